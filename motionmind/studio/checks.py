@@ -42,6 +42,17 @@ def check_movements(state: State, edit: Edit, frames: Callable[[str], int]) -> N
                 )
 
 
+def check_names(edit: Edit) -> None:
+    """Check that the postures which an edit saves can be asked for by their names.
+
+    Raises:
+        MotionMindError: one cannot: a browser takes it out of an address.
+    """
+    for one in each(edit):
+        if isinstance(one, SavePosture) and one.posture is not None and {".", ".."} & set(one.name.split("/")):
+            raise MotionMindError(f"a posture cannot be called “{displayed(one.name)}”: give it another name")
+
+
 def missing_in(state: State, has_corpus: Callable[[str], bool], marks: Marks) -> list[str]:
     """Say in a line each what a piece needs that is not there: corpora by name, and what others have no more.
 

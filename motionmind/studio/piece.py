@@ -178,7 +178,7 @@ class State:
         try:
             return self._places[block]
         except KeyError:
-            raise MotionMindError(f"the piece has no stretch {displayed(block)}") from None
+            raise MotionMindError("this stretch is not in the piece any more") from None
 
     def block(self, block: str) -> Block:
         """Return the block of that id; MotionMindError if there is none."""
@@ -188,7 +188,7 @@ class State:
         """Return the seam between two neighbours; MotionMindError if they are not neighbours."""
         place = self.place(left)
         if self.place(right) != place + 1:
-            raise MotionMindError(f"{displayed(right)} does not follow {displayed(left)} in the piece")
+            raise MotionMindError("these two stretches do not follow each other any more")
         return self.seams[place]
 
     def stable(self, key: str) -> str:
@@ -324,7 +324,7 @@ def _countable(blocks: tuple[Block, ...]) -> tuple[Block, ...]:
 def _moved(state: State, edit: Move) -> State:
     place = state.place(edit.block)
     if edit.before == edit.block:
-        raise MotionMindError(f"{displayed(edit.block)} cannot stand before itself")
+        raise MotionMindError("a stretch cannot stand before itself")
     block, rest = state.blocks[place], state.blocks[:place] + state.blocks[place + 1 :]
     before = len(rest)
     if edit.before is not None:
@@ -339,7 +339,7 @@ def _split(state: State, edit: Split) -> State:
     _check_new(state, edit.id)
     if not block.first < edit.at <= block.last:
         raise MotionMindError(
-            f"{displayed(edit.block)} goes from frame {block.first} to {block.last}: frame {edit.at} does not split it"
+            f"the stretch goes from frame {block.first} to {block.last}: frame {edit.at} does not split it"
         )
     one = msgspec.structs.replace(block, last=edit.at - 1)
     other = msgspec.structs.replace(block, first=edit.at, id=edit.id)
@@ -376,7 +376,7 @@ def _forget_ends(state: State, block: Block, *, begins: bool, ends: bool) -> Sta
 def _open(seam: Seam) -> Verdict:
     """The word on a seam; MotionMindError if it is locked."""
     if seam.verdict.decision == "locked":
-        raise MotionMindError(f"the insertion between {' and '.join(seam.pair)} is locked: unlock it first")
+        raise MotionMindError("an insertion that this changes is locked: unlock it first")
     return seam.verdict
 
 

@@ -10,7 +10,7 @@ from typing import Self
 from motionmind.display import displayed
 from motionmind.errors import FormatError, MotionMindError, enumerated
 from motionmind.studio import piece
-from motionmind.studio.checks import check_movements, corpora_of, missing_in
+from motionmind.studio.checks import check_movements, check_names, corpora_of, missing_in
 from motionmind.studio.edits import Edit, SetCorpus, Wish, touched, words_of
 from motionmind.studio.journal import Journal
 from motionmind.studio.movements import Movements, version_of
@@ -191,6 +191,7 @@ class Project:
         """
         self.greet(window)
         try:
+            check_names(edit)
             state = piece.apply(self.state, edit)
             check_movements(state, edit, self.marks.length)
         except MotionMindError as error:

@@ -43,7 +43,8 @@ def layout_of(state: State, findings: Findings, marks: Marks, standing: Standing
 
     def insertion(seam: Seam) -> str | None:
         finding = findings(seam)
-        found = standing(seam) if state_of(seam, finding) == "waiting" else chosen_at(seam, finding)
+        is_sought = state_of(seam, finding) in ("waiting", "abrupt")
+        found = standing(seam) if is_sought else chosen_at(seam, finding)
         return found.key if found else None
 
     return lay_out(state, insertion, marks)

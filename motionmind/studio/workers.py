@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import sys
 import threading
+import time
 from collections import OrderedDict, deque
 from collections.abc import Callable
 from contextlib import suppress
@@ -141,8 +142,7 @@ def _seen(future: asyncio.Future[Any]) -> None:
 class Workers:
     """The worker processes, and the jobs that wait for them: the urgent ones first, and of those the oldest.
 
-    Where there are several workers, one of them does nothing but what is urgent, so that nobody waits for what goes on
-    in the background.
+    Where there are several, one does nothing but what is urgent: nobody waits for what goes on in the background.
     """
 
     def __init__(
@@ -158,7 +158,7 @@ class Workers:
         """
         self._theirs, self._tell = (home, warm), tell
         self._loop = asyncio.get_running_loop()
-        self._numbers = count(1)
+        self._numbers = count(time.time_ns())  # no job of a studio that ran before has one of them
         self._waiting: deque[Job] = deque()
         self._jobs: OrderedDict[str, Job] = OrderedDict()
         self._number = number or _room()

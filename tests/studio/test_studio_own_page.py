@@ -136,11 +136,14 @@ def test_a_piece_is_varied_by_mouse(served: Served, open_page: Open, size: str) 
     # Both beside each other, then the variation becomes the piece, one undo.
     page.get_by_test_id("beside").click()
     until(page, "document.querySelectorAll('.stage.two canvas').length === 2")
+    titles = "[studio.viewer.title, studio.viewer.halves[1].dataset.title].join(' | ')"
+    assert page.evaluate(titles) == "The piece | The variation"
     assert piece(served) == ["b1", "b2"]
     page.get_by_test_id("vary").click()
     until(page, "studio.store.state.piece.blocks.length > 2")
     varied = piece(served)
     assert len(varied) == page.locator(".tiles > li").count()
+    until(page, f"{titles} === 'Before | The piece'")
     # Insertions come as they are found.
     until(page, "studio.store.state.piece.seams.some(seam => seam.state === 'inserted')")
     page.locator(".tiles .seam.inserted").first.wait_for()
@@ -330,6 +333,11 @@ def test_a_recording_leaves_questions(served: Served, open_page: Open, shared_da
     card.get_by_text("no person is so tall").wait_for()
     card.get_by_test_id("unit").select_option("")
     card.get_by_text("no person is so tall").wait_for(state="detached")
+    rate = card.get_by_test_id("fps")
+    for wrong in ("0", "2000"):
+        rate.fill(wrong)
+        rate.press("Tab")
+        assert rate.input_value() == "120"  # which is in use
     card.get_by_test_id("skip").click()
     card.get_by_text("is being read again").wait_for()
     card.get_by_text("is being read again").wait_for(state="detached")

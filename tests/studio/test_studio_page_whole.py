@@ -26,6 +26,12 @@ _FAULTS = """async () => {
     .filter(({ impact }) => impact === 'serious' || impact === 'critical')
     .flatMap(({ id, nodes }) => nodes.map((node) => `${id}: ${node.html.slice(0, 200)} ${node.failureSummary}`));
 }"""
+_NEEDS = """(field) => {
+  field.style.flex = 'none';
+  const { width } = field.getBoundingClientRect();
+  field.style.flex = '';
+  return width;
+}"""
 _WORDS = """() => {
   const shown = (element) => element.checkVisibility() && !element.closest('details:not([open]) > :not(summary)');
   const told = ['aria-label', 'title', 'placeholder', 'alt'];
@@ -117,4 +123,49 @@ def test_the_page_speaks_a_choreographers_words(studio_server: Served, browser: 
         found[name] = sorted({match[0] for match in FORBIDDEN.finditer(words)})
     page.context.close()
     assert {name: words for name, words in found.items() if words} == {}
+    assert errors == []
+
+
+def test_nothing_covers_what_it_stands_beside(studio_server: Served, browser: Any) -> None:
+    studio_server.send("DELETE", "/api/seams")  # no insertion moves what stands there
+    for number in range(9):
+        studio_server.insert(f"b{number}", "ballet/adagio", 0, 40)
+    page, errors = _enter(studio_server, browser, "light", 1024)
+    # Counts on the ruler, up to eights of three digits.
+    page.get_by_test_id("tempo").fill("300")
+    page.get_by_test_id("tempo").press("Tab")
+    gap = """() => {
+      const labels = [...document.querySelectorAll('.ruler .count')].map((label) => label.getBoundingClientRect());
+      return Math.min(...labels.slice(1).map((label, i) => label.left - labels[i].right));
+    }"""
+    for _ in range(12):
+        page.evaluate("document.querySelector('.tracks').scrollLeft = 1e6")
+        page.wait_for_timeout(100)
+        assert "100·1" < page.locator(".ruler .count.strong").last.inner_text() < "199·1"
+        assert page.evaluate(gap) >= 2
+        page.get_by_test_id("zoom-in").click()
+    # What is wished, beside what plays; also on a telephone, where all of it is read.
+    page.evaluate("studio.store.set({ selection: { seam: ['b0', 'b1'] } })")
+    page.get_by_test_id("wishes").click()
+    for width in (1440, 1024, 390):
+        page.set_viewport_size({"width": width, "height": 844})
+        page.wait_for_timeout(200)
+        sheet, play = page.get_by_test_id("wish-sheet").bounding_box(), page.get_by_test_id("transport").bounding_box()
+        assert 0 <= sheet["y"] < sheet["y"] + sheet["height"] <= 844
+        assert sheet["y"] + sheet["height"] <= play["y"] or play["y"] + play["height"] <= sheet["y"]
+        for name in ("wish-joint", "wish-hold"):
+            field = page.get_by_test_id(name)
+            assert field.bounding_box()["width"] >= field.evaluate(_NEEDS) - 1
+    page.context.close()
+    assert errors == []
+
+
+def test_one_is_not_several(studio_server: Served, browser: Any) -> None:
+    studio_server.insert("b0", "ballet/adagio", 0, 40)
+    page, errors = _enter(studio_server, browser, "light", 1024)
+    page.get_by_text(re.compile(r"^1 stretch, \d")).wait_for()
+    studio_server.insert("b1", "ballet/plies", 0, 20)
+    page.get_by_test_id("insertion-1").and_(page.locator("[data-state=inserted]")).click()
+    assert re.fullmatch(r"Insertion, [\d.]+ s +(?!\d).+", page.get_by_test_id("selected").inner_text())
+    page.context.close()
     assert errors == []

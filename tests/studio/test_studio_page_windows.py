@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -72,6 +73,44 @@ def test_another_window_sees_an_edit_and_takes_back_its_own_alone(
         expect(page.get_by_test_id("block-b1")).to_have_count(0)
 
 
+def test_a_title_that_is_left_as_it_was_is_not_given_again(
+    studio_server: Served, studio_page: Any, expect: Any
+) -> None:
+    title = studio_page.get_by_test_id("title")
+    expect(title).to_have_value("piece")
+    title.click()
+    studio_server.edit(edit="title", title="Swan")
+    expect(studio_page).to_have_title(re.compile("^Swan"))
+    expect(title).to_have_value("piece")  # nobody's words are taken from under their fingers
+    title.press("Tab")
+    expect(title).to_have_value("Swan")
+    studio_page.wait_for_timeout(200)
+    assert studio_server.project()["title"] == "Swan"
+
+
+def test_a_posture_that_is_saved_again_is_pictured_again(studio_server: Served, studio_page: Any, expect: Any) -> None:
+    def save(source: str) -> str:
+        told = studio_server.post("/api/pose/open", {"key": source})
+        pose = {"key": source, "rotations": told["rotations"], "root": told["root"]}
+        key: str = studio_server.post("/api/pose/keep", {"pose": pose, "name": "mine"})["key"]
+        studio_server.edit(edit="posture", name="mine", posture=key)
+        return key
+
+    picture = studio_page.get_by_test_id("posture-mine").locator("img")
+    shown = "JSON.stringify(studio.viewer.motion.rotations)"
+    before = ""
+    for source in ("ballet/fifth", "ballet/arabesque"):
+        key = save(source)
+        expect(picture).to_have_attribute("src", f"/api/thumbnails/{key}/0.png?height=96")
+        studio_page.get_by_test_id("posture-mine").click()
+        expect(studio_page.locator(".caption .name")).to_have_text("mine")
+        studio_page.wait_for_timeout(300)
+        assert studio_page.evaluate(shown) != before
+        before = studio_page.evaluate(shown)
+    studio_page.reload()
+    expect(picture).to_have_attribute("src", f"/api/thumbnails/{key}/0.png?height=96")
+
+
 def test_what_is_edited_while_a_page_opens_is_seen_there(studio_server: Served, studio_page: Any, expect: Any) -> None:
     edited: list[Any] = []
 
@@ -139,3 +178,43 @@ def test_a_page_elsewhere_can_neither_read_nor_write(studio_server: Served, stud
     assert tried == dict.fromkeys(tried, "refused")
     assert len(tried) == 5
     assert studio_server.project() == before
+
+
+def test_a_search_is_begun_again_by_the_studio_that_was_started_again(
+    studio_server: Served, browser: Any, expect: Any
+) -> None:
+    studio = studio_server.studio
+
+    def lose() -> None:
+        """What a page sees of it: its stream ends, and its jobs are known no more."""
+        studio.workers._jobs.clear()
+        for stream in studio.events._streams:
+            stream.end()
+
+    context = browser.new_context(
+        viewport={"width": 1024, "height": 768}, device_scale_factor=0.5, reduced_motion="reduce"
+    )
+    page, searches = context.new_page(), list[str]()
+    page.on("request", lambda request: request.url.endswith("/api/between") and searches.append(request.url))
+    page.goto(studio_server.entry)
+    page.get_by_test_id("posture-arabesque").click()
+    with page.expect_response("**/api/between"):
+        page.get_by_test_id("posture-fifth").click()
+    studio.workers._loop.call_soon_threadsafe(lose)
+    with page.expect_response("**/api/between"):
+        pass
+    expect(page.get_by_test_id("alternatives")).to_have_attribute("data-state", "found", timeout=120_000)
+    assert len(searches) == 2
+    # Nobody was there when it was asked for: it is once somebody is.
+    page.route("**/api/between", lambda route: route.abort())
+    page.get_by_label("Exchange A and B").click()
+    expect(page.get_by_test_id("alternatives")).to_contain_text("The studio does not answer")
+    page.unroute("**/api/between")
+    studio.workers._loop.call_soon_threadsafe(lose)
+    expect(page.get_by_test_id("alternatives")).to_have_attribute("data-state", "found", timeout=120_000)
+    # Whatever else is asked for says the same.
+    page.route("**/api/export/*", lambda route: route.abort())
+    page.get_by_test_id("open-take").click()
+    page.get_by_test_id("export-project").click()
+    expect(page.get_by_test_id("toast")).to_contain_text("The studio does not answer: has it ended?")
+    context.close()

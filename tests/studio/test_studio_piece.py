@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from motionmind.errors import MotionMindError
 from motionmind.studio import edits as e
-from motionmind.studio.checks import check_movements
+from motionmind.studio.checks import check_movements, check_names
 from motionmind.studio.piece import State, Verdict, apply, apply_all
 from motionmind.studio.questions import question_of
 
@@ -204,7 +204,7 @@ def test_a_locked_insertion_changes_only_when_it_is_unlocked():
         e.Trim("b2", 3, 8),
         e.Mirror("b2"),
     ):
-        with pytest.raises(MotionMindError, match=r"between b1 and b2 is locked: unlock it first"):
+        with pytest.raises(MotionMindError, match="locked: unlock it first"):
             apply(state, edit)
     assert apply(state, e.Trim("b1", 3, 8)).verdicts == state.verdicts
     assert apply(state, e.Split("b1", 5, "n")).seam("n", "b2").verdict == Verdict(
@@ -212,6 +212,21 @@ def test_a_locked_insertion_changes_only_when_it_is_unlocked():
     )
     open_again = apply_all([e.Decide("b1", "b2", "open"), e.Trim("b1", 2, 7)], state)
     assert open_again.seam("b1", "b2").verdict == Verdict()
+
+
+@pytest.mark.parametrize("name", [".", "..", "arms/."])
+def test_a_posture_has_a_name_by_which_it_can_be_asked_for(name):
+    with pytest.raises(MotionMindError, match="cannot be called"):
+        check_names(e.Several((e.SetTitle("Swan"), e.SavePosture(name, "m-1"))))
+    check_names(e.SavePosture(name, None))  # which an earlier version let save it
+    check_names(e.SavePosture(f"{name}bow", "m-1"))
+
+
+def test_what_is_gone_is_said_without_names_that_nobody_gave():
+    gone = apply(BEGIN, e.Delete("b1"))
+    for edit in (e.Delete("b1"), e.Trim("b1", 2, 7), e.Mirror("b1"), e.Decide("b1", "b2", "locked")):
+        with pytest.raises(MotionMindError, match=r"^this stretch is not in the piece any more$"):
+            apply(gone, edit)
 
 
 def test_a_saved_posture_that_is_used_stays_as_it_was():

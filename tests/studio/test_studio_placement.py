@@ -187,6 +187,9 @@ def test_what_was_inserted_stands_until_a_wish_is_answered() -> None:
     view = view_of(piece, lambda _: None, Marks(movement), str.upper, lambda _: found)
     assert [part["key"] for part in view["parts"]] == ["c/one", "m-found", "c/two"]
     assert (view["seams"][0]["state"], view["seams"][0]["seconds"]) == ("waiting", pytest.approx(0.5))
+    abrupt = Finding("q", True, "not seen", None)  # is looked at, but what joins it is still sought
+    view = view_of(piece, lambda _: abrupt, Marks(movement), str.upper, lambda _: found)
+    assert [part["key"] for part in view["parts"]] == ["c/one", "m-found", "c/two"]
     none = Finding("q", True, "no way found", ())
     view = view_of(piece, lambda _: none, Marks(movement), str.upper, lambda _: found)
     assert [part["key"] for part in view["parts"]] == ["c/one", "c/two"]

@@ -60,9 +60,19 @@ export class Api extends EventTarget {
     return this.#ask(path, { method: "POST", body: file, headers: { "X-Name": encodeURIComponent(name) } });
   }
 
+  /** A file that the server makes: its answer. @param {string} path @returns {Promise<Response>} */
+  file(path) {
+    return this.#answer(path, { method: "GET" });
+  }
+
   /** Edit the project: the new state, which the store has taken over. @param {object} edit */
   edit(edit) {
     return this.#change("/api/edits", { edit });
+  }
+
+  /** Put an alternative that a search found onto the line of time. @param {string} job @param {number} alternative from 1 */
+  accept(job, alternative) {
+    return this.#change("/api/between/accept", { job, alternative });
   }
 
   undo() {
@@ -87,13 +97,18 @@ export class Api extends EventTarget {
 
   /** @param {string} path @param {RequestInit} request */
   async #ask(path, request) {
+    return (await this.#answer(path, request)).json().catch(() => ({}));
+  }
+
+  /** @param {string} path @param {RequestInit} request */
+  async #answer(path, request) {
     if (request.method !== "GET") this.expected.clear(); // what was answered before may be so no more
     const headers = { "X-MotionMind": "studio", ...request.headers };
     const answer = await fetch(path, { ...request, headers, credentials: "same-origin" }).catch(() => {
       throw new AwayError(AWAY);
     });
-    const found = await answer.json().catch(() => ({}));
-    if (!answer.ok) throw new Error(found.error ?? `The studio answered with ${answer.status}.`);
-    return found;
+    if (answer.ok) return answer;
+    const { error } = await answer.json().catch(() => ({}));
+    throw new Error(error ?? `The studio answered with ${answer.status}.`);
   }
 }

@@ -1,7 +1,7 @@
 /** What the page asks for while its other modules are on their way: the project, the gallery and its first pictures. */
 
 import { Api } from "./api.js";
-import { movementAt, thumbnail } from "./places.js";
+import { knowPostures, movementAt, thumbnail } from "./places.js";
 
 const SEEN = 12; // postures of the gallery that are seen before anybody scrolls
 const FIRST = 3; // of them, for which the body in 3D waits: where there is no GPU it takes longer than all else
@@ -9,14 +9,15 @@ const FIRST = 3; // of them, for which the body in 3D waits: where there is no G
 /** Requests to the server, the first of which are under way. */
 export const api = new Api();
 
-/** @param {any} gallery */
-function expectPictures(gallery) {
+/** @param {[any, any]} answers the gallery and the project */
+function expectPictures([gallery, project]) {
+  knowPostures(project.postures);
   const postures = [gallery.own, ...gallery.corpora.map((/** @type {any} */ corpus) => corpus.postures)].flat();
   const pictures = postures.slice(0, SEEN).map(({ key }) => Object.assign(new Image(), { src: thumbnail(key, 0) }));
   if (postures.length > 0) api.expect(movementAt(postures[0].key));
   return Promise.allSettled(pictures.slice(0, FIRST).map((picture) => picture.decode()));
 }
 
-api.expect(`/api/project?window=${api.window}`);
+const project = api.expect(`/api/project?window=${api.window}`);
 /** @type {Promise<unknown>} over when the gallery's first pictures have come, or will not */
-export const pictured = api.expect("/api/gallery").then(expectPictures, () => {}); // who needs it hears why it is not there
+export const pictured = Promise.all([api.expect("/api/gallery"), project]).then(expectPictures, () => {}); // who needs it hears why it is not there

@@ -10,6 +10,7 @@ import { Bar } from "./shell/bar.js";
 import { useChange } from "./shell/hooks.js";
 import { icon } from "./shell/icons.js";
 import { Keys } from "./shell/keys.js";
+import { oncer } from "./shell/once.js";
 import { View } from "./shell/stage.js";
 import { Shown, Toasts } from "./shell/toasts.js";
 import { Store } from "./store.js";
@@ -104,6 +105,15 @@ async function start() {
   const keys = new Keys();
   const store = new Store(api);
   const viewer = new Viewer();
+  /** Do something that may fail, and say in one line why it did. @param {() => Promise<any>} doing */
+  const act = async (doing) => {
+    try {
+      return await doing();
+    } catch (error) {
+      toasts.say(error instanceof Error ? error.message : String(error), { kind: "error" });
+      return undefined;
+    }
+  };
   const studio = {
     api,
     store,
@@ -115,15 +125,9 @@ async function start() {
     pictured: () => shown,
     open: (/** @type {string} */ panel) => open.set(panel),
     say: toasts.say.bind(toasts),
-    /** Do something that may fail, and say in one line why it did. @param {() => Promise<any>} doing */
-    act: async (doing) => {
-      try {
-        return await doing();
-      } catch (error) {
-        toasts.say(error instanceof Error ? error.message : String(error), { kind: "error" });
-        return undefined;
-      }
-    },
+    act,
+    /** As `act`, but not again while the same, by its name, is being done: for what a button or a key begins. */
+    once: oncer(act),
   };
   Object.assign(window, { studio }); // for tests, and for whoever is curious
   render(html`<${Studio} studio=${studio} open=${open} />`, /** @type {Element} */ (document.getElementById("studio")));

@@ -2,7 +2,7 @@
 
 import { Body } from "motionmind/body";
 import { Motion } from "motionmind/motion";
-import { movementAt } from "./places.js";
+import { movementAt, stable } from "./places.js";
 
 const MOST = 48; // movements that are kept, the latest used
 /** @type {Map<string, Promise<any>>} */
@@ -17,18 +17,14 @@ const bodies = new Map(); // bodies are many movements', and what draws them tak
  * @returns {Promise<any>}
  */
 export function movement(api, key) {
-  const known = kept.get(key);
-  kept.delete(key);
+  const now = stable(key); // one's own posture may have been saved again since
+  const known = kept.get(now);
+  kept.delete(now);
   const found = known ?? api.get(movementAt(key)).then((/** @type {object} */ data) => playable(data, key));
-  if (!known) found.catch(() => kept.delete(key));
-  kept.set(key, found);
+  if (!known) found.catch(() => kept.delete(now));
+  kept.set(now, found);
   if (kept.size > MOST) kept.delete(kept.keys().next().value ?? "");
   return found;
-}
-
-/** Forget a movement that may have become another, such as a posture that was saved again. */
-export function forget(/** @type {string} */ key) {
-  kept.delete(key);
 }
 
 /**

@@ -1,13 +1,18 @@
 /** What the page knows: the project as it stands, what is selected, and the jobs that run. It knows no views. */
 
 import { AwayError } from "./api.js";
+import { knowPostures } from "./places.js";
 import { useChange } from "./shell/hooks.js";
 
 const AGAIN = [500, 1000, 2000, 4000]; // milliseconds until a lost connection is tried again
 const OVER = new Set(["done", "failed", "cancelled"]);
+const LOST = "The studio was started again in the middle of it.";
 const REMEMBERED = 50; // jobs that are over
 
-/** Fires "change" whenever something has changed, and "job" with what a job has come to. */
+/**
+ * Fires "change" whenever something has changed, "job" with what a job has come to, and "back" once the studio is there
+ * again; jobs that it does not know then were lost: they have failed, and `lost` says so.
+ */
 export class Store extends EventTarget {
   /** @param {import("./api.js").Api} api */
   constructor(api) {
@@ -46,6 +51,7 @@ export class Store extends EventTarget {
   /** Take over a state, unless it is older than the one that is there. @param {any} state */
   take(state) {
     if (this.state && state.sequence < this.state.sequence) return;
+    knowPostures(state.postures);
     this.set({ state });
   }
 
@@ -60,8 +66,7 @@ export class Store extends EventTarget {
     source.addEventListener("open", () => {
       this.tries = 0;
       this.stopped = false; // or else the next event says so
-      if (!this.connected) this.load().catch(() => {});
-      if (!this.connected) this.set({ connected: true });
+      if (!this.connected) this.#return();
     });
     source.addEventListener("project", (event) => {
       const { sequence, left } = JSON.parse(event.data); // `left` is a window whose edits are everybody's now
@@ -77,6 +82,21 @@ export class Store extends EventTarget {
       this.load().catch((error) => this.set({ refusal: error instanceof AwayError ? "" : error.message }));
       setTimeout(() => this.#listen(), AGAIN[Math.min(this.tries++, AGAIN.length - 1)]);
     });
+  }
+
+  /** The studio is there again, or another that was started in its place. */
+  #return() {
+    this.load().catch(() => {});
+    this.set({ connected: true });
+    for (const job of this.jobs.values()) if (!OVER.has(job.state)) this.#lookFor(job);
+    this.dispatchEvent(new Event("back"));
+  }
+
+  /** @param {any} job */
+  async #lookFor(job) {
+    const lost = { ...job, state: "failed", words: LOST, lost: true };
+    const found = await this.api.get(`/api/jobs/${job.id}`).catch((error) => (error instanceof AwayError ? null : lost));
+    if (found) this.#hear(found);
   }
 
   /** @param {any} job */

@@ -61,6 +61,7 @@ export class Viewer extends EventTarget {
   home(motion, { time } = {}) {
     this.piece = motion;
     if (this.isHome || !this.motion) this.#take(motion, { time, title: "", home: true, look: false });
+    else this.dispatchEvent(new Event("show")); // there is a piece to come back to
   }
 
   /** Forget the piece, which nothing is left of; whoever looks at something else goes on. */

@@ -72,14 +72,14 @@ function Alternatives({ studio }) {
   const searching = state === "searching";
   return html`<section ref=${section} class="centre alternatives" data-testid="alternatives" data-state=${state} aria-label="Alternatives" aria-busy=${String(searching)}>
     <header class="row">
-      <h2 class="grow">${heading(state, found.length)}</h2>
+      <h2 class="grow">${desk.away ? "Not searched yet" : heading(state, found.length)}</h2>
       <p class="hint" role="status">${searching && words && getting ? `${getting}; then it begins, and all else works meanwhile.` : words}</p>
       ${searching && html`<button class="button" onClick=${() => desk.stop()}>Cancel</button>`}
       <button class="button quiet icon" aria-label="Back to the viewer" title="Back to the viewer (Esc)" onClick=${() => desk.show(false)}>
         ${icon("close")}
       </button>
     </header>
-    ${state === "failed" && html`<p class="empty">No movement joins these two postures. Try another posture, or another length.</p>`}
+    ${state === "failed" && !desk.away && html`<p class="empty">No movement joins these two postures. Try another posture, or another length.</p>`}
     <div class="four" role="radiogroup" aria-label="Alternatives" hidden=${state === "failed"}>
       ${Array.from({ length: state === "found" ? found.length : COUNT }, (_, i) =>
         found[i]

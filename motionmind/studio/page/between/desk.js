@@ -1,5 +1,6 @@
 /** From A to B: which two postures, what was found between them, and which of it is chosen. It knows no views. */
 
+import { AwayError } from "../api.js";
 import { playable } from "../movements.js";
 
 const MOST = 4; // alternatives
@@ -29,12 +30,14 @@ export class Desk extends EventTarget {
     this.job = null;
     this.state = "idle"; // "idle" | "searching" | "found" | "failed"
     this.words = "";
+    this.away = false; // whether nobody was there to search
     this.shown = false;
     this.asked = 0; // counts searches, so that what comes late is known
     /** @type {any} what was heard of the job last */
     this.seen = null;
     this.taking = 0; // the search whose movements are being fetched
     studio.store.addEventListener("change", () => this.#follow());
+    studio.store.addEventListener("back", () => this.away && this.search());
   }
 
   /** Pick a posture: the first is A, the second B; later ones wait to be set. @param {Place} place */
@@ -70,7 +73,7 @@ export class Desk extends EventTarget {
   async search() {
     this.stop();
     const { a, b } = this.ends;
-    Object.assign(this, { found: [], chosen: 0, words: "", state: a && b ? "searching" : "idle", shown: Boolean(a && b) });
+    Object.assign(this, { found: [], chosen: 0, words: "", away: false, state: a && b ? "searching" : "idle", shown: Boolean(a && b) });
     this.#changed();
     if (!a || !b) return;
     const asked = ++this.asked;
@@ -84,7 +87,9 @@ export class Desk extends EventTarget {
       this.job = job;
       this.#follow();
     } catch (error) {
-      if (asked === this.asked) this.#fail(error instanceof Error ? error.message : String(error));
+      if (asked !== this.asked) return;
+      this.away = error instanceof AwayError;
+      this.#fail(error instanceof Error ? error.message : String(error));
     }
   }
 
@@ -111,13 +116,15 @@ export class Desk extends EventTarget {
   }
 
   /** Put the chosen alternative onto the line of time. */
-  async accept() {
+  accept() {
+    return this.studio.once("accept", () => this.#accept());
+  }
+
+  async #accept() {
     const { job, chosen } = this;
     if (!this.found[chosen]) return;
-    const { viewer, api, act, store } = this.studio;
-    const done = await act(() => api.post("/api/between/accept", { job, alternative: chosen + 1, window: api.window }));
-    if (!done) return;
-    store.take(done);
+    const { viewer, api, store } = this.studio;
+    await api.accept(/** @type {string} */ (job), chosen + 1);
     // The next movement goes on from here.
     Object.assign(this, { ends: { a: this.ends.b, b: null }, choice: null, found: [], state: "idle", shown: false, job: null });
     viewer.back();
@@ -137,7 +144,10 @@ export class Desk extends EventTarget {
     this.seen = job;
     this.words = job.state === "waiting" ? "It waits until the engine is free." : "";
     if (job.state === "failed") {
-      this.#fail(job.words);
+      if (job.lost) {
+        this.job = null; // nobody is left to give it up
+        this.search();
+      } else this.#fail(job.words);
       return;
     }
     this.#changed();

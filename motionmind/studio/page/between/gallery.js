@@ -138,7 +138,7 @@ function whole({ key, frames, title }) {
 export async function insert(studio, { key, frame, last = frame }) {
   const id = `b-${crypto.randomUUID().slice(0, 13)}`;
   const edit = { edit: "insert", id, source: key, first: frame, last, mirrored: false, before: null };
-  if (await studio.act(() => studio.api.edit(edit))) studio.viewer.back();
+  if (await studio.once(`insert ${key} ${frame} ${last}`, () => studio.api.edit(edit))) studio.viewer.back();
 }
 
 /** A clip's moments: the viewer shows the one that is scrubbed to. @param {{studio: any, clip: any}} props */

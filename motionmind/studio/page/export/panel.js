@@ -73,8 +73,7 @@ function Save({ studio, format, testid }) {
   const save = async () => {
     setBusy(true);
     await studio.act(async () => {
-      const answer = await fetch(`/api/export/${format}`, { credentials: "same-origin" });
-      if (!answer.ok) throw new Error((await answer.json().catch(() => null))?.error ?? "The studio did not answer.");
+      const answer = await studio.api.file(`/api/export/${format}`);
       offer(await answer.blob(), nameOf(answer) ?? `piece.${format}`);
     });
     setBusy(false);

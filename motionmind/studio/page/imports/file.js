@@ -1,6 +1,7 @@
 /** A file that somebody brought: what was understood, what it leaves open, and what can be done with it. */
 
 import { html } from "../vendor/htm-preact-standalone.js";
+import { written } from "../shell/fields.js";
 import { bodyOf, doubtsOf, lengthOf, sizeOf } from "./words.js";
 
 const UNITS = /** @type {[string, string][]} */ ([
@@ -59,6 +60,7 @@ function Questions({ file, choose }) {
   const [clip] = facts.clips;
   const posed = facts.clips.some((one) => one.posed_first);
   const chosen = choices.unit ?? "";
+  const fps = choices.fps ?? (clip.fps && Number(clip.fps.toFixed(2)));
   return html`<div class="questions">
     ${WITH_UNIT.includes(kind) &&
     html`<label class="row"><span class="grow">Unit of length</span>
@@ -70,8 +72,12 @@ function Questions({ file, choose }) {
     clip.fps !== null &&
     html`<label class="row"><span class="grow">Frames a second</span>
       <input class="field numbers" data-testid="fps" type="number" min="1" max="1000" step="any" inputmode="decimal"
-        value=${choices.fps ?? Number(clip.fps.toFixed(2))}
-        onChange=${(/** @type {any} */ event) => event.target.value > 0 && choose({ fps: Number(event.target.value) })} /></label>`}
+        value=${fps}
+        onChange=${written((given) => {
+          if (given < 1 || given > 1000) return fps;
+          choose({ fps: given });
+          return given;
+        })} /></label>`}
     ${(posed || (skips?.[0] ?? 0) > 0) &&
     html`<label class="check"><input type="checkbox" data-testid="skip" checked=${(skips?.[0] ?? 0) > 0}
       onChange=${(/** @type {any} */ event) => choose({ skip: event.target.checked ? null : 0 })} />

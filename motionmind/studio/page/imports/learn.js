@@ -23,11 +23,7 @@ export function Learn({ studio, imports }) {
   const count = imports.parts.length;
   const mixed = Object.entries(mix).map(([corpus, weight]) => ({ name: corpus, weight }));
   const ready = name.trim() && (count > 0 || mixed.length > 0) && !busy;
-  const learn = async (/** @type {Event} */ event) => {
-    event.preventDefault();
-    const refusal = imports.refusal(name.trim());
-    setError(refusal);
-    if (refusal) return;
+  const learn = async () => {
     try {
       setId(await imports.learn({ name: name.trim(), title, mix: mixed, mirror }));
     } catch (failed) {
@@ -38,7 +34,15 @@ export function Learn({ studio, imports }) {
     const { [corpus]: _, ...others } = mix;
     setMix(weight ? { ...others, [corpus]: Number(weight) } : others);
   };
-  return html`<form class="stack learn" onSubmit=${learn}>
+  return html`<form
+    class="stack learn"
+    onSubmit=${(/** @type {Event} */ event) => {
+      event.preventDefault();
+      const refusal = imports.refusal(name.trim());
+      setError(refusal);
+      if (!refusal) studio.once("learn", learn);
+    }}
+  >
     <h3>Learn a corpus</h3>
     <p class="hint">${count ? `From ${count} clip${count > 1 ? "s" : ""} above` : "Bring files, or mix corpora that there are"}${
       mixed.length ? `, and ${mixed.map((one) => one.name).join(", ")}` : ""

@@ -78,7 +78,7 @@ export function Panel({ studio }) {
       )}
       ${imports.files.map(
         (file) => html`<${FileCard} key=${file.id} imports=${imports} file=${file} onFail=${failed}
-          onLook=${(/** @type {number} */ clip) => look(file, clip).catch(failed)} onPut=${(/** @type {number} */ clip) => put(file, clip).catch(failed)} />`,
+          onLook=${(/** @type {number} */ clip) => look(file, clip).catch(failed)} onPut=${(/** @type {number} */ clip) => studio.once(`put ${file.id} ${clip}`, () => put(file, clip))} />`,
       )}
     </ul>
     <${Learn} studio=${studio} imports=${imports} />

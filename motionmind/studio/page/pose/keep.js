@@ -2,7 +2,6 @@
 
 import { html, useState } from "../vendor/htm-preact-standalone.js";
 import { deskOf } from "../between/desk.js";
-import { forget } from "../movements.js";
 
 /** @param {{studio: any, editor: import("./session.js").Editor}} props */
 export function Keep({ studio, editor }) {
@@ -12,7 +11,6 @@ export function Keep({ studio, editor }) {
   const save = async () => {
     const key = await editor.keep(called);
     const replaced = studio.store.state?.postures?.some((/** @type {{name: string}} */ one) => one.name === called);
-    forget(`own/${called}`);
     await studio.api.edit({ edit: "posture", name: called, posture: key });
     studio.say(replaced ? `${called} is replaced: undo brings the one before back.` : `Saved as ${called}.`);
     return `own/${called}`;
@@ -36,14 +34,14 @@ export function Keep({ studio, editor }) {
       () => {},
     );
   };
-  const doing = (/** @type {() => Promise<any>} */ act) => () => studio.act(act);
+  const doing = (/** @type {string} */ what, /** @type {() => Promise<any>} */ act) => () => studio.once(`${what} a posture`, act);
   return html`<section class="stack" aria-label="Keep the posture">
     <h3>Keep it</h3>
     <form
       class="row"
       onSubmit=${(/** @type {Event} */ event) => {
         event.preventDefault();
-        studio.act(save);
+        doing("save", save)();
       }}
     >
       <input
@@ -58,10 +56,10 @@ export function Keep({ studio, editor }) {
       <button class="button" type="submit" data-testid="save-posture">Save</button>
     </form>
     <div class="row wide">
-      <button class="button" data-testid="use-a" onClick=${doing(end("a"))}>Use as A</button>
-      <button class="button" data-testid="use-b" onClick=${doing(end("b"))}>Use as B</button>
-      <button class="button" data-testid="posture-to-timeline" onClick=${doing(place)}>Onto the time line</button>
-      <button class="button" data-testid="copy-score" onClick=${doing(copy)}>Copy for a score</button>
+      <button class="button" data-testid="use-a" onClick=${doing("begin with", end("a"))}>Use as A</button>
+      <button class="button" data-testid="use-b" onClick=${doing("end with", end("b"))}>Use as B</button>
+      <button class="button" data-testid="posture-to-timeline" onClick=${doing("insert", place)}>Onto the time line</button>
+      <button class="button" data-testid="copy-score" onClick=${doing("copy", copy)}>Copy for a score</button>
     </div>
     ${lines && html`<textarea readonly aria-label="Lines of a score" data-testid="score-lines" value=${lines}></textarea>`}
   </section>`;

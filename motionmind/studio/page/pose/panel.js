@@ -29,8 +29,8 @@ export function Panel({ studio }) {
     };
   }, []);
   useKeys(studio, [
-    { keys: ["Ctrl+z"], does: "take the last change of the posture back", group: GROUP, act: (event) => isOfPosture(event, editor.began ?? editor.past[0]) && editor.undo() },
-    { keys: ["Ctrl+Shift+z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "do it again", group: GROUP, act: (event) => isOfPosture(event, editor.future[0]) && editor.redo() },
+    { keys: ["Ctrl+z"], does: "take the last change of the posture back", group: GROUP, act: (event) => isOfPosture(event, editor, editor.began ?? editor.past[0]) && editor.undo() },
+    { keys: ["Ctrl+Shift+z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "do it again", group: GROUP, act: (event) => isOfPosture(event, editor, editor.future[0]) && editor.redo() },
     { keys: ["k"], does: "bring it to what is known", group: GROUP, act: () => toKnown(editor) },
     { keys: ["f"], does: "feet on the floor", group: GROUP, act: () => toFloor(editor) },
     { shown: ["Tab"], does: "from handle to handle", group: GROUP },
@@ -48,9 +48,12 @@ export function Panel({ studio }) {
   </div>`;
 }
 
-/** Whether a key is for a posture's change, if there is one: not at the line of time. @param {Event} event @param {unknown} change */
-function isOfPosture({ target }, change) {
-  return Boolean(change) && !(target instanceof Element && target.closest(".timeline"));
+/**
+ * Whether a key is for a posture's change, if there is one: not at the line of time, nor where the posture is not shown.
+ * @param {Event} event @param {import("./session.js").Editor} editor @param {unknown} change
+ */
+function isOfPosture({ target }, editor, change) {
+  return Boolean(change) && editor.shown && !(target instanceof Element && target.closest(".timeline"));
 }
 
 /** Where posing starts. @param {{studio: any}} props */

@@ -13,6 +13,9 @@ const STEPS = 200; // that can be taken back
  * @typedef {{joint: string, words: string, on: string, at: [number, number, number]}} Handle a joint, or a heel on one
  * @typedef {{joint: string, words: string, angle: string, label: string, least: number, most: number, degrees: number}} Turn
  * @typedef {"seen" | "near" | "unseen"} Known
+ * @typedef {{motion: any, key: string, title: string, joints: Joint[], handles: Handle[], turns: Turn[], mirrors: boolean,
+ *   released: Set<string>}} Opened what is posed: the movement that the posture was opened of, and its body
+ * @typedef {{posture: Posture, opened: Opened, words: string}} Step
  */
 
 /** @type {WeakMap<object, Editor>} */
@@ -54,9 +57,9 @@ export class Editor extends EventTarget {
     this.words = "";
     /** @type {Posture} */
     this.posture = { rotations: [], root: [] };
-    /** @type {{posture: Posture, words: string}[]} */
+    /** @type {Step[]} */
     this.past = [];
-    /** @type {{posture: Posture, words: string}[]} */
+    /** @type {Step[]} */
     this.future = [];
     /** @type {{posture: Posture, standing: string[], words: string} | null} where a drag or a turn began, and what it is */
     this.began = null;
@@ -68,17 +71,22 @@ export class Editor extends EventTarget {
     );
   }
 
-  /** Open a frame of a movement. @param {string} key @param {number} frame @param {string} name the movement's title if "" */
+  /**
+   * Open a frame of a movement. If a posture is being made, that is a step of it, which can be taken back.
+   * @param {string} key @param {number} frame @param {string} name the movement's title if ""
+   */
   async open(key, frame = 0, name = "") {
     const [told, source] = await Promise.all([
       this.studio.api.post("/api/pose/open", { key, frame }),
       movement(this.studio.api, key),
     ]);
+    await this.end();
     const { joints, handles, mirrors } = told;
     const title = name || told.title;
     const shown = told.rotations.length ? { rotations: told.rotations, root: told.root } : this.posture;
-    Object.assign(this, { key, title, joints, handles, mirrors, selected: handles[0]?.on ?? "", dragged: "", words: "" });
-    Object.assign(this, { past: [], future: [], began: null, released: new Set(), motion: new Posed(source, shown) });
+    if (this.past.length) this.#step(this.posture, `start from ${title}`);
+    else this.future = [];
+    this.#put({ motion: new Posed(source, shown), key, title, joints, handles, turns: [], mirrors, released: new Set() });
     this.#take(told);
     this.show();
     this.dispatchEvent(new Event("open"));
@@ -182,11 +190,13 @@ export class Editor extends EventTarget {
 
   async undo() {
     await this.end();
+    if (!this.shown) this.show();
     this.#travel(this.past, this.future);
   }
 
   async redo() {
     await this.end();
+    if (!this.shown) this.show();
     this.#travel(this.future, this.past);
   }
 
@@ -210,18 +220,36 @@ export class Editor extends EventTarget {
 
   /** @param {Posture} before @param {string} words */
   #step(before, words) {
-    this.past = [...this.past, { posture: before, words }].slice(-STEPS);
+    this.past = [...this.past, { posture: before, opened: this.#opened, words }].slice(-STEPS);
     this.future = [];
     this.#changed();
   }
 
-  /** @param {{posture: Posture, words: string}[]} from @param {{posture: Posture, words: string}[]} to */
+  /** @returns {Opened} */
+  get #opened() {
+    const { motion, key, title, joints, handles, turns, mirrors, released } = this;
+    return { motion, key, title, joints, handles, turns, mirrors, released };
+  }
+
+  /** Pose another. @param {Opened} opened */
+  #put(opened) {
+    Object.assign(this, opened, { selected: opened.handles[0]?.on ?? "", dragged: "", words: "" });
+  }
+
+  /** @param {Step[]} from @param {Step[]} to */
   #travel(from, to) {
     const step = from.pop();
     if (!step || !this.motion) return;
-    to.push({ posture: this.posture, words: step.words });
+    to.push({ posture: this.posture, opened: this.#opened, words: step.words });
+    const isAnother = step.opened.motion !== this.motion;
     this.posture = step.posture;
     this.dragged = "";
+    if (isAnother) {
+      this.#put(step.opened);
+      this.motion.take(this.posture);
+      this.show();
+      this.dispatchEvent(new Event("open"));
+    }
     this.requests.send(() => this.studio.api.post("/api/pose/tell", { pose: this.#pose(this.posture) }));
     this.#changed();
   }

@@ -85,12 +85,14 @@ function button(name, label, what, act) {
 function Title({ studio, title }) {
   const [written, write] = useState(title);
   const field = useRef(/** @type {any} */ (null));
+  const before = useRef(""); // what it held when somebody came to it: another window may call the piece something else meanwhile
   useEffect(() => {
     if (document.activeElement !== field.current) write(title); // nobody's words are taken from under their fingers
     document.title = title ? `${title} · MotionMind studio` : "MotionMind studio";
   }, [title]);
   const save = () => {
-    if (written.trim() && written.trim() !== title) studio.act(() => studio.api.edit({ edit: "title", title: written.trim() }));
+    const wanted = written.trim();
+    if (wanted && ![before.current, title].includes(wanted)) studio.act(() => studio.api.edit({ edit: "title", title: wanted }));
     else write(title);
   };
   return html`<input
@@ -102,6 +104,7 @@ function Title({ studio, title }) {
     placeholder="Untitled"
     maxlength="200"
     value=${written}
+    onFocus=${() => (before.current = written)}
     onInput=${(/** @type {any} */ event) => write(event.target.value)}
     onBlur=${save}
     onKeyDown=${(/** @type {any} */ event) => {

@@ -21,6 +21,7 @@ export function View({ studio }) {
   useLayoutEffect(() => place.current.prepend(viewer.element), []);
   const home = useChange(viewer, () => viewer.isHome, "show");
   const title = useChange(viewer, () => viewer.title, "show");
+  const piece = useChange(viewer, () => viewer.piece, "show");
   useKeys(studio, [
     { keys: [" "], does: "play or pause", group: GROUP, act: () => player.toggle() },
     { keys: ["ArrowLeft"], does: "one frame back", group: GROUP, act: () => player.step(-1) },
@@ -46,7 +47,7 @@ export function View({ studio }) {
         !home &&
         html`<div class="caption">
           ${title && html`<span class="name cut">${title}</span>`}
-          ${viewer.piece && html`<button class="button" onClick=${() => viewer.back()}>${icon("back")} Back to the piece</button>`}
+          ${piece && html`<button class="button" onClick=${() => viewer.back()}>${icon("back")} Back to the piece</button>`}
         </div>`
       }
       <div class="views" role="group" aria-label="View">

@@ -4,7 +4,10 @@ import { bounded, fitting } from "./scale.js";
 import {
   discard,
   duplicate,
+  EMPTY,
   flip,
+  lasting,
+  lengthOf,
   lock,
   move,
   nameOf,
@@ -19,7 +22,6 @@ import {
 } from "./items.js";
 
 const LONGER = 0.1; // seconds by which a key makes an insertion longer
-const SHORTEST = 0.1;
 const ZOOM = 1.4;
 
 export class Actions {
@@ -34,8 +36,10 @@ export class Actions {
     this.show = show;
     /** What is in sight: pixels a second, pixels to the left of it, and its width. */
     this.sight = { scale: 60, left: 0, width: 800, fits: true };
-    /** @type {import("./items.js").Piece} */
-    this.piece = { blocks: [], seams: [], parts: [], seconds: 0 };
+    /** @type {Promise<any>} over when the edits that were asked for are answered */
+    this.turn = Promise.resolve();
+    /** @type {{name: string, by: number, done: Promise<any>} | null} steps whose turn is still to come: more join them */
+    this.steps = null;
     /** Whether the keys' focus is on the tracks. */
     this.focused = false;
     /** The moment of the piece that is shown, or was last, seconds. */
@@ -65,22 +69,51 @@ export class Actions {
     if (playing && (x < 0 || x > width)) this.show({ left: Math.max(time * scale - width / 8, 0) });
   }
 
+  /** @returns {import("./items.js").Piece} */
+  get piece() {
+    return this.studio.store.state?.piece ?? EMPTY;
+  }
+
   get item() {
     return selected(this.piece, this.studio.store.selection);
   }
 
-  /** Send an edit; null does nothing. What the server refuses is said in a line. */
-  async edit(edit) {
-    if (!edit) return;
+  /**
+   * Send an edit, or what a function makes of the piece as all that was done before has left it; null does nothing.
+   * What the server refuses is said in a line.
+   */
+  edit(edit) {
+    return this.#inTurn(() => this.#send(typeof edit === "function" ? edit() : edit));
+  }
+
+  /** Edit what is selected now, as it is when it is its turn. @param {(item: import("./items.js").Item) => any} make */
+  #editSelected(make) {
+    const { selection } = this.studio.store;
+    return this.edit(() => make(selected(this.piece, selection) ?? {}));
+  }
+
+  /** Do something once all that was done before is answered: keys are pressed faster than that. */
+  #inTurn(doing) {
+    this.steps = null;
+    const done = this.turn.then(() => this.studio.api.changed).then(doing);
+    this.turn = done.catch(() => {});
+    return done;
+  }
+
+  /** Whether an edit was sent, and done. */
+  async #send(edit) {
+    if (!edit) return false;
     this.look();
-    await this.#sent(() => this.studio.api.edit(edit));
+    return this.#sent(() => this.studio.api.edit(edit));
   }
 
   async #sent(send) {
     try {
       await send();
+      return true;
     } catch (error) {
       this.studio.say(error instanceof Error ? error.message : String(error), { kind: "error" });
+      return false;
     }
   }
 
@@ -108,70 +141,94 @@ export class Actions {
   }
 
   moveBy(by) {
-    const { block } = this.item ?? {};
-    if (!block) return undefined;
-    return this.edit(move(this.piece, block, this.piece.blocks.findIndex(({ id }) => id === block.id) + by));
+    return this.#editSelected(
+      ({ block }) => block && move(this.piece, block, this.piece.blocks.findIndex(({ id }) => id === block.id) + by),
+    );
   }
 
-  /** Let a stretch begin or end `by` frames later, or an insertion last longer. */
+  /** Let a stretch begin or end `by` frames later, or an insertion last longer. Steps that wait are taken as one. */
   trimBy(side, by) {
-    const { block, seam } = this.item ?? {};
-    if (block) return this.edit(trim(block, side, block[side] + by));
-    return seam?.state === "inserted" ? this.last(seam, seam.seconds + by * LONGER) : undefined;
+    const { selection } = this.studio.store;
+    const name = `${side} ${nameOf(selection)}`;
+    if (this.steps?.name === name) {
+      this.steps.by += by;
+      return this.steps.done;
+    }
+    const steps = { name, by, done: Promise.resolve() };
+    steps.done = this.edit(() => {
+      if (this.steps === steps) this.steps = null;
+      const { block, seam } = selected(this.piece, selection) ?? {};
+      if (block) return trim(block, side, block[side] + steps.by);
+      return seam?.stands ? lasting(seam, lengthOf(seam) + steps.by * LONGER) : null;
+    });
+    this.steps = steps;
+    return steps.done;
   }
 
   /** Let an insertion last some seconds. */
   last(seam, seconds) {
-    return this.edit(wish(seam, { seconds: Math.round(Math.max(seconds, SHORTEST) * 100) / 100 }));
+    return this.edit(lasting(seam, seconds));
   }
 
   split() {
-    const { block } = this.item ?? {};
-    if (!block) return undefined;
-    const edit = split(block, this.time, this.times(block), newId(this.studio.window));
-    if (!edit) this.studio.say("put the playhead inside the stretch to split it there", { kind: "note" });
-    return this.edit(edit);
+    const { time } = this;
+    return this.#editSelected(({ block }) => {
+      if (!block) return null;
+      const edit = split(block, time, this.times(block), newId(this.studio.window));
+      if (!edit) this.studio.say("put the playhead inside the stretch to split it there", { kind: "note" });
+      return edit;
+    });
   }
 
   async duplicate() {
-    const { block } = this.item ?? {};
-    if (!block) return;
     const id = newId(this.studio.window);
-    await this.edit(duplicate(this.piece, block, id));
-    if (this.studio.store.state.piece.blocks.some((one) => one.id === id)) this.studio.store.set({ selection: { block: id } });
+    await this.#editSelected(({ block }) => block && duplicate(this.piece, block, id));
+    if (this.piece.blocks.some((one) => one.id === id)) this.studio.store.set({ selection: { block: id } });
   }
 
   mirror() {
-    const { block } = this.item ?? {};
-    return block && this.edit({ edit: "mirror", block: block.id });
+    return this.#editSelected(({ block }) => block && { edit: "mirror", block: block.id });
   }
 
   /** Delete the stretch, or discard the insertion or restore it. */
-  async remove() {
-    const { block, seam } = this.item ?? {};
-    if (seam) {
-      if (seam.alternatives.length > 0) await this.edit(discard(seam));
-    } else if (block) {
+  remove() {
+    const { selection } = this.studio.store;
+    return this.#inTurn(async () => {
+      const { block, seam } = selected(this.piece, selection) ?? {};
+      if (seam && seam.alternatives.length > 0) await this.#send(discard(seam));
+      if (!block) return;
       const at = this.piece.blocks.findIndex(({ id }) => id === block.id);
       const next = this.piece.blocks[at + 1] ?? this.piece.blocks[at - 1];
-      await this.edit({ edit: "delete", block: block.id });
-      this.studio.store.set({ selection: next ? { block: next.id } : null });
-    }
+      const done = await this.#send({ edit: "delete", block: block.id });
+      if (done) this.studio.store.set({ selection: next ? { block: next.id } : null });
+    });
   }
 
   /** Show an insertion's alternative `by` places on: at the playhead if it is in it, or else in its middle. */
   flip(by) {
-    const { seam } = this.item ?? {};
-    const change = seam && flip(seam, by);
-    if (!change) return undefined;
-    const { at, seconds } = seam;
-    if (this.time <= at || this.time >= at + seconds) this.seek(at + seconds / 2);
-    return this.edit(change);
+    return this.#editSelected(({ seam }) => {
+      const change = seam && flip(seam, by);
+      if (!change) return null;
+      const { at, seconds } = seam;
+      if (this.time <= at || this.time >= at + seconds) this.seek(at + seconds / 2);
+      return change;
+    });
   }
 
   lock() {
-    const { seam } = this.item ?? {};
-    return seam && seam.alternatives.length > 0 && this.edit(lock(seam));
+    return this.#editSelected(({ seam }) => seam && seam.alternatives.length > 0 && lock(seam));
+  }
+
+  /**
+   * Wish for something else at a seam.
+   * @param {import("./items.js").Seam} seam
+   * @param {(ask: import("./items.js").Ask) => object} change returns what is different from what is wished when it is its turn
+   */
+  wish({ left, right }, change) {
+    return this.edit(() => {
+      const now = selected(this.piece, { seam: [left, right] })?.seam;
+      return now && wish(now, change(now.ask));
+    });
   }
 
   pass(seam, posture, share = 1) {

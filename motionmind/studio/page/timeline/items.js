@@ -9,11 +9,15 @@ import { lastBefore } from "./composed.js";
  * @typedef {{id: string, source: string, first: number, last: number, mirrored: boolean, key: string, title: string,
  *   frames: number, missing: boolean, at: number, seconds: number}} Block
  * @typedef {{left: string, right: string, number: number, state: string, words: string, chosen: number,
- *   alternatives: {key: string, seconds: number, words: string}[], decision: string, ask: Ask, at: number,
+ *   alternatives: {key: string, seconds: number, words: string}[], decision: string, ask: Ask, at: number, stands: boolean,
  *   seconds: number}} Seam
  * @typedef {{block?: Block, seam?: Seam}} Item
  * @typedef {{blocks: Block[], seams: Seam[], parts: object[], seconds: number}} Piece
  */
+
+/** A piece of nothing. @type {Piece} */
+export const EMPTY = { seconds: 0, parts: [], blocks: [], seams: [] };
+export const [SHORTEST, LONGEST] = [0.1, 60]; // seconds of an insertion that can be wished for
 
 /** The item that a selection names, or undefined. @param {Piece} piece */
 export function selected(piece, selection) {
@@ -128,6 +132,16 @@ export function split(block, time, times, id) {
 /** Ask for something else at a seam. @param {Seam} seam @param {Partial<Ask>} change */
 export function wish({ left, right, ask }, change) {
   return { edit: "ask", left, right, ...ask, ...change };
+}
+
+/** Let a seam's insertion last some seconds. @param {Seam} seam */
+export function lasting(seam, seconds) {
+  return wish(seam, { seconds: Math.round(Math.min(Math.max(seconds, SHORTEST), LONGEST) * 100) / 100 });
+}
+
+/** How long an insertion is, or will be once what is wished is found. @param {Seam} seam */
+export function lengthOf({ state, seconds, ask }) {
+  return (state === "inserted" ? null : ask.seconds) ?? seconds;
 }
 
 /** Let a seam's insertion pass through a posture too, at a share of its way. @param {Seam} seam */

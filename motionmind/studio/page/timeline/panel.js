@@ -6,14 +6,13 @@ import { thumbnail } from "../places.js";
 import { useStore } from "../store.js";
 import { Actions } from "./actions.js";
 import { Composed, Movements } from "./composed.js";
-import { selected } from "./items.js";
+import { EMPTY, selected } from "./items.js";
 import { act, KEYS } from "./keys.js";
 import { fitting } from "./scale.js";
 import { Toolbar } from "./toolbar.js";
 import { Tracks } from "./tracks.js";
 import { WishSheet } from "./wishes.js";
 
-const EMPTY = { seconds: 0, parts: [], blocks: [], seams: [] };
 const TEMPO = "motionmind-tempo"; // where this browser keeps it
 const HEIGHT = 48; // pixels of a thumbnail
 /** The rows of the sheet of keys; the tracks hear the keys themselves, where they have the focus. */
@@ -33,7 +32,6 @@ export function Panel({ studio }) {
   const [tempo, setTempo] = useState(() => Number(localStorage.getItem(TEMPO)) || 120);
   const does = useMemo(() => new Actions(studio, new Movements((key) => movement(studio.api, key)), show), [studio]);
   does.sight = sight;
-  does.piece = piece;
   const joints = usePlayed(studio, does.movements, piece).filter((name) => LIMBS.test(name));
   useEffect(() => {
     if (sight.fits) show({ scale: fitting(piece.seconds, sight.width, piece.blocks.length), left: 0 });

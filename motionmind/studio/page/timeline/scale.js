@@ -4,6 +4,7 @@ export const LEAST = 2; // pixels a second
 export const MOST = 1200;
 const APART = 64; // pixels between numbers on the ruler, at least
 const STEPS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1200, 3600];
+const DIGIT = 8; // pixels of a digit there
 const BAR = 8; // counts that dancers count to
 const CROWD = 300; // stretches in sight, at most
 const SIDES = 40; // pixels beside a piece that is shown whole: a posture that it ends with is drawn on both sides of its end
@@ -32,7 +33,9 @@ export function secondTicks(from, to, scale) {
 /** Ticks of counts at so many beats a minute: [{at, label, strong}]; each eight begins with a strong one. */
 export function countTicks(from, to, scale, tempo) {
   const beat = 60 / tempo;
-  const every = [1, 2, 4, 8, 16, 32, 64, 128].find((each) => each * beat * scale >= (each < BAR / 2 ? 26 : 40)) ?? 256;
+  const digits = String(Math.floor(to / beat / BAR) + 1).length; // of the last eight's number
+  const room = (each) => (each < BAR / 2 ? 26 : 40) + DIGIT * (digits - 1);
+  const every = [1, 2, 4, 8, 16, 32, 64, 128].find((each) => each * beat * scale >= room(each)) ?? 256;
   const ticks = [];
   for (let i = Math.max(Math.floor(from / (beat * every)), 0) * every; i * beat <= to; i += every) {
     const eight = Math.floor(i / BAR) + 1;

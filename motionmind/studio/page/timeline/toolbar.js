@@ -1,6 +1,7 @@
 /** The bar above the tracks: what can be done with what is selected, how smoothing goes, tempo and zoom. */
 
 import { html } from "../vendor/htm-preact-standalone.js";
+import { written } from "../shell/fields.js";
 import { selected } from "./items.js";
 import { clock } from "./scale.js";
 
@@ -42,7 +43,11 @@ export function Toolbar({ does, piece, selection, tempo, onTempo, stopped, onSto
         value=${tempo}
         data-testid="tempo"
         aria-label="Tempo, beats a minute"
-        onChange=${(event) => onTempo(Math.min(Math.max(Number(event.target.value) || 120, 20), 300))}
+        onChange=${written((given) => {
+          const beats = Math.min(Math.max(given || 120, 20), 300);
+          onTempo(beats);
+          return beats;
+        })}
       />
     </label>
     <div class="zoom row">
@@ -71,7 +76,7 @@ function OfSeam({ does, seam, sheet }) {
   const locked = decision === "locked";
   return html`<p class="grow cut" data-testid="selected">
       <b>${seam.stands ? `Insertion, ${clock(seam.seconds)} s` : any ? "Insertion, left out" : "Seam"}</b>${" "}
-      <span class="pale">${state === "inserted" ? alternatives[chosen - 1].words : seam.stands ? "another is being sought" : words}</span>
+      <span class="pale">${state === "inserted" ? besideLength(alternatives[chosen - 1].words) : seam.stands ? "another is being sought" : words}</span>
     </p>
     ${any &&
     html`<div class="row flip">
@@ -141,7 +146,12 @@ function Button({ icon, words, does, test, pressed }) {
   </button>`;
 }
 
+/** What there is to know of an insertion beside its length. */
+function besideLength(words) {
+  return words.split("; ").filter((one) => !/^[\d.]+ s$/.test(one)).join("; ");
+}
+
 function hintFor({ blocks, seconds }) {
   if (blocks.length === 0) return "Nothing yet: accept an alternative, or drag a posture here.";
-  return `${blocks.length} stretches, ${clock(seconds)} s. Select one, or press Tab and the arrow keys.`;
+  return `${blocks.length} stretch${blocks.length === 1 ? "" : "es"}, ${clock(seconds)} s. Select one, or press Tab and the arrow keys.`;
 }

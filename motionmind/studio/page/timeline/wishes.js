@@ -1,8 +1,9 @@
 /** What is wished of an insertion: its length, postures that it passes, hands and feet that stay. */
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { written } from "../shell/fields.js";
 import { plain } from "./blocks.js";
-import { pass, wish } from "./items.js";
+import { lasting, LONGEST, SHORTEST } from "./items.js";
 
 const HOLDS = {
   start: "stays as at the start",
@@ -31,12 +32,12 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
   };
   const without = (list, index) => list.filter((_, i) => i !== index);
   const addPosture = () => {
-    if (posture) does.edit(pass(seam, { posture, frame: 0 }));
+    if (posture) does.wish(seam, ({ passing }) => ({ passing: [...passing, { posture, frame: 0 }] }));
     setPosture("");
   };
   const addPin = () => {
     const { begins, ends } = hold === "place" ? stay : { begins: 0, ends: 1 };
-    if (joint) does.edit(wish(seam, { pins: [...ask.pins, { joint, hold, begins, ends }] }));
+    if (joint) does.wish(seam, ({ pins }) => ({ pins: [...pins, { joint, hold, begins, ends }] }));
     setJoint("");
   };
   return html`<section
@@ -57,17 +58,18 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
       <input
         class="field numbers"
         type="number"
-        min="0.1"
-        max="60"
+        min=${SHORTEST}
+        max=${LONGEST}
         step="0.1"
         placeholder="as usual"
         data-testid="wish-seconds"
         disabled=${locked}
         value=${ask.seconds ?? ""}
-        onChange=${(event) => {
-          const seconds = Number(event.target.value);
-          does.edit(wish(seam, { seconds: seconds > 0 ? Math.min(seconds, 600) : null }));
-        }}
+        onChange=${written((given) => {
+          const seconds = given > 0 ? lasting(seam, given).seconds : null;
+          does.wish(seam, () => ({ seconds }));
+          return seconds;
+        })}
       />
     </label>
     <div class="stack">
@@ -81,7 +83,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
         }))}
         action="Remove"
         locked=${locked}
-        onAction=${(index) => does.edit(wish(seam, { passing: without(ask.passing, index) }))}
+        onAction=${(index) => does.wish(seam, () => ({ passing: without(ask.passing, index) }))}
       />
       <div class="row">
         <select
@@ -108,7 +110,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
         }))}
         action="Let go"
         locked=${locked}
-        onAction=${(index) => does.edit(wish(seam, { pins: without(ask.pins, index) }))}
+        onAction=${(index) => does.wish(seam, () => ({ pins: without(ask.pins, index) }))}
       />
       <div class="row">
         <select
@@ -153,7 +155,11 @@ function Stay({ seam, stay, locked, onStay }) {
       data-testid=${`wish-${name}`}
       disabled=${locked}
       value=${(stay[name] * seam.seconds).toFixed(1)}
-      onChange=${(event) => onStay({ ...stay, [name]: Math.min(Math.max(Number(event.target.value) / seam.seconds, least), most) })}
+      onChange=${written((given) => {
+        const share = Math.min(Math.max(given / seam.seconds, least), most);
+        onStay({ ...stay, [name]: share });
+        return (share * seam.seconds).toFixed(1);
+      })}
     />
   </label>`;
   const gap = Math.min(LEAST / seam.seconds, 0.5);

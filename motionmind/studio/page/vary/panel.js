@@ -63,10 +63,16 @@ export function Panel({ studio }) {
   const departs = proposal ? departure(proposal.departs) : "";
   const isFarthest = Boolean(proposal) && !varying.asking && wish.nudge === null && wish.depart > proposal.departs + OFF;
   const told = isFarthest ? `${departs} at most` : departs;
-  const vary = async () => {
-    await varying.ask();
+  const make = async () => {
+    // An edit may still be on its way, and others come while the variation is made: it is of the piece after them.
+    for (let changed; changed !== studio.api.changed; ) {
+      ({ changed } = studio.api);
+      await changed;
+      await varying.ask();
+    }
     if (varying.edit && !varying.error) await studio.api.edit(varying.edit);
   };
+  const vary = () => studio.once("vary", make);
   return html`<section class="stack vary">
     <h2>Variations</h2>
     <${AttractorMap} studio=${studio} varying=${varying} piece=${shown} playing=${view.playing} />
@@ -175,7 +181,8 @@ function useView(studio, varying, piece) {
     );
     if (varying.proposal !== proposal) return; // another was asked for meanwhile
     const { viewer } = studio;
-    const how = both ? { beside: own, title: "The piece", besideTitle: "The variation" } : { title: "The variation" };
+    const [before, now] = isPiece ? ["Before", "The piece"] : ["The piece", "The variation"];
+    const how = both ? { beside: own, title: before, besideTitle: now } : { title: now };
     viewer.show(both ? original : own, { time, look: !looking, ...how });
   };
   const failed = (/** @type {Error} */ error) => studio.say(error.message, { kind: "error" });

@@ -37,9 +37,15 @@ export class Varying extends EventTarget {
     /** @type {Proposal | null} */
     this.proposal = null;
     this.error = "";
-    this.asking = false;
     this.stale = false;
+    /** @type {Promise<void> | null} over with the latest that was asked for; null when it is */
+    this.answered = null;
     this.version = 0;
+  }
+
+  /** Whether something is asked for. */
+  get asking() {
+    return this.answered !== null;
   }
 
   /** Wish for something else; what is asked meanwhile is asked once, the latest of all. @param {Partial<Wish>} change */
@@ -49,11 +55,14 @@ export class Varying extends EventTarget {
     return this.ask();
   }
 
-  /** Ask for what is wished. */
-  async ask() {
+  /** Ask for what is wished; over once that is answered, and not what was asked for before. */
+  ask() {
     this.stale = true;
-    if (this.asking) return;
-    this.asking = true;
+    this.answered ??= this.#ask();
+    return this.answered;
+  }
+
+  async #ask() {
     while (this.stale) {
       this.stale = false;
       try {
@@ -64,7 +73,7 @@ export class Varying extends EventTarget {
       }
       this.#changed();
     }
-    this.asking = false;
+    this.answered = null;
     this.#changed();
   }
 
