@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from command_line import Run
 
+from motionmind.body.contact import lowest_height
 from motionmind.body.motion import Posture
 from motionmind.bundled import bundled
 from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
@@ -151,6 +152,16 @@ def test_who_is_slower_takes_no_longer_than_in_proportion(name: str, pace: float
         a, b = (Posture(known.corpus.skeleton, known.corpus.rotations[k], known.corpus.root[k]) for k in pair)
         own, other = (seconds(known.tween(a, b, pace=one)) for one in (1.0, pace))
         assert 0.85 < other * pace / own < 1.1
+
+
+def test_nothing_sinks_into_the_floor_before_the_end() -> None:
+    known = Engine.load("karate")
+    clips = {clip.label: known.corpus.motion(clip) for clip in known.corpus.clips}
+    pairs = ("heian-shodan", 53, "taikyoku-shodan", 48), ("taikyoku-shodan", 90, "heian-sandan", 47)
+    for a, frame, b, to in pairs:
+        motion = known.tween(clips[a].posture(frame), clips[b].posture(to)).motion
+        low = lowest_height(motion.skeleton, motion.rotations, motion.root)
+        assert low.min() > min(low[0], low[-1], 0.0) - 0.0035
 
 
 @pytest.mark.parametrize("long", [7.0, 12.0, 20.0, 30.0, 60.0])
