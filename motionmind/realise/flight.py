@@ -208,6 +208,8 @@ def fall_freely(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bool
         fps: frames a second.
     """
     mass, falls = find_falls(skeleton, rotations, root, given, fps)
+    if not falls:
+        return root
     out = root.copy()
     for start, stop in falls:
         seconds = np.arange(stop - start + 2) / fps

@@ -202,8 +202,10 @@ def realise(
     )
     motion = settle(Motion(a.skeleton, rotations, root, clock.frames), clock)
     if windows is not None:
-        quickest = _quickest(windows(LONGER * float(clock.frames[-1]), pace), speeds, pace, len(a.skeleton))
-        motion, clock = slow_down(motion, clock, quickest, moving, pace * slides, settle, lasts=length is not None)
+        most = windows(LONGER * float(clock.frames[-1]), pace)
+        if length is None:
+            most = _quickest(most, speeds, pace, len(a.skeleton))
+        motion, clock = slow_down(motion, clock, most, moving, pace * slides, settle, lasts=length is not None)
     return Realised(replace(motion, name="tween", insertions=(Insertion(clock.moves),)), detailed, walk.left_out)
 
 

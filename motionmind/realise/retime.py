@@ -40,7 +40,7 @@ JUMPS_AT = 0.95  # share of the fastest rise with which a body jumps on the way 
 AROUND = 1.0 / 6.0  # seconds about what is too quick, in which the clock is slower
 LONGER = 1.1  # times as long as it was a movement is taken to be at most, when it is compared with others as long
 ROUNDS = 3  # of slowing down at most
-SPARES = 0.5  # share of the time that slow parts could do without, which fast ones may take
+SPARES = 0.3  # share of the time that slow parts could do without, which fast ones may take
 AGAIN = 3  # times at most that it slows down and settles
 SLIGHT = 1e-3  # by which a clock is not worth slowing
 LEFT = 0.1  # metres, of a person: walks that are no higher have not left the floor
@@ -237,12 +237,14 @@ def _within(slower: Floats, slack: Floats, seconds: Floats) -> Floats:
 
     Args:
         slower: how many times longer each is to take [N - 1].
-        slack: what share of its time each could do without [N - 1]; up to SPARES of that is taken.
+        slack: what share of its time each could do without [N - 1]; where more than SPARES of that would be taken,
+            all is left as it is.
         seconds: how long each takes [N - 1].
     """
     more, spare = float((slower - 1.0) @ seconds), float(slack @ seconds)
-    share = min(1.0, SPARES * spare / more) if more > 0.0 else 0.0
-    return np.asarray(1.0 + share * (slower - 1.0) - slack * (share * more / max(spare, 1e-9)))
+    if more > SPARES * spare:
+        return np.ones(len(slower))
+    return np.asarray(slower - slack * (more / max(spare, 1e-9)))
 
 
 def _slowed(motion: Motion, clock: Timeline, slower: Floats) -> tuple[Motion, Timeline]:
