@@ -93,5 +93,6 @@ def studio_page(request: pytest.FixtureRequest, studio_server: Served, browser: 
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.goto(studio_server.entry)
     yield page
+    page.unroute_all(behavior="wait")  # an answer still held back would fail in whatever test comes next
     context.close()
     assert not errors
