@@ -13,7 +13,8 @@ import numpy as np
 
 from motionmind import Engine, Motion, Posture, make_discretization, own_skeleton, read_motion
 from motionmind._typing import Ints
-from motionmind.corpus.corpus import Clip, Corpus
+from motionmind.corpus.clip import Clip
+from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
 from motionmind.metrics import find_floor
 from motionmind.metrics.measure import at_rate

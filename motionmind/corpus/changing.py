@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind.body.motion import Motion
-from motionmind.corpus.corpus import Clip, Corpus
+from motionmind.corpus.clip import Clip
+from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
 from motionmind.corpus.recordings import Flips, Recording
 from motionmind.errors import CorpusError, suggestion

@@ -7,15 +7,13 @@ every clip is where it starts and what it counts, and that is in the columns.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple, TypeVar, overload
+from typing import NamedTuple, TypeVar, overload
 
 import msgspec
 import numpy as np
 
 from motionmind._typing import Bytes, Floats, Int32s, Ints
-
-if TYPE_CHECKING:
-    from motionmind.corpus.corpus import Clip
+from motionmind.corpus.clip import Clip
 
 _Kind = TypeVar("_Kind")
 
@@ -114,15 +112,14 @@ def key_of(clip: Clip) -> tuple[str, str]:
     return clip.corpus, clip.name
 
 
-class StoredClips(Entries["Clip"]):
+class StoredClips(Entries[Clip]):
     """The clips of a corpus on disk.
 
     Args:
         packed: their entries.
-        kind: Clip.
         columns: their columns, which agree with the entries.
     """
 
-    def __init__(self, packed: Packed, kind: type[Clip], columns: Columns) -> None:
-        super().__init__(packed, kind)
+    def __init__(self, packed: Packed, columns: Columns) -> None:
+        super().__init__(packed, Clip)
         self.columns = columns

@@ -21,7 +21,7 @@ import numpy as np
 from motionmind._typing import Bools, Floats
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.corpus import FLIP_DEGREES, JointFlip, JointRepair, Repair
+from motionmind.corpus.clip import FLIP_DEGREES, JointFlip, JointRepair, Repair
 from motionmind.geometry import rotations as rot
 
 FLIP_SPEED = 3000.0  # degrees a second

@@ -23,7 +23,8 @@ from motionmind.arguments import (
     check_type,
 )
 from motionmind.body.motion import Motion
-from motionmind.corpus.corpus import FLIP_DEGREES, MAX_PRICE, Clip, Corpus, Facing
+from motionmind.corpus.clip import FLIP_DEGREES, Clip
+from motionmind.corpus.corpus import MAX_PRICE, Corpus, Facing
 from motionmind.corpus.origins import gather_origins, warn_of_licences
 from motionmind.corpus.recordings import (
     Flips,

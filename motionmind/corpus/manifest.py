@@ -7,7 +7,8 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from motionmind.corpus.corpus import FLIP_DEGREES, Clip, Facing, JointFlip
+from motionmind.corpus.clip import FLIP_DEGREES, Clip, JointFlip
+from motionmind.corpus.corpus import Facing
 from motionmind.credits.credit import Origin
 from motionmind.errors import FormatError
 

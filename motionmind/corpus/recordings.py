@@ -16,7 +16,8 @@ from motionmind.body.mirror import find_sides, mirrored
 from motionmind.body.motion import Motion
 from motionmind.body.rates import FILM_RATE
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.corpus import FLIP_DEGREES, Clip, Corpus, JointFlip, JointRepair, subdivide_times
+from motionmind.corpus.clip import FLIP_DEGREES, Clip, JointFlip, JointRepair
+from motionmind.corpus.corpus import Corpus, subdivide_times
 from motionmind.corpus.flips import find_flips, repair_flips
 from motionmind.errors import CorpusError, SkeletonError
 from motionmind.geometry import rotations as rot

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store, versions
-from motionmind.corpus.corpus import Clip, JointFlip
+from motionmind.corpus.clip import Clip, JointFlip
 from motionmind.corpus.fingerprint import fingerprint
 from motionmind.corpus.manifest import BodyEntry
 from motionmind.corpus.recordings import Piece, Recording, Taking, take

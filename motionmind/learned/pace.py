@@ -37,7 +37,8 @@ import numpy as np
 from motionmind._typing import Floats, Ints
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.corpus import Clip, Corpus
+from motionmind.corpus.clip import Clip
+from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.learned.peaks import LENGTHS, RARE, Peaks, accelerations
 from motionmind.learned.percentiles import Percentile

@@ -20,7 +20,8 @@ from motionmind._typing import States
 from motionmind.body.limbs import parts_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store
-from motionmind.corpus.corpus import FLIP_DEGREES, Clip, Corpus, JointFlip
+from motionmind.corpus.clip import FLIP_DEGREES, Clip, JointFlip
+from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.entries import Columns, Entries, Packed, StoredClips
 from motionmind.corpus.fingerprint import fingerprint
 from motionmind.corpus.gather import gather
@@ -257,7 +258,7 @@ def _read_arrays(
 def _clips(arrays: Mapping[str, NDArray[Any]]) -> StoredClips:
     """Return the clips of a corpus from its arrays."""
     columns = Columns(*(arrays[f"clips.{key}"] for key in Columns._fields))
-    return StoredClips(_packed("clips", arrays), Clip, columns)
+    return StoredClips(_packed("clips", arrays), columns)
 
 
 def _packed(name: str, arrays: Mapping[str, NDArray[Any]]) -> Packed:

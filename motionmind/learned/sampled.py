@@ -9,7 +9,8 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Ints
 from motionmind.body.motion import Motion
-from motionmind.corpus.corpus import Clip, Corpus
+from motionmind.corpus.clip import Clip
+from motionmind.corpus.corpus import Corpus
 from motionmind.geometry.splines import natural_spline, rotation_spline
 
 FPS = 30.0  # at which movement is looked at where no other rate is said

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from motionmind._typing import Bools, Int32s, Ints
 from motionmind.arguments import check_integer
-from motionmind.corpus.corpus import Clip, Corpus, Facing, Repair
+from motionmind.corpus.clip import Clip, Repair
+from motionmind.corpus.corpus import Corpus, Facing
 from motionmind.errors import MotionMindError
 from motionmind.grammar.grammar import Grammar
 

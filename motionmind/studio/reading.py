@@ -27,7 +27,7 @@ from motionmind.studio.score_files import take_together
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
-    from motionmind.corpus.corpus import JointFlip
+    from motionmind.corpus.clip import JointFlip
 
 SUFFIXES = (".bvh", ".glb", ".vrm", ".vrma", ".amc", ".npz", ".json", ".score")  # that can be read alone
 SECONDS = 60.0  # in which a file must be read

@@ -13,7 +13,7 @@ import numpy as np
 from motionmind._typing import Bools, Floats
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture, Velocity
-from motionmind.corpus.corpus import JointFlip
+from motionmind.corpus.clip import JointFlip
 from motionmind.corpus.flips import find_flips
 from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError
 from motionmind.geometry import rotations as rot

@@ -10,7 +10,8 @@ import pytest
 
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.corpus import Clip, Corpus
+from motionmind.corpus.clip import Clip
+from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.flips import find_flips
 from motionmind.corpus.gather import gather
 from motionmind.errors import CorpusError, MotionMindError

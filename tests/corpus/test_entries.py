@@ -11,7 +11,8 @@ import pytest
 from bodies import insect
 
 from motionmind.body.motion import Motion
-from motionmind.corpus.corpus import Clip, Corpus
+from motionmind.corpus.clip import Clip
+from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.entries import Columns, Entries, Packed, StoredClips
 from motionmind.corpus.gather import gather
 from motionmind.discretize import Codebook
@@ -104,7 +105,7 @@ def test_a_clip_is_found_by_its_name_its_label_and_its_postures(gathered: Corpus
 def test_to_find_a_clip_takes_a_look_at_few(gathered: Corpus, read: list[int]) -> None:
     clips = tuple(Clip(f"clip {n}", 2 * n, 2 * n + 2) for n in range(1000))
     arrays = {name: getattr(gathered, name) for name in ("rotations", "root", "times", "detail")}
-    stored = StoredClips(Packed.of(clips), Clip, Columns.of(clips))
+    stored = StoredClips(Packed.of(clips), Columns.of(clips))
     arrays = {name: np.resize(array, (2000, *array.shape[1:])) for name, array in arrays.items()}
     corpus = replace(gathered, clips=stored, **arrays)
     assert corpus.clip_labelled("clip 777") == clips[777]

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.corpus import JointRepair
+from motionmind.corpus.clip import JointRepair
 from motionmind.corpus.gather import gather
 from motionmind.geometry import rotations as rot
 from motionmind.learned.pace import (

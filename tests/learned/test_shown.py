@@ -15,7 +15,7 @@ from motionmind.body.contact import floor_height, foot_slides, lowest_height
 from motionmind.body.human import human23
 from motionmind.body.plausibility import at_rate
 from motionmind.corpus import store
-from motionmind.corpus.corpus import JointRepair
+from motionmind.corpus.clip import JointRepair
 from motionmind.learned.plausibility import EVERYDAY, MEASURES, Plausibility, learn_plausibility
 
 BALLET = Engine.load("ballet")

@@ -16,7 +16,7 @@ import pytest
 from numpy.typing import NDArray
 
 from motionmind.corpus import store, versions
-from motionmind.corpus.corpus import JointFlip, JointRepair
+from motionmind.corpus.clip import JointFlip, JointRepair
 from motionmind.errors import FormatError, MotionMindError, NoPathError
 from motionmind.learned.validity import FORMS
 from motionmind.tween.engine import Engine
