@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
 NOTICE = "compiling inner loops, once, which takes a minute or more (`motionmind warm` does it)"
 _LAST = "search/astar.search"  # calls most of what is compiled for a search, and is there only once all of that is
-_SEARCHES = ("body/", "geometry/", "realise/", "search/")  # what a search needs, by folder
+_SEARCHES = ("body/", "footing/", "geometry/", "realise/", "search/", "walks/")  # what a search needs, by folder
 _LATER = (  # of which it needs little, or nothing
     *("body/support._overhang", "geometry/many.matrices", "geometry/many.turns"),
-    *("realise/sparse", "realise/steps", "search/pair_chain", "search/sample"),
+    *("walks/sparse", "walks/steps", "search/pair_chain", "search/sample"),
 )
 _LOOK = 0.2  # seconds between two looks at what is compiled
 _AT_ONCE = 3  # processes at most that share the work
@@ -205,7 +205,7 @@ def search() -> None:
 def realise() -> None:
     """Realise moves of the corpus, which no search has to find, see how deep limbs are in each other, and reach."""
     from motionmind.body.capsules import penetration
-    from motionmind.realise.legs import find_legs, reach
+    from motionmind.footing.legs import find_legs, reach
     from motionmind.tween.engine import Engine
 
     engine = Engine.load("ballet")
@@ -237,10 +237,10 @@ def learn() -> None:
     """Learn a clip anew, find its moves in the corpus, realise them by few of its moments; sample a path; read it."""
     from motionmind.discretize import make_discretization
     from motionmind.learned.neighbours import build_neighbours
-    from motionmind.realise.detail import likest_moves
     from motionmind.search.sample import sample_path
     from motionmind.search.solve import solve
     from motionmind.tween.engine import Engine
+    from motionmind.walks.detail import likest_moves
 
     engine = Engine.load("ballet")
     clip = engine.corpus.motion(engine.corpus.clips[0])

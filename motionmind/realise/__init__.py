@@ -1,1 +1,1 @@
-"""Realising a path of states as a motion: timeline, walks through the corpus, detail, root and feet."""
+"""Realising a path of states as a motion: in its own time, as walks expect, on its feet, its limbs apart."""

@@ -18,17 +18,14 @@ from motionmind.body.plausibility import GRAVITY
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import size_of
 from motionmind.corpus.corpus import Corpus, subdivide_times
+from motionmind.footing.corrections import Correction
+from motionmind.footing.ground import Stance, ends_in_air, set_on_floor
+from motionmind.footing.legs import find_legs
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.grammar import Grammar
 from motionmind.learned.carriage import Carriage
-from motionmind.realise.corrections import Correction
-from motionmind.realise.detail import detail_of, likest_moves, moves_near, share_of_detail
-from motionmind.realise.expectation import Expectation, expect
-from motionmind.realise.ground import Stance, ends_in_air, set_on_floor
-from motionmind.realise.headings import correct_headings, travel_along
-from motionmind.realise.legs import find_legs
-from motionmind.realise.minimal import departure
+from motionmind.realise.bending import allowed_off, bend_to_states
 from motionmind.realise.retime import (
     ENDS_AT,
     HEADROOM,
@@ -41,12 +38,13 @@ from motionmind.realise.retime import (
     slow_down,
 )
 from motionmind.realise.settling import keeper, settled
-from motionmind.realise.stops import Stop, stop_at
 from motionmind.realise.timeline import Timeline, stretch, timeline
+from motionmind.walks.detail import detail_of, likest_moves, moves_near, share_of_detail
+from motionmind.walks.expectation import Expectation, expect
+from motionmind.walks.headings import travel_along
+from motionmind.walks.minimal import departure
+from motionmind.walks.stops import Stop, stop_at
 
-# Tolerances by which a chain may be off its state at a move: where something is asked of it, with room for the arc
-# between two frames, and elsewhere.
-FIRMLY, FREELY = 0.95, 3.0
 # Power of the trust in walks by which their detail is trusted: roughness is less particular than movement.
 LINGERS = 0.1
 _SAME = 1e-9  # radians: two orientations no farther apart are the same but for rounding
@@ -93,12 +91,11 @@ def realise(
     Its first and last frames are `a` and `b`, exactly, and at the moves in `through` its joints and its facing are as
     in the postures there. Between them the body is, at the times of the moves, at the mean of the walks that the corpus
     knows from `a` to `b` in that time and that count the more the nearer they are to the path
-    (`motionmind.realise.walks`); a C2 spline joins them. Where that leaves a chain too far from its state, the movement
-    is bent towards it, smoothly. Fine detail of the corpus's recordings is added
-    (`motionmind.realise.detail`).
+    (`motionmind.walks.likelihood`); a C2 spline joins them. Where that leaves a chain too far from its state, the
+    movement is bent towards it, smoothly. Fine detail of the corpus's recordings is added (`motionmind.walks.detail`).
 
     Feet that stand carry the body; where none stands it travels as the corpus's bodies do, and it ends where `b`
-    stands. The legs hold what one root cannot (`motionmind.realise.feet`), but for those with `fixed` joints. The
+    stands. The legs hold what one root cannot (`motionmind.footing.feet`), but for those with `fixed` joints. The
     lowest point stays as far above the floor as in the corpus's postures; the floor is at 0, or lower under ends that
     are lower, or higher under ends higher than the corpus knows of such postures. Limbs that would then pass through
     each other are kept apart (`motionmind.realise.limbs_apart`).
@@ -143,8 +140,8 @@ def realise(
     stops[len(path) - 1] = stop_at(corpus, b, _times(slower, arriving))
     states = grammar.centres[grammar.transitions.starts[: path.shape[1]] + path]
     walk = _walk_near(states, clock, stops, corpus, carriage, length is None and not through)
-    within = _bounds(chains := walk.chains(corpus, clock.moves), path, grammar, tolerances, wished)
-    walk = _bend_to_states(walk, chains, states, clock, stops, corpus, within)
+    within = allowed_off(chains := walk.chains(corpus, clock.moves), path, grammar, tolerances, wished)
+    walk = bend_to_states(walk, chains, states, clock, stops, corpus, within)
     size = a.skeleton.height / corpus.skeleton.height if corpus.skeleton.height > 0.0 else 1.0
     travel = travel_along(walk.trust[:, :1] * (walk.moves @ carriage.travel[walk.of_moves]), walk.headings)
     given = [0, *(2 * move for move in through), -1]
@@ -306,51 +303,6 @@ def _quickest(most: Floats, speeds: Floats | None, pace: float, joints: int) -> 
     if speeds is not None:
         out[:joints] = np.minimum(out[:joints], JOINTS_AT * pace * speeds[:joints])
     return out
-
-
-def _bounds(chains: Floats, path: Int32s, grammar: Grammar, tolerances: Floats, wished: Bools) -> Floats:
-    """Return how far each chain may be off its state at each move [T + 1, L], radians; the walk has them at `chains`.
-
-    It is FIRMLY the chain's tolerance where something is asked of it. Elsewhere it is FREELY as much, and what the walk
-    is beyond the tolerance of every state: of a vocabulary that has nothing near, no state is to be forced on a
-    movement.
-    """
-    starts, beyond = grammar.transitions.starts, np.empty(path.shape)
-    for chain, tolerance in enumerate(tolerances):
-        centres = grammar.centres[starts[chain] : starts[chain + 1]]
-        nearest = 2.0 * np.arccos(np.minimum(np.abs(chains[:, chain] @ centres.T).max(axis=1), 1.0))
-        beyond[:, chain] = np.maximum(nearest - tolerance, 0.0)
-    return np.where(wished, FIRMLY * tolerances, FREELY * tolerances + beyond)
-
-
-def _bend_to_states(
-    walk: Expectation,
-    chains: Floats,
-    states: Floats,
-    clock: Timeline,
-    stops: Mapping[int, Stop],
-    corpus: Corpus,
-    within: Floats,
-) -> Expectation:
-    """Return a walk bent so that each chain is `within` radians [T + 1, L] of its state [T + 1, L, 4] at each move.
-
-    Before, it has the chains at the moves as given [T + 1, L, 4].
-
-    The bend of each move is 0 at the stops and where the chain is near already; between moves it is a spline.
-    """
-    joints, inner = walk.poses.shape[1], np.ones(len(states), dtype=np.bool_)
-    inner[list(stops)] = False
-    missing = rot.log(rot.inv_mul(chains[:, :joints], states[:, :joints]))
-    far = rot.norm(missing)[..., None]
-    bends = missing * np.maximum(1.0 - within[:, :joints, None] / np.maximum(far, 1e-9), 0.0) * inner[:, None, None]
-    poses = rot.mul(walk.poses, rot.exp(natural_spline(clock.moves, bends, walk.half_steps)))
-    headings = walk.headings
-    if corpus.facing == "free":
-        at_moves, centres = natural_spline(walk.half_steps, headings, clock.moves), rot.heading(states[:, -1])
-        centres[~inner] = at_moves[~inner]
-        bent = correct_headings(at_moves, centres, within[:, -1])
-        headings = headings + natural_spline(clock.moves, bent, walk.half_steps)
-    return walk._replace(poses=poses, headings=headings)
 
 
 def _detail(

@@ -14,7 +14,8 @@ from motionmind.body.limbs import parts_of
 from motionmind.body.motion import Posture
 from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
-from motionmind.realise.realise import FREELY, realise
+from motionmind.realise.bending import FREELY
+from motionmind.realise.realise import realise
 from motionmind.tween.engine import SAME_ANGLE, Engine
 from motionmind.tween.result import Tween
 

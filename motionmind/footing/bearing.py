@@ -1,0 +1,255 @@
+"""Bearing: what bears a body at each frame, and where: feet by their stances, other parts where they are."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats, Indices
+from motionmind.body.contact import contact_points
+from motionmind.body.limbs import limb_of_points, limbs_of
+from motionmind.body.skeleton import Skeleton
+from motionmind.footing.feet import Foot, foot_points, track_of
+from motionmind.footing.footfalls import Stance, find_stances, standing_costs
+from motionmind.geometry import rotations as rot
+from motionmind.jit import jit
+
+UNDER = 0.02  # metres above the lowest limb at which a limb's share in bearing the body has fallen to 1/e
+BEARS = 4  # a limb bears the body by this power of how firmly it stands
+TOUCHES = 0.03  # metres above a limb's lowest point below which another point of it touches the floor
+MOSTLY = 0.3  # share of bearing from which a part other than a foot holds the body up
+LOADS = 0.12  # seconds in which a foot takes over the body's weight
+ALONE = 0.05  # metres above a body's lowest point below which another part bears, too
+HEAVY = 6.0  # a second: cost of swinging a foot that bears the whole weight of a body at rest
+FALLS = 30.0  # a second: cost of swinging a foot without which the body falls; chosen on ballet and karate
+RESTS = 0.3  # seconds from an end at which nothing moves in which low feet stand
+UPSIDE = 0.15  # metres above a body's lowest point up to which its lowest foot may bear it
+NEAR = 0.1  # metres that a part of a foot is off at most which is in one place, though it rolls, or turns on that
+
+
+class Shape(NamedTuple):
+    """A body in each frame relative to its root, and its parts.
+
+    Attributes:
+        places: of the points that may touch the floor [N, P, 3], metres.
+        feet: which of them are each foot's [feet, P].
+        others: which of them are each other part's: limbs without their feet, and last the trunk [parts, P].
+        low: height of each foot's lowest point [N, feet], metres.
+        low_others: the same of the other parts [N, parts]; infinite for one without points.
+        tracks: level places of the feet, which do not move while they stand or roll [N, feet, 2], metres.
+        outward: level unit vectors from the middle of the hips to each leg's [N, feet, 2].
+    """
+
+    places: Floats
+    feet: Bools
+    others: Bools
+    low: Floats
+    low_others: Floats
+    tracks: Floats
+    outward: Floats
+
+    @property
+    def lowest(self) -> Floats:
+        """Height of the lowest point of all [N], metres."""
+        return np.asarray(self.places[..., 1].min(axis=1))
+
+
+def shape_of(skeleton: Skeleton, rotations: Floats, feet: list[Foot]) -> Shape:
+    """Return the shape of a body with local rotations [N, J, 4]."""
+    places, joints = contact_points(skeleton, rotations, np.zeros((len(rotations), 3)))
+    limb = limb_of_points(skeleton)[joints]
+    of_feet = points_of_feet(skeleton, joints, feet)
+    others = (limb == np.arange(len(limbs_of(skeleton)) + 1)[:, None]) & ~of_feet.any(axis=0)
+    hips = places[:, [foot.leg[0] for foot in feet]][..., [0, 2]]
+    outward = hips - hips.mean(axis=1, keepdims=True) if feet else hips
+    outward /= np.maximum(np.linalg.norm(outward, axis=-1, keepdims=True), 1e-9)
+    tracks = [track_of(foot, places[:, : 2 * len(skeleton)]) for foot in feet]
+    along = np.stack(tracks, axis=1) if feet else np.zeros((len(places), 0, 2))
+    return Shape(places, of_feet, others, lowest(places, of_feet), lowest(places, others), along, outward)
+
+
+def points_of_feet(skeleton: Skeleton, joints: Indices, feet: list[Foot]) -> Bools:
+    """Return which points are each foot's [feet, P]; `joints` are those that the points belong to [P]."""
+    own = [foot_points(foot, joints, len(skeleton)) for foot in feet]
+    return np.stack(own) if own else np.zeros((0, len(joints)), dtype=np.bool_)
+
+
+@jit
+def lowest(places: Floats, parts: Bools) -> Floats:
+    """Return the height of the lowest point of each part [N, parts], metres; infinite for a part without points.
+
+    Args:
+        places: of the body's points [N, P, 3], metres.
+        parts: which of them are each part's [parts, P].
+    """
+    out = np.full((len(places), len(parts)), np.inf)
+    for t in range(len(places)):
+        for part in range(len(parts)):
+            for point in range(parts.shape[1]):
+                if parts[part, point]:
+                    out[t, part] = min(out[t, part], places[t, point, 1])
+    return out
+
+
+@jit
+def _mark_touching(places: Floats, parts: Bools, low: Floats, bears: Bools, out: Bools) -> None:
+    """Mark points of parts that bear [N, parts], about as low as the lowest of them [N, parts]: `out` [N, P]."""
+    for t in range(len(places)):
+        for part in range(len(parts)):
+            for point in range(parts.shape[1]):
+                if bears[t, part] and parts[part, point]:
+                    out[t, point] = places[t, point, 1] < low[t, part] + TOUCHES
+
+
+class Bearing(NamedTuple):
+    """The parts that bear a body at each frame.
+
+    Attributes:
+        stances: when and where each foot stands.
+        loads: how much of the weight each foot may bear [N, feet], from 0 to 1: less as a stance begins and ends.
+        stands: whether each foot stands [N, feet].
+        targets: the feet's places, less their tracks [N, feet, 2], metres: where each would have the root.
+        others: how much each other part bears [N, parts], from 0 to 1.
+    """
+
+    stances: list[list[Stance]]
+    loads: Floats
+    stands: Bools
+    targets: Floats
+    others: Floats
+
+    def holds(self, fps: float) -> Floats:
+        """Return how much each foot holds its place [N, feet], from 0 to 1: 1 while it stands, fading as it swings."""
+        out = self.stands.astype(np.float64)
+        fades = max(1, round(LOADS * fps))
+        for away in range(1, min(fades, len(out))):
+            share = 1.0 - away / fades
+            out[away:] = np.maximum(out[away:], share * self.stands[:-away])
+            out[:-away] = np.maximum(out[:-away], share * self.stands[away:])
+        return out
+
+    def all_standing(self) -> Bearing:
+        """Return the same with all feet on the floor throughout."""
+        return self._replace(stands=np.ones_like(self.stands))
+
+    def touching(self, shape: Shape) -> Bools:
+        """Return which points touch the floor [N, P]: those of what bears, about as low as its lowest."""
+        out = np.zeros(shape.places.shape[:2], dtype=np.bool_)
+        # A foot that comes down, or lifts, in this very frame carries nothing yet, or no more.
+        still = self.stands.copy()
+        still[1:] &= self.stands[:-1]
+        still[:-1] &= self.stands[1:]
+        _mark_touching(shape.places, shape.feet, shape.low, still, out)
+        _mark_touching(shape.places, shape.others, shape.low_others, self.others > MOSTLY, out)
+        return out
+
+
+def find_bearing(
+    shape: Shape,
+    root: Floats,
+    mass: Floats,
+    firm: Floats,
+    flying: Bools,
+    staying: int | None,
+    moving: tuple[bool, bool],
+    feet: list[Foot],
+    fps: float,
+    falls: Floats | None = None,
+) -> Bearing:
+    """Find what bears a body, and where its feet step.
+
+    Args:
+        shape: the body.
+        root: level places of the root on which feet would slide to where they have to be [N, 2], metres.
+        mass: level places of the centre of mass relative to the root [N, 2], metres.
+        firm: how firmly each limb, and last the trunk, stands where it is low [N, limbs + 1], from 0 to 1.
+        flying: whether the body is in the air [N].
+        staying: a foot that stands throughout, or None.
+        moving: whether the body passes the first and the last frame with a velocity; else feet that are low rest there.
+        feet: its feet.
+        fps: frames a second.
+        falls: how far the body would fall without each foot [N, feet], from 0 to 1; None where that is not known.
+    """
+    low = shape.lowest[:, None]
+    far = np.minimum(shape.low_others - low, 1.0)
+    bears = np.maximum(firm, 1e-3) ** BEARS
+    if feet:  # where no foot is near the floor, what is lowest bears, however the corpus's bodies hold it
+        lifted = np.clip((shape.low.min(axis=1, keepdims=True) - low) / UPSIDE - 1.0, 0.0, 1.0)
+        bears = np.maximum(bears, lifted)
+    others = bears * np.exp(-far / UNDER) * np.isfinite(shape.low_others)
+    others[flying] = 0.0
+    rests = others.max(axis=1, initial=0.0) > MOSTLY
+    frames = np.arange(len(root)) / fps
+    rest = [
+        np.zeros(len(root)) if moves else np.maximum(1.0 - away / RESTS, 0.0)
+        for moves, away in zip(moving, (frames, frames[::-1]), strict=True)
+    ]
+    still = np.maximum(*rest)
+    costs = [
+        standing_costs(shape.low[:, k] - low[:, 0], np.maximum(firm[:, foot.limb], still))
+        for k, foot in enumerate(feet)
+    ]
+    weighs = HEAVY * still[:, None] * _weights(shape, mass)
+    if falls is not None:
+        weighs += FALLS * falls
+    costs = [(stand, swing + weighs[:, k]) for k, (stand, swing) in enumerate(costs)]
+    tracks = shape.tracks + root[:, None]
+    stands = np.stack([stand <= swing for stand, swing in costs], axis=1) if feet else np.zeros((len(root), 0), bool)
+    if staying is not None:
+        costs[staying] = np.zeros(len(root)), np.full(len(root), np.inf)
+        stands[:, staying] = True
+    stances: list[list[Stance]] = [[] for _ in feet]
+    borne = [np.zeros(0, dtype=np.bool_) for _ in feet]
+    for _ in range(2):  # each foot steps where others stand, as they did the last time
+        for k in range(len(feet)):
+            bears = stands[:, [other for other in range(len(feet)) if other != k]].any(axis=1) | rests
+            if np.array_equal(bears, borne[k]):
+                continue  # as the last time
+            borne[k] = bears
+            stances[k] = find_stances(tracks[:, k], shape.outward[:, k], *costs[k], bears, flying, fps)
+            stands[:, k] = False
+            for stance in stances[k]:
+                stands[stance.start : stance.end + 1, k] = True
+    loads, places = np.zeros(stands.shape), tracks.copy()
+    for k, own in enumerate(stances):
+        for stance in own:
+            here = slice(stance.start, stance.end + 1)
+            places[here, k] = stance.places
+            loads[here, k] = _load(stance, len(root), fps)
+    return Bearing(stances, loads, stands, places - shape.tracks, others)
+
+
+def _weights(shape: Shape, mass: Floats) -> Floats:
+    """Return about how much of the weight each foot would bear if all stood [N, feet]: the more the nearer it is."""
+    far = rot.norm(shape.tracks - mass[:, None])
+    near = 1.0 / np.maximum(far, 0.03) ** 2
+    return np.asarray(near / np.maximum(near.sum(axis=1, keepdims=True), 1e-9)) ** 2
+
+
+def find_staying(shape: Shape, root: Floats) -> int | None:
+    """Return the foot that stays where it stands: one that bears alone in the first and the last frame, in one place.
+
+    It may roll from its heel to its toes there, or turn on either.
+
+    Args:
+        shape: the body.
+        root: level places of the root [N, 2], metres.
+    """
+    low = np.concatenate([shape.low, shape.low_others], axis=1)[[0, -1]]
+    bears = low < low.min(axis=1, keepdims=True) + ALONE
+    if np.any(bears.sum(axis=1) != 1) or np.any(bears[0] != bears[1]) or not bears[0, : shape.low.shape[1]].any():
+        return None
+    foot = int(bears[0].argmax())
+    places = shape.places[[0, -1]][:, shape.feet[foot]][..., [0, 2]]
+    moved = places[1] + root[-1] - places[0] - root[0]
+    return foot if np.linalg.norm(moved, axis=1).min() < NEAR else None
+
+
+def _load(stance: Stance, count: int, fps: float) -> Floats:
+    """Return how much of the weight a foot may bear in the frames of a stance: 1 well within it, less at its ends."""
+    frames = np.arange(stance.start, stance.end + 1)
+    since = frames - stance.start + 1.0 if stance.start > 0 else np.full(len(frames), np.inf)
+    until = stance.end - frames + 1.0 if stance.end < count - 1 else np.full(len(frames), np.inf)
+    s = np.minimum(np.minimum(since, until) / (LOADS * fps), 1.0)
+    return np.asarray(s * s * (3.0 - 2.0 * s))

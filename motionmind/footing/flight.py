@@ -1,0 +1,263 @@
+"""Flight: when a body is in the air, and that its mass falls freely there.
+
+A flight lasts as long as its height asks, 2 sqrt(2 H / g); where a given posture is in the air, the body passes it at
+the top of its flight, unless its velocity is given. Before it takes off and after it lands the body has its height for
+free: least squares of its acceleration bend the legs as deep as the push needs.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats
+from motionmind.body.contact import LOW, lowest_height
+from motionmind.body.plausibility import GRAVITY
+from motionmind.body.skeleton import Skeleton
+from motionmind.body.support import centre_of_mass, size_of
+from motionmind.body.tempo import runs_of
+from motionmind.footing.least_squares import Rows, difference_rows, position_rows
+
+SURELY = 0.5  # share of the corpus's walks that are in the air where a given posture is
+EVER = 0.05  # share of them from which a movement may be
+HOVERS = 0.04  # metres above the floor from which a given posture is in the air, if walks there are
+SHORTEST, LONGEST = 0.15, 0.8  # seconds of a flight
+PUSHES = 0.25  # seconds that a push off, or a landing, takes at least
+BENDS = 0.5, 0.2  # seconds before and after a flight in which legs bend for it, and seconds from there to standing
+FALLS = 0.3, 0.5  # metres a second squared off free fall, standard deviation, vertical and level
+RATE = 0.02  # metres a second off a velocity that is given in the air, the same
+FALLING = 0.5  # of gravity: a body off the floor that falls faster is in the air, and one that is pushed so is not
+PAUSES = 0.1  # seconds for which a fall may be slower than that, as where legs are drawn up
+TOUCHES = 0.005  # metres off the height at which legs leave the floor, and come back to it
+
+
+class Flight(NamedTuple):
+    """A stretch in the air: the last frame on the floor before it, and the first after it.
+
+    Where it begins or ends in a given posture, that is the frame; `rates` are the vertical velocities there, metres a
+    second, or None where it is on the floor, or nothing is known.
+    """
+
+    start: int
+    end: int
+    rates: tuple[float | None, float | None]
+
+
+def find_flights(
+    aloft: Floats,
+    leaps: Floats,
+    standing: Floats,
+    masses: Floats,
+    hovering: tuple[bool, bool],
+    rates: tuple[float | None, float | None],
+    gravity: float,
+    fps: float,
+) -> list[Flight]:
+    """Return the flights of a movement, in order.
+
+    Args:
+        aloft: share of the corpus's walks that are in the air [N], from 0 to 1.
+        leaps: height of their lowest points above the floor there [N], metres.
+        standing: height of the centre of mass if the lowest point were on the floor [N], metres.
+        masses: its height in the first and in the last frame [2], metres.
+        hovering: whether the first and the last posture are in the air.
+        rates: its vertical velocities there, metres a second; None where unknown.
+        gravity: metres a second squared.
+        fps: frames a second.
+    """
+    last = len(aloft) - 1
+    lands, rises = 0, last
+    first = second = None
+    push = PUSHES * fps
+    if hovering[0]:
+        lands, rate = _time_of_fall(
+            standing, masses[0], None if rates[0] is None else -rates[0], last - push, gravity, fps
+        )
+        first = Flight(0, lands, (-rate, None))
+    if hovering[1]:
+        back, rate = _time_of_fall(standing[::-1], masses[1], rates[1], last - push, gravity, fps)
+        rises = last - back
+        second = Flight(rises, last, (None, rate))
+    if first and second and lands + push > rises:
+        return [Flight(0, last, (None, None))]
+    out = [first] if first else []
+    begin, end = lands + push, rises - push
+    for start, stop in runs_of(aloft > EVER):
+        if (start == 0 and hovering[0]) or (stop > last and hovering[1]):
+            continue
+        share, frames = aloft[start:stop], np.arange(start, stop)
+        height = float(share @ leaps[start:stop] / share.sum())
+        seconds = min(2.0 * np.sqrt(2.0 * height / gravity), LONGEST)
+        # Walks jump at different moments: so many of their flights are expected in this time.
+        count = round(share.sum() / (seconds * fps))
+        middles = np.interp((np.arange(count) + 0.5) / max(count, 1), np.cumsum(share) / share.sum(), frames)
+        for middle in middles:
+            half = min(0.5 * seconds * fps, 0.5 * (end - begin))
+            top = float(np.clip(middle, begin + half, max(end - half, begin + half)))
+            # Rounded before: what lies midway between two frames is not for rounding errors to decide.
+            flight = Flight(round(round(top - half, 6)), round(round(top + half, 6)), (None, None))
+            if half >= 0.5 * SHORTEST * fps and flight.end - flight.start > 2:
+                out.append(flight)
+                begin = flight.end + push
+    return [*out, second] if second else out
+
+
+def _time_of_fall(
+    standing: Floats, mass: float, rate: float | None, longest: float, gravity: float, fps: float
+) -> tuple[int, float]:
+    """Return the frames before a body in the air came off the floor, and its vertical velocity in the air.
+
+    Args:
+        standing: height of the centre of mass on the floor, from the frame in the air back [N], metres.
+        mass: its height in the air, metres.
+        rate: its velocity there, metres a second, upward; None for the top of the flight, or as near it as there is
+            time for, and as lets it come off the floor in a whole frame.
+        longest: how many frames it may take.
+        gravity: metres a second squared.
+        fps: frames a second.
+    """
+    seconds = np.arange(len(standing)) / fps
+    free = rate is None
+    if rate is None:
+        rise = max(mass - float(standing.min()), 0.01)
+        most = max(longest, 2.0) / fps
+        rate = max(rise / most - 0.5 * gravity * most, 0.0)
+    below = np.flatnonzero(mass - rate * seconds[1:] - 0.5 * gravity * seconds[1:] ** 2 <= standing[1:])
+    if not len(below):
+        return len(standing) - 1, rate
+    first = int(below[0]) + 1
+    if not free:
+        return first, rate
+    # It is to come off the floor in a whole frame: of the two about that moment, in the one nearer to that velocity.
+    either = [max(first - 1, 1), first]
+    rates = (mass - standing[either]) / seconds[either] - 0.5 * gravity * seconds[either]
+    nearest = int(np.abs(rates - rate).argmin())
+    # Too near the floor, or over a posture so much higher, it comes off in no whole frame.
+    if abs(rates[nearest] - rate) > gravity / fps:
+        return first, rate
+    return int(either[nearest]), float(rates[nearest])
+
+
+def flying_frames(flights: list[Flight], hovering: tuple[bool, bool], count: int) -> Bools:
+    """Return in which frames nothing bears the body [count]; `hovering` is whether the first and the last are such."""
+    out = np.zeros(count, dtype=np.bool_)
+    for flight in flights:
+        out[flight.start + 1 : flight.end] = True
+    if flights:
+        out[[0, -1]] = hovering
+    return out
+
+
+def leg_freedom(flights: list[Flight], count: int, fps: float) -> Floats:
+    """Return how free the height of a body is that stands [N], from 0 to 1: near flights its legs bend for them."""
+    out, frames = np.zeros(count), np.arange(count)
+    for flight in flights:
+        seconds = np.maximum(flight.start - frames, frames - flight.end) / fps
+        away = np.clip((seconds - BENDS[0]) / BENDS[1], 0.0, 1.0)
+        out = np.maximum(out, 1.0 - away * away * (3.0 - 2.0 * away))
+    return out
+
+
+def flight_rows(flights: list[Flight], own: Floats, standing: Floats, gravity: float, fps: float) -> list[Rows]:
+    """Return rows for the root's trajectory that let the centre of mass fall freely in flights.
+
+    Args:
+        flights: the flights.
+        own: the centre of mass relative to the root [N, 3], metres.
+        standing: height of the root if the lowest point were on the floor [N], metres.
+        gravity: metres a second squared.
+        fps: frames a second.
+    """
+    count = len(own)
+    weights, at = np.zeros(count - 2), []
+    leaves: list[Rows] = []
+    for flight in flights:
+        weights[flight.start : flight.end - 1] = 1.0
+        at += [frame for frame in (flight.start, flight.end) if 0 < frame < count - 1]
+        for rate, first, sign, shares in (
+            (flight.rates[0], 0, -1.0, (-fps, fps, 0.0)),
+            (flight.rates[1], count - 3, 1.0, (0.0, -fps, fps)),
+        ):
+            if rate is not None:
+                target = rate + sign * 0.5 * gravity / fps - np.array(shares) @ own[first : first + 3, 1]
+                row = difference_rows(1, shares, np.array([target]), np.array([RATE**-2.0]))
+                leaves.append(row._replace(first=np.array([first])))
+    rows = []
+    for axis, falls, spread in ((0, 0.0, FALLS[1]), (1, -gravity, FALLS[0]), (2, 0.0, FALLS[1])):
+        target = falls - fps**2 * np.diff(own[:, axis], 2)
+        rows.append(difference_rows(axis, (fps**2, -2.0 * fps**2, fps**2), target, weights * spread**-2.0))
+    frames = np.array(at, dtype=np.int64)
+    up = np.tile([0.0, 1.0, 0.0], (len(frames), 1))
+    rows.append(position_rows(frames, up, standing[frames], np.full(len(frames), TOUCHES**-2.0)))
+    return rows + leaves
+
+
+def fall_freely(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bools, fps: float) -> Floats:
+    """Return positions of the root [N, 3], metres, with which the centre of mass falls exactly where it nearly does.
+
+    Legs that bend in the air, limbs that are kept apart and a slower clock each take it a little off its parabola.
+    While it falls off the floor, with more than FALLING of gravity but for PAUSES, it is put back on the parabola
+    through its places just before and just after.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [N, J, 4].
+        root: positions of the root [N, 3], metres.
+        given: frames that must not change, the first and the last among them [N].
+        fps: frames a second.
+    """
+    mass, falls = find_falls(skeleton, rotations, root, given, fps)
+    if not falls:
+        return root
+    out = root.copy()
+    for start, stop in falls:
+        seconds = np.arange(stop - start + 2) / fps
+        line = np.linspace(mass[start - 1, 1], mass[stop, 1], len(seconds))
+        fallen = line + 0.5 * GRAVITY * seconds * (seconds[-1] - seconds)
+        out[start:stop, 1] += fallen[1:-1] - mass[start:stop, 1]
+    return out
+
+
+def find_falls(
+    skeleton: Skeleton, rotations: Floats, root: Floats, given: Bools, fps: float
+) -> tuple[Floats, list[tuple[int, int]]]:
+    """Return the centre of mass [N, 3], metres, and the first frame of each fall, and the one after its last.
+
+    Where masses are not known there are no falls. Arguments are those of `fall_freely`.
+    """
+    low = lowest_height(skeleton, rotations, root)
+    off_floor = low > low.min() + LOW * size_of(skeleton)
+    up = ~given & off_floor
+    mass = centre_of_mass(skeleton, rotations, root) if up.any() else None
+    if mass is None:
+        return root, []
+    fall = np.zeros(len(root))
+    fall[1:-1] = -(fps**2) * np.diff(mass[:, 1], 2) / GRAVITY
+    return mass, _falls(fall, up, (bool(off_floor[0]), bool(off_floor[-1])), round(PAUSES * fps))
+
+
+def _falls(fall: Floats, up: Bools, in_air: tuple[bool, bool], pauses: int) -> list[tuple[int, int]]:
+    """Return the first frame of each fall, and the one after its last.
+
+    A pause is between two falls, or between a fall and an end in the air.
+
+    Args:
+        fall: downward acceleration of the mass, in gravities [N].
+        up: where the body is off the floor, and may be moved [N].
+        in_air: whether it is off the floor in the first and in the last frame, which may not.
+        pauses: frames of a pause at most.
+    """
+    fast = up & (fall > FALLING)
+    whole = fast.copy()
+    for start, stop in runs_of(~fast):
+        inner = slice(max(start, 1), min(stop, len(fast) - 1))
+        between = (start > 0 or in_air[0]) and (stop < len(fast) or in_air[1])
+        if between and inner.stop - inner.start <= pauses:
+            whole[inner] = np.all(up[inner] & (fall[inner] > -FALLING))
+    out = []
+    for start, stop in runs_of(whole):
+        # What trembles falls on the whole no faster than that: then pauses part it.
+        parts = [(0, stop - start)] if fall[start:stop].mean() > FALLING else runs_of(fast[start:stop])
+        out += [(start + first, start + last) for first, last in parts if last - first > 1]
+    return out

@@ -1,0 +1,100 @@
+"""The root's trajectory: the feet that stand carry the body; where none stands it travels as the corpus's bodies do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from motionmind._typing import Floats
+from motionmind.body.contact import lowest_height
+from motionmind.body.limbs import limb_of_points
+from motionmind.body.skeleton import Skeleton
+from motionmind.footing.knees import smoothed
+
+GRIP = 0.015  # metres above the floor at which a foot's hold on it has fallen to 1/e
+SLIP = 0.15  # weight of the corpus's own travel, that of a standing foot being 1
+WALKS = 0.3  # metres a second of missing travel that is made up evenly by half
+STARTS = 0.3  # seconds in which even travel starts and stops
+RAISED = 0.1, 0.25  # metres by which the second foot is above the first: from there a body travels less, and least
+LEAST = 0.3  # share of even travel that is left then: no dancer walks with a leg in the air
+GATHERS = 0.2  # seconds over which travel becomes less, and more again
+BEARS = 4  # a limb bears the body by this power of how much it stands: of two feet, mostly the one that stands firmer
+
+
+def root_trajectory(
+    skeleton: Skeleton,
+    rotations: Floats,
+    clearance: Floats,
+    stands: Floats,
+    drift: Floats,
+    a: Floats,
+    b: Floats,
+    seconds: float,
+    easily: Floats,
+) -> Floats:
+    """Return positions [N, 3] of the root, metres, from `a` to `b`; their heights are provisional, `stand` sets them.
+
+    From each frame to the next, points of the body that stand near the floor should stay, and the root should move by
+    `drift`: the displacements v minimise sum_p w_p |v + v_p|^2 + SLIP |v - drift|^2, with v_p the motion of point p
+    relative to the root and w_p = exp(-height / GRIP) stands^BEARS of its limb, under the condition that they add up to
+    b - a. So v = (SLIP drift - sum_p w_p v_p + l) / (SLIP + sum_p w_p), with one multiplier l for all: the distance
+    missing to `b` is made up where the body stands least; if it is far, in proportion to `easily`, but for its start
+    and its end.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [N, J, 4].
+        clearance: height of the lowest point above the floor [N], metres.
+        stands: how firmly each limb, and last the trunk, stands between frames [N - 1, limbs + 1], from 0 to 1.
+        drift: displacement of the corpus's bodies from each frame to the next [N - 1, 3], metres.
+        a: first position of the root [3], metres.
+        b: last position of the root [3], metres.
+        seconds: duration of the whole.
+        easily: how easily the body steps between frames [N - 1], from LEAST to 1 (`steps_easily`).
+    """
+    points = skeleton.positions_and_tips(rotations, np.zeros((len(rotations), 3)))
+    height = points[..., 1] - points[..., 1].min(axis=-1, keepdims=True) + clearance[:, None]
+    hold = np.exp(-np.maximum(height[1:], height[:-1]) / GRIP) * stands[:, limb_of_points(skeleton)] ** BEARS
+    weight = SLIP + hold.sum(axis=1)
+    steps = (SLIP * drift - np.einsum("np,npk->nk", hold, np.diff(points, axis=0))) / weight[:, None]
+    slack = (1.0 / weight) / np.sum(1.0 / weight)
+    missing = b - a - steps.sum(axis=0)
+    fast = np.linalg.norm(missing) / seconds
+    evenly = fast**2 / (fast**2 + WALKS**2)
+    since = np.linspace(0.0, seconds, len(steps) + 2)[1:-1]
+    ramp = easily * np.minimum(np.minimum(since, since[::-1]) / STARTS, 1.0)
+    slack = (1.0 - evenly) * slack + evenly * ramp / ramp.sum()
+    steps += slack[:, None] * missing
+    return np.asarray(a + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]))
+
+
+def steps_easily(heights: Floats, fps: float) -> Floats:
+    """Return how easily a body steps between frames [N - 1], from LEAST to 1: with one foot high up it would hop.
+
+    Args:
+        heights: of each foot's lowest point, above any floor [N, feet], metres.
+        fps: frames a second.
+    """
+    if heights.shape[1] < 2:
+        return np.ones(len(heights) - 1)
+    first, second = np.sort(heights, axis=1)[:, :2].T
+    low, high = RAISED
+    s = np.clip((second - first - low) / (high - low), 0.0, 1.0)
+    easily = smoothed(1.0 - (1.0 - LEAST) * s * s * (3.0 - 2.0 * s), 0.5 * GATHERS, fps)
+    return np.asarray(0.5 * (easily[1:] + easily[:-1]))
+
+
+def stand(skeleton: Skeleton, rotations: Floats, root: Floats, clearance: Floats) -> Floats:
+    """Lift or lower each posture so that its lowest point is `clearance` above y = 0.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [N, J, 4].
+        root: positions of the root [N, 3], metres.
+        clearance: height of the lowest point [N], metres.
+
+    Returns:
+        Positions of the root [N, 3], metres.
+    """
+    lifted = root.copy()
+    lifted[:, 1] += clearance - lowest_height(skeleton, rotations, root)
+    return lifted

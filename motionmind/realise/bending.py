@@ -1,0 +1,66 @@
+"""Bending: where walks leave a path's states, they are bent towards them, as little as will do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats, Int32s
+from motionmind.corpus.corpus import Corpus
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.splines import natural_spline
+from motionmind.grammar.grammar import Grammar
+from motionmind.realise.timeline import Timeline
+from motionmind.walks.expectation import Expectation
+from motionmind.walks.headings import correct_headings
+from motionmind.walks.stops import Stop
+
+# Tolerances by which a chain may be off its state at a move: where something is asked of it, with room for the arc
+# between two frames, and elsewhere.
+FIRMLY, FREELY = 0.95, 3.0
+
+
+def allowed_off(chains: Floats, path: Int32s, grammar: Grammar, tolerances: Floats, wished: Bools) -> Floats:
+    """Return how far each chain may be off its state at each move [T + 1, L], radians; the walk has them at `chains`.
+
+    It is FIRMLY the chain's tolerance where something is asked of it. Elsewhere it is FREELY as much, and what the walk
+    is beyond the tolerance of every state: of a vocabulary that has nothing near, no state is to be forced on a
+    movement.
+    """
+    starts, beyond = grammar.transitions.starts, np.empty(path.shape)
+    for chain, tolerance in enumerate(tolerances):
+        centres = grammar.centres[starts[chain] : starts[chain + 1]]
+        nearest = 2.0 * np.arccos(np.minimum(np.abs(chains[:, chain] @ centres.T).max(axis=1), 1.0))
+        beyond[:, chain] = np.maximum(nearest - tolerance, 0.0)
+    return np.where(wished, FIRMLY * tolerances, FREELY * tolerances + beyond)
+
+
+def bend_to_states(
+    walk: Expectation,
+    chains: Floats,
+    states: Floats,
+    clock: Timeline,
+    stops: Mapping[int, Stop],
+    corpus: Corpus,
+    within: Floats,
+) -> Expectation:
+    """Return a walk bent so that each chain is `within` radians [T + 1, L] of its state [T + 1, L, 4] at each move.
+
+    Before, it has the chains at the moves as given [T + 1, L, 4].
+
+    The bend of each move is 0 at the stops and where the chain is near already; between moves it is a spline.
+    """
+    joints, inner = walk.poses.shape[1], np.ones(len(states), dtype=np.bool_)
+    inner[list(stops)] = False
+    missing = rot.log(rot.inv_mul(chains[:, :joints], states[:, :joints]))
+    far = rot.norm(missing)[..., None]
+    bends = missing * np.maximum(1.0 - within[:, :joints, None] / np.maximum(far, 1e-9), 0.0) * inner[:, None, None]
+    poses = rot.mul(walk.poses, rot.exp(natural_spline(clock.moves, bends, walk.half_steps)))
+    headings = walk.headings
+    if corpus.facing == "free":
+        at_moves, centres = natural_spline(walk.half_steps, headings, clock.moves), rot.heading(states[:, -1])
+        centres[~inner] = at_moves[~inner]
+        bent = correct_headings(at_moves, centres, within[:, -1])
+        headings = headings + natural_spline(clock.moves, bent, walk.half_steps)
+    return walk._replace(poses=poses, headings=headings)

@@ -1,0 +1,390 @@
+"""The mean of all walks through a corpus between given postures: a movement's postures at its moves and midway."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Floats, Ints
+from motionmind.body.limbs import parts_of
+from motionmind.body.skeleton import Skeleton
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.distances import squared_distance
+from motionmind.jit import jit
+from motionmind.learned.carriage import Carriage
+from motionmind.walks.likelihood import (
+    FOLLOWS_WITHIN,
+    LEAVES_WITHIN,
+    SIZES,
+    TRAVELS_WITHIN,
+    TURNS_WITHIN,
+    squared_differences,
+    squared_distances,
+    variance_at_ends,
+    write_likelihood,
+)
+from motionmind.walks.marginals import posterior_marginals
+from motionmind.walks.minimal import LASTS, departure, minimal_movement, trust
+from motionmind.walks.sparse import Chosen, all_of, choose, steps_on
+from motionmind.walks.stops import Rates, Stop
+
+STRIDE = 0.5  # radians a joint that go with travelling as far as the body is tall; chosen on cmu-05 and cmu-16
+THREADS = min(4, os.cpu_count() or 1)  # in which parts of the body are worked on; results do not depend on it
+COUNTS = 1e-6  # the least weight that counts in a mean
+BUSY = 4000  # moments of a corpus that keep a thread busy: for fewer, another costs more than it saves
+
+
+class MeanWalk(NamedTuple):
+    """The mean of walks through a corpus, at T moves and midway between them: the half steps.
+
+    Attributes:
+        poses: orientations of the joints [2 T + 1, J, 4].
+        moments: probabilities of moments of the corpus [2 T + 1, n].
+        of: which moments these are [n]; all of them in a small corpus.
+        trust: how far each joint is trusted to the walks in each half step [2 T, J], from 0 to 1 (`minimal.trust`).
+        left_out: share of walks that begin or end in moments that were not looked at, about, in the part of the body
+            where it is greatest; 0 in a small corpus.
+    """
+
+    poses: Floats
+    moments: Floats
+    of: Ints | slice
+    trust: Floats
+    left_out: float
+
+
+def mean_walk(
+    skeleton: Skeleton,
+    carriage: Carriage,
+    rates: Callable[[Ints | slice], Rates] | None,
+    stops: Mapping[int, Stop],
+    half_steps: Floats,
+    path: Floats | None,
+) -> MeanWalk:
+    """Return the mean over walks from each stop to the next, and how likely moments of the corpus are.
+
+    Walks of limbs count as much as those of larger parts together. The moments, by which the body travels and stands,
+    are those of walks of the whole and of the part that carries it. The mean is taken as a departure from the minimal
+    movement between the stops, which shrinks as the corpus's postures are farther from them
+    (`motionmind.walks.minimal`). It comes near the stops but not to them: its offsets there are subtracted along the
+    walk in proportion to time, and those of its velocities as `departure` has it.
+
+    Args:
+        skeleton: the body.
+        carriage: the corpus's N moments and its steps between them.
+        rates: returns the velocities in moments; None where no stop has any.
+        stops: what the walk passes, by the number of moves that lead there; increasing, with the first and the last.
+        half_steps: times of the moves and midway between them [2 T + 1], seconds.
+        path: orientations to follow at the moves [T + 1, J, 4], or None.
+    """
+    joints, parts = len(skeleton), parts_of(skeleton)
+    poses, trusted = np.empty((len(half_steps), joints, 4)), np.empty((len(half_steps) - 1, joints))
+    segments = {}
+    for start, end in pairwise(stops):
+        here, ends = slice(2 * start, 2 * end + 1), (stops[start], stops[end])
+        between = path[start + 1 : end] if path is not None and end > start + 1 else None
+        walk = _mean_between(parts, carriage, rates, ends, half_steps[here], between)
+        poses[here], trusted[2 * start : 2 * end], segments[start] = walk.poses, walk.trust, walk
+    for move, stop in stops.items():
+        poses[2 * move] = stop.chains[:joints]
+    left_out = max(walk.left_out for walk in segments.values())
+    return MeanWalk(poses, *_joined(segments, len(half_steps), len(carriage.weights)), trusted, left_out)
+
+
+class _Walk(NamedTuple):
+    """The mean over the walks from one stop to the next in S steps.
+
+    Attributes:
+        poses: orientations [S + 1, J, 4].
+        moments: probabilities of moments [S + 1, n] in walks of the whole body, and in those of what carries it, each
+            with the moments that these are.
+        trust: how far each joint is trusted to the walks [J].
+        left_out: as in `MeanWalk`.
+    """
+
+    poses: Floats
+    moments: tuple[tuple[Floats, Ints | slice], ...]
+    trust: Floats
+    left_out: float
+
+
+def _joined(segments: Mapping[int, _Walk], count: int, moments: int) -> tuple[Floats, Ints | slice]:
+    """Return the probabilities of moments at each of so many half steps, and which moments of the corpus these are.
+
+    Args:
+        segments: by the number of moves that lead to their first stop.
+        count: 2 T + 1.
+        moments: N, of the corpus.
+    """
+    kept = [of for walk in segments.values() for _, of in walk.moments if not isinstance(of, slice)]
+    chosen = np.unique(np.concatenate(kept)) if kept else slice(None)
+    out = np.zeros((count, moments if isinstance(chosen, slice) else len(chosen)))
+    for start, walk in segments.items():
+        rows = out[2 * start : 2 * start + len(walk.poses)]
+        rows[0] = 0.0  # of the segment before
+        for share, of in walk.moments:
+            if isinstance(of, slice) or isinstance(chosen, slice):
+                rows += 0.5 * share
+            else:
+                rows[:, np.searchsorted(chosen, of)] += 0.5 * share
+    return out, chosen
+
+
+def _mean_between(
+    parts: tuple[Ints, ...],
+    carriage: Carriage,
+    rates: Callable[[Ints | slice], Rates] | None,
+    ends: tuple[Stop, Stop],
+    times: Floats,
+    path: Floats | None,
+) -> _Walk:
+    """Return the mean over walks from one stop to the next.
+
+    Args:
+        parts: of the body, as in `parts_of`.
+        carriage: the corpus's N moments and its steps between them.
+        rates: returns the velocities in moments; or None.
+        ends: both stops.
+        times: of the steps' ends [S + 1], seconds.
+        path: orientations to follow at every other step between [S / 2 - 1, J, 4], or None.
+    """
+    joints = max(int(part.max()) for part in parts) + 1
+    orientations = np.stack([stop.chains[:joints] for stop in ends])
+    leaving, arriving = (None if stop.rates is None else stop.rates.joints for stop in ends)
+    minimal = minimal_movement(orientations, times, leaving, arriving)
+    poses, trusted = np.empty_like(minimal), np.empty(joints)
+
+    inside = np.zeros((joints, len(parts)), dtype=np.bool_)
+    for number, part in enumerate(parts):
+        inside[part, number] = True
+    members = np.nonzero(inside)[1].reshape(joints, len(SIZES))  # one part of each size
+    groups: dict[tuple[int, ...], list[int]] = {}
+    for joint, numbers in enumerate(members.tolist()):
+        groups.setdefault(tuple(numbers), []).append(joint)
+    passed = orientations if path is None else np.concatenate([orientations, path])
+    shown, trees = carriage.orientations, carriage.trees
+
+    def off(postures: Floats) -> Floats:
+        return squared_distances(shown, members, len(parts), postures)
+
+    larger = sorted({number for numbers in groups for number in numbers[:-1]})
+    # Parts do not depend on each other, and compiled loops run side by side. What larger parts share is kept, what
+    # belongs to a limb alone is not: of a large corpus it is large.
+    threads = min(THREADS, 1 + len(carriage.weights) // BUSY)
+    with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as pool:
+        each = map if pool is None else pool.map
+        distances = [*each(off, np.array_split(passed, threads))] if trees is None else []
+
+        def walk(number: int) -> tuple[Chosen, Floats, Floats, float, float]:
+            part, here = parts[number], shown
+            if trees is None:
+                chosen = all_of(carriage, number)
+                own = distances[0][number] if threads == 1 else np.concatenate([of[number] for of in distances])
+            else:
+                chosen = choose(trees, number, carriage, orientations, path, len(times) - 1)
+                here = _taken(shown, np.asarray(chosen.moments), part)
+                to = np.ascontiguousarray(passed[:, part])
+                own = squared_distances(here, np.zeros((len(part), 1), dtype=np.int64), 1, to)[0]
+            return chosen, here, *_part_marginals(part, chosen, rates, ends, times, own)
+
+        known = dict(zip(larger, each(walk, larger), strict=True))
+
+        def move(number: int) -> float:
+            mine = known[number] if number in known else walk(number)
+            for numbers, here in groups.items():
+                if numbers[-1] != number:
+                    continue
+                walks = [*(known[n] for n in numbers[:-1]), mine]
+                about = np.ascontiguousarray(minimal[:, here])
+                if trees is None:
+                    weights = _mixed(*(marginals for _, _, marginals, *_ in walks))
+                    mean = mean_rotations(weights, shown, np.array(here), about)
+                else:
+                    columns = [np.array([np.flatnonzero(parts[n] == joint)[0] for joint in here]) for n in numbers]
+                    mean = _mean_of_few([one[1:3] for one in walks], columns, about)
+                off = rot.log(rot.inv_mul(about, mean))
+                off = _without_ends(off, times, leaving is not None, arriving is not None)
+                trusted[here] = np.dot(SIZES, [trust_in_part for *_, trust_in_part, _ in walks])
+                poses[:, here] = rot.mul(about, rot.exp(trusted[here, None] * off))
+            return mine[-1]
+
+        lost = [*each(move, sorted({numbers[-1] for numbers in groups})), *(one[-1] for one in known.values())]
+    moments = tuple((marginals, chosen.moments) for chosen, _, marginals, *_ in (known[0], known[1]))
+    return _Walk(poses, moments, trusted, max(lost))
+
+
+def _without_ends(off: Floats, times: Floats, leaving: bool, arriving: bool) -> Floats:
+    """Return departures [S + 1, m, 3] less what they are at both ends and, where velocities are given, their rates."""
+    share = ((times - times[0]) / (times[-1] - times[0]))[:, None, None]
+    off = off - (1.0 - share) * off[0] - share * off[-1]
+    first = (off[1] - off[0]) / (times[1] - times[0]) if leaving else None
+    last = (off[-1] - off[-2]) / (times[-1] - times[-2]) if arriving else None
+    return np.asarray(off - departure(times, first, last))
+
+
+def _part_marginals(
+    part: Ints,
+    chosen: Chosen,
+    rates: Callable[[Ints | slice], Rates] | None,
+    ends: tuple[Stop, Stop],
+    times: Floats,
+    off: Floats,
+) -> tuple[Floats, float, float]:
+    """Return the posterior marginals [S + 1, n] of walks of one part of the body, how far to trust them, and the share
+    of their ends that is left out, by the moments that stand for these.
+
+    Arguments are those of `_mean_between`, but for the moments that are `chosen`, and how far `off` they are from the
+    two ends, and then from the postures of the path, if there is one: squared distances of the part [K, n], radians^2.
+    """
+    near = np.ones((len(times), len(chosen.weights)))
+    if len(off) > len(ends):
+        write_likelihood(near[2:-2:2], off[len(ends) :] / FOLLOWS_WITHIN**2)
+    nearest = np.sqrt(off[: len(ends)].min(axis=1))
+    known, left_out = None if rates is None else rates(chosen.moments), 0.0
+    for k, stop in enumerate(ends):
+        variance = variance_at_ends(float(nearest[k]))
+        write_likelihood(near[-k], off[k] / variance, *_rate_terms(part, known, stop))
+        if chosen.near is not None:
+            mass = chosen.weights @ near[-k]
+            near[-k] *= chosen.near[k]
+            left_out = max(left_out, 1.0 - float(chosen.weights @ near[-k] / mass))
+    marginals = posterior_marginals(*steps_on(chosen, near[0]), chosen.clusters, chosen.weights, near)
+    return marginals, trust(nearest, _way(part, ends, float(times[-1] - times[0]))), left_out
+
+
+def _way(part: Ints, ends: tuple[Stop, Stop], seconds: float) -> float:
+    """Return how far a part of the body has to go, radians a joint, root mean square.
+
+    It is the root of the sum of three squares: of the turn from one end to the other; of how far the part's speed at
+    the ends goes if it fades as (1 - t / LASTS)^2, sooner where there is less time; and of STRIDE for each of the
+    body's heights that its root travels. A body in one posture of a cycle has a way to go if it moves there, or has to
+    get elsewhere.
+    """
+    turn = squared_distance(ends[0].chains[part], ends[1].chains[part]) / len(part)
+    rates = [stop.rates.joints[part] for stop in ends if stop.rates is not None]
+    speed = float(np.mean([np.sum(rate**2, axis=-1).mean() for rate in rates])) if rates else 0.0
+    travel = float(np.sum((ends[1].place - ends[0].place) ** 2))
+    return float(np.sqrt(turn + (min(seconds, LASTS) / 3.0) ** 2 * speed + STRIDE**2 * travel))
+
+
+def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
+    """Return squared differences of the moments' velocities from a stop's [N], in units of their variances.
+
+    Parts with the root know also how the body turns and travels.
+    """
+    if rates is None or stop.rates is None:
+        return []
+    joints = squared_differences(np.ascontiguousarray(rates.joints[:, part]), stop.rates.joints[part])
+    terms = [joints / LEAVES_WITHIN**2]
+    if part[0] == 0:
+        terms.append((rates.turn - stop.rates.turn) ** 2 / TURNS_WITHIN**2)
+        terms.append(np.sum((rates.travel - stop.rates.travel) ** 2, axis=1) / TRAVELS_WITHIN**2)
+    return terms
+
+
+def _mean_of_few(walks: Sequence[tuple[Floats, Floats]], columns: Sequence[Ints], about: Floats) -> Floats:
+    """Return `mean_rotations` over the walks of all three sizes; of moments that hardly count nothing is read.
+
+    Args:
+        walks: of each size the orientations of the moments' parts [n, p, 4], and the marginals [S + 1, n].
+        columns: which of these joints the mean is of [m], for each size.
+        about: as for `mean_rotations`.
+    """
+    weights, shown = [], []
+    for size, (orientations, marginals), own in zip(SIZES, walks, columns, strict=True):
+        counts = np.flatnonzero(size * marginals.max(axis=0) >= COUNTS)
+        weights.append(size * marginals[:, counts])
+        shown.append(_taken(orientations, counts, own))
+    return mean_rotations(np.concatenate(weights, axis=1), np.concatenate(shown), np.arange(about.shape[1]), about)
+
+
+@jit
+def _mixed(whole: Floats, half: Floats, limb: Floats) -> Floats:
+    """Return how likely moments are in walks of all three sizes together [S + 1, N], from those of each."""
+    out = np.empty_like(limb)
+    for t in range(len(out)):
+        for i in range(out.shape[1]):
+            out[t, i] = SIZES[2] * limb[t, i] + (SIZES[0] * whole[t, i] + SIZES[1] * half[t, i])
+    return out
+
+
+@jit
+def _taken(shown: Floats, moments: Ints, joints: Ints) -> Floats:
+    """Return the orientations of some joints in some moments [n, m, 4], of all [N, L, 4]."""
+    out = np.empty((len(moments), len(joints), 4))
+    for i in range(len(moments)):
+        for j in range(len(joints)):
+            for c in range(4):
+                out[i, j, c] = shown[moments[i], joints[j], c]
+    return out
+
+
+@jit
+def _spread(near: Floats, middle: Floats) -> float:
+    """Return how far orientations [4, S] are from one of them [4] at most, as vectors: a cosine with that one which is
+    greater has the same sign with all."""
+    farthest = 0.0
+    for t in range(near.shape[1]):
+        far = 0.0
+        for c in range(4):
+            far += (near[c, t] - middle[c]) ** 2
+        farthest = max(farthest, far)
+    return float(np.sqrt(farthest)) + 1e-6
+
+
+@jit
+def mean_rotations(weights: Floats, orientations: Floats, joints: Ints, about: Floats) -> Floats:
+    """Return weighted means [S, m, 4] of m joints' orientations, in the hemisphere of `about`.
+
+    The mean is the normalised sum of quaternions of one sign, which is within a few thousandths of the mean rotation
+    where they lie within a right angle. Source: Gramkow, "On averaging rotations", IJCV 42 (2001).
+
+    Args:
+        weights: of the orientations in each mean [S, N].
+        orientations: of all chains [N, L, 4].
+        joints: the m of them.
+        about: orientations that choose each quaternion's sign, and stand in for a mean of length 0 [S, m, 4].
+    """
+    out, count, moments = about.copy(), len(about), weights.shape[1]
+    # Side by side for all means, which are then added to at once, four moments at a time. A weight of 0 changes no sum.
+    counted = np.zeros((moments + -moments % 4, count))
+    for i in range(moments):
+        for t in range(count):
+            counted[i, t] = weights[t, i] if weights[t, i] >= COUNTS else 0.0
+    near, sums, signed, shown = np.empty((4, count)), np.empty((4, count)), np.empty((4, count)), np.empty((4, 4))
+    for j in range(len(joints)):
+        near[:] = about[:, j].T
+        middle = about[count // 2, j]
+        alike = _spread(near, middle)
+        sums[:] = 0.0
+        for first in range(0, len(counted), 4):
+            added, mixed = counted[first : first + 4], False
+            for k in range(4):
+                x, y, z, w = orientations[min(first + k, moments - 1), joints[j]]
+                cosine = middle[0] * x + middle[1] * y + middle[2] * z + middle[3] * w
+                sign = -1.0 if cosine < -alike else 1.0
+                shown[0, k], shown[1, k], shown[2, k], shown[3, k] = sign * x, sign * y, sign * z, sign * w
+                mixed = mixed or abs(cosine) <= alike
+            if mixed:
+                for k in range(4):
+                    x, y, z, w = shown[:, k]
+                    for t in range(count):
+                        cosine = near[0, t] * x + near[1, t] * y + near[2, t] * z + near[3, t] * w
+                        signed[k, t] = -added[k, t] if cosine < 0.0 else added[k, t]
+                added = signed
+            for c in range(4):
+                a, b, d, e = shown[c]
+                for t in range(count):
+                    sums[c, t] = sums[c, t] + added[0, t] * a + added[1, t] * b + added[2, t] * d + added[3, t] * e
+        for t in range(count):
+            x, y, z, w = sums[:, t]
+            length = np.sqrt(x * x + y * y + z * z + w * w)
+            if length > 1e-6:
+                out[t, j, 0], out[t, j, 1], out[t, j, 2], out[t, j, 3] = x / length, y / length, z / length, w / length
+    return out

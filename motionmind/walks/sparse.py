@@ -1,0 +1,257 @@
+"""Few of a corpus's moments that stand for all of them in the walks of a part of the body.
+
+The sums over all walks (`motionmind.walks.marginals`) take time in proportion to the corpus. Of a large corpus they
+are taken over a few thousand moments, which are found by the tree of the part (`motionmind.learned.neighbours`):
+
+- those nearest to the first posture, where walks begin, and those that follow on them in the clips; those nearest to
+  the last, where walks end, and those that lead there; those nearest to every other posture of a path to follow, and
+  those that follow on them within a move;
+- for all others, one moment of each of a few hundred balls into which the tree is cut.
+
+What is nearest stands for itself. All else that is chosen in a ball stands for the rest of it, and has its weight. So
+the weights add up to those of the corpus. A step to a moment that is not chosen leads to one that stands for its ball:
+no walk is lost.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Concatenate, Generic, NamedTuple, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary, ref
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats, Int32s, Ints
+from motionmind.jit import jit
+from motionmind.learned.carriage import Carriage
+from motionmind.learned.neighbours import Neighbours, find_near
+from motionmind.walks.steps import follow, steps_at
+
+SPLITS = 384  # balls that are cut in two
+ENDS = 64  # moments near each end, with those that follow on them or lead to them
+ALONG = 8  # steps for which these are followed
+NEAREST = 24  # of those at the ends, that are followed half the way
+BY_PATH = 16  # moments near every other posture of a path, that are followed to the next
+PATH_LEAVES = 12  # of a tree that are searched for these
+KEPT = 32  # look-ups of parts that are kept: of a body of 16 parts those of a guide, and of its motion
+HARDLY = 1e-200  # of the likeliest moment: sums of such chances might be 0
+
+
+class Chosen(NamedTuple):
+    """Few of the corpus's moments for the walks of one part of the body, and the steps between them.
+
+    Attributes:
+        moments: their numbers, rising [n]; all of them where they are a slice.
+        weights: of the moments [n].
+        begins: which of them each step leads from [m].
+        ends: which it leads to [m].
+        shares: share of each step among those that leave the same moment [m].
+        clusters: their clusters, numbered from 0 [n].
+        near: which of them are near the first posture and the last, where walks begin and end [n] each; None for all.
+    """
+
+    moments: Ints | slice
+    weights: Floats
+    begins: Ints
+    ends: Ints
+    shares: Floats
+    clusters: Int32s
+    near: tuple[Bools, Bools] | None
+
+
+def all_of(carriage: Carriage, number: int) -> Chosen:
+    """Return all of the corpus's moments, for the walks of the part of that number."""
+    clusters = np.ascontiguousarray(carriage.clusters[:, number])
+    steps = carriage.begins, carriage.ends, carriage.shares
+    return Chosen(slice(None), carriage.weights, *steps, clusters, None)
+
+
+def choose(trees: Neighbours, number: int, carriage: Carriage, ends: Floats, path: Floats | None, steps: int) -> Chosen:
+    """Choose moments for the walks of one part of the body.
+
+    Args:
+        trees: of the corpus.
+        number: of the part.
+        carriage: the corpus's moments.
+        ends: orientations of the joints in both given postures [2, J, 4].
+        path: those that walks are to follow [K, J, 4], or None.
+        steps: of a walk.
+    """
+    near, *runs = _near_ends(carriage, number, ends.tobytes())
+    by_path, nodes = near[:, :0], _balls(trees, number)
+    if path is not None:
+        by_path = find_near(trees, number, carriage.orientations, path[::2], BY_PATH, PATH_LEAVES)
+    chain = carriage.begins, carriage.ends, len(carriage.orientations) - len(carriage.turn)
+    runs.append(follow(by_path.ravel(), True, 2, *chain))
+    runs += [follow(end[:NEAREST], on, steps // 2 + 1, *chain) for end, on in zip(near, (True, False), strict=True)]
+    order, ranks, bounds = trees.order[number], trees.ranks[number], trees.bounds[nodes]
+    singles = _rising(np.concatenate([near.ravel(), by_path.ravel()]))
+    moments = _rising(np.concatenate([singles, *runs, order[bounds.sum(axis=1) // 2]]))
+    starts = np.ascontiguousarray(bounds[:, 0])
+    weights, stands = _shares(moments, singles, starts, trees.weights[number][nodes], ranks, carriage.weights)
+    begins, leads, numbers = steps_at(moments, True, *chain)
+    goals = _goals(moments, leads, starts, stands, ranks)
+    clusters = _numbered(carriage.clusters[moments, number])
+    of_ends = np.zeros((2, len(moments)), dtype=np.bool_)
+    for one, end in zip(of_ends, near, strict=True):
+        one[np.searchsorted(moments, end)] = True
+    return Chosen(
+        moments, weights, begins, goals, np.asarray(carriage.shares[numbers]), clusters, (of_ends[0], of_ends[1])
+    )
+
+
+def steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
+    """Return the steps of walks, as `posterior_marginals` takes them, of which some lead on from where walks begin.
+
+    Of many performances of a dance, all moments near its last posture end clips. Then walks stay where a clip ends for
+    a step, after which they may go over to another.
+
+    Args:
+        chosen: the moments, and the corpus's steps between them.
+        near: how likely walks begin in each moment [n].
+    """
+    if near[chosen.begins].max(initial=0.0) > HARDLY:
+        return chosen.begins, chosen.ends, chosen.shares
+    leads = np.zeros(len(near), dtype=np.bool_)
+    leads[chosen.begins] = True
+    ends = np.flatnonzero(~leads)
+    begins, goals = (np.concatenate([of, ends]) for of in (chosen.begins, chosen.ends))
+    return begins, goals, np.concatenate([chosen.shares, np.ones(len(ends))])
+
+
+_Owner = TypeVar("_Owner")
+_Asked = ParamSpec("_Asked")
+_Found = TypeVar("_Found")
+
+
+class _Kept(Generic[_Owner, _Asked, _Found]):
+    """A function whose last results for each first argument are kept for as long as that is in use, and no longer."""
+
+    def __init__(self, function: Callable[Concatenate[_Owner, _Asked], _Found]) -> None:
+        self._function = function
+        self._kept: WeakKeyDictionary[_Owner, Callable[_Asked, _Found]] = WeakKeyDictionary()
+
+    def __call__(self, owner: _Owner, /, *asked: _Asked.args, **named: _Asked.kwargs) -> _Found:
+        if owner not in self._kept:
+            self._kept[owner] = self._keeping(ref(owner))
+        return self._kept[owner](*asked, **named)
+
+    def _keeping(self, owner: ref[_Owner]) -> Callable[_Asked, _Found]:
+        """Return the function for an owner that what is kept does not keep in use."""
+
+        def look(*asked: _Asked.args, **named: _Asked.kwargs) -> _Found:
+            here = owner()
+            assert here is not None
+            return self._function(here, *asked, **named)
+
+        kept: Callable[_Asked, _Found] = lru_cache(maxsize=KEPT)(look)  # type: ignore[assignment]
+        return kept
+
+    def cache_clear(self) -> None:
+        self._kept.clear()
+
+
+@_Kept  # of all parts; the guide of a search and its motion ask for the same
+def _near_ends(carriage: Carriage, number: int, ends: bytes) -> tuple[Ints, Ints, Ints]:
+    """Return the moments near both ends in one part of the body [2, n], and those that follow on the first or lead to
+    the last, some steps on; `ends` are the bytes of those of `choose`."""
+    assert carriage.trees is not None
+    postures = np.frombuffer(ends).reshape(2, -1, 4)
+    near = find_near(carriage.trees, number, carriage.orientations, postures, ENDS)
+    chain = carriage.begins, carriage.ends, len(carriage.orientations) - len(carriage.turn)
+    return near, follow(near[0], True, ALONG, *chain), follow(near[1], False, ALONG, *chain)
+
+
+@_Kept
+def _balls(trees: Neighbours, number: int) -> Ints:
+    """Return the nodes of the balls that a part's tree is cut into, in its order [B]."""
+    return _cut(trees.bounds, trees.radii[number], trees.weights[number])
+
+
+def _rising(numbers: Ints) -> Ints:
+    """Return numbers without repetition, rising: `np.unique` of so few takes twice as long."""
+    numbers = np.sort(numbers)
+    return np.asarray(numbers[np.append(True, numbers[1:] != numbers[:-1])])
+
+
+def _numbered(clusters: Int32s) -> Int32s:
+    """Return clusters by numbers that rise as theirs do, from 0 and without gaps."""
+    seen = np.zeros(int(clusters.max()) + 1, dtype=np.int32)
+    seen[clusters] = 1
+    return np.asarray(np.cumsum(seen, dtype=np.int32)[clusters] - 1, dtype=np.int32)
+
+
+@jit
+def _shares(
+    moments: Ints, singles: Ints, starts: Int32s, balls: Floats, ranks: Int32s, counts: Floats
+) -> tuple[Floats, Ints]:
+    """Return the weights of chosen moments [n], and the first of them that stands for each ball [B].
+
+    Args:
+        moments: their numbers, rising [n].
+        singles: those of them that stand for themselves, rising.
+        starts: where the balls begin in the tree's order [B], rising.
+        balls: their weights [B].
+        ranks: of the tree [N].
+        counts: weights of all moments [N].
+    """
+    ball, alone = np.empty(len(moments), np.int64), np.zeros(len(moments), np.bool_)
+    alone[np.searchsorted(moments, singles)] = True
+    shared, rest = np.zeros(len(balls)), balls.copy()
+    for k in range(len(moments)):
+        ball[k] = np.searchsorted(starts, ranks[moments[k]], side="right") - 1
+        if not alone[k]:
+            shared[ball[k]] += counts[moments[k]]
+    # Where none but what is near was chosen of a ball, that stands for what is left of it.
+    crowded = shared > 0.0
+    for k in range(len(moments)):
+        if not crowded[ball[k]]:
+            alone[k] = False
+            shared[ball[k]] += counts[moments[k]]
+        elif alone[k]:
+            rest[ball[k]] -= counts[moments[k]]
+    weights, stands = np.empty(len(moments)), np.empty(len(balls), np.int64)
+    for k in range(len(moments) - 1, -1, -1):
+        weights[k] = counts[moments[k]]
+        if not alone[k]:
+            weights[k] *= rest[ball[k]] / shared[ball[k]]
+            stands[ball[k]] = k
+    return weights, stands
+
+
+@jit
+def _goals(moments: Ints, leads: Ints, starts: Int32s, stands: Ints, ranks: Int32s) -> Ints:
+    """Return which of the chosen moments [n] each step leads to [m]: its own, or what stands for the ball of that."""
+    out = np.empty(len(leads), np.int64)
+    for k in range(len(leads)):
+        at = np.searchsorted(moments, leads[k])
+        if at < len(moments) and moments[at] == leads[k]:
+            out[k] = at
+        else:
+            out[k] = stands[np.searchsorted(starts, ranks[leads[k]], side="right") - 1]
+    return out
+
+
+@jit
+def _cut(bounds: Int32s, radii: Floats, weights: Floats) -> Ints:
+    """Cut a tree into balls, of which none is much wider or heavier: return their nodes in its order [n].
+
+    Args:
+        bounds, radii, weights: of the nodes.
+    """
+    heap, leaves = [(-1.0, 0)], [0][:0]
+    for _ in range(SPLITS):
+        if not heap:
+            break
+        _, node = heapq.heappop(heap)
+        if 2 * node + 2 >= len(bounds):
+            leaves.append(node)
+            continue
+        for child in (2 * node + 1, 2 * node + 2):
+            heapq.heappush(heap, (-weights[child] * radii[child] ** 2, child))
+    for _, node in heap:
+        leaves.append(node)
+    nodes = np.array(leaves, np.int64)
+    return nodes[np.argsort(bounds[nodes, 0])]

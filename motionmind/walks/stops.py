@@ -1,0 +1,109 @@
+"""Stops: the postures that a movement passes exactly, with the velocities there if they are known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Floats, Ints
+from motionmind.body.motion import Posture, Velocity
+from motionmind.corpus.corpus import Corpus
+from motionmind.geometry import rotations as rot
+from motionmind.learned.carriage import Carriage
+from motionmind.walks.steps import steps_at
+
+_ALL = slice(None)
+_SOON = 1e-3  # seconds over which a velocity of the body is taken apart into its chains'
+
+
+class Rates(NamedTuple):
+    """Velocities of a body in one or more moments.
+
+    Attributes:
+        joints: angular velocities of the joints [..., J, 3], radians a second, in their own frames; of the root without
+            the body's turning, where that is a chain of its own.
+        turn: the body's turning about the vertical [...], radians a second; 0 where that is no chain of its own.
+        travel: velocity of the root [..., 3], metres a second, in the body's own heading.
+    """
+
+    joints: Floats
+    turn: Floats
+    travel: Floats
+
+    @classmethod
+    def of_chains(cls, chains: Floats, travel: Floats, joints: int) -> Rates:
+        """Return rates from those of all chains [..., L, 3], of which the first J are joints, and the travel."""
+        turn = chains[..., -1, 1] if chains.shape[-2] > joints else np.zeros(chains.shape[:-2])
+        return cls(np.ascontiguousarray(chains[..., :joints, :]), turn, travel)
+
+
+class Stop(NamedTuple):
+    """A posture that a movement passes.
+
+    Attributes:
+        chains: orientations of the chains [L, 4].
+        place: of the root [3], in heights of the body.
+        rates: its velocity; None if unknown.
+    """
+
+    chains: Floats
+    place: Floats
+    rates: Rates | None = None
+
+
+def stop_at(corpus: Corpus, posture: Posture, velocity: Velocity | None = None) -> Stop:
+    """Return a stop at a posture of the corpus's skeleton that is passed with the given velocity."""
+    chains, place = corpus.to_chains(posture.rotations), posture.root / (posture.skeleton.height or 1.0)
+    if velocity is None:
+        return Stop(chains, place)
+    soon = corpus.to_chains(rot.mul(posture.rotations, rot.exp(_SOON * velocity.rotations)))
+    ahead = rot.about_vertical(-rot.heading(posture.rotations[0]))
+    turned = rot.log(rot.inv_mul(chains, soon)) / _SOON
+    return Stop(chains, place, Rates.of_chains(turned, rot.mul_vec(ahead, velocity.root), len(posture.skeleton)))
+
+
+def moments_rates(corpus: Corpus, carriage: Carriage, moments: Ints | slice = _ALL) -> Rates:
+    """Return the velocities in moments of the corpus: means of the steps that lead there and on, in `Rates`.
+
+    Args:
+        corpus: the movement that was learned from.
+        carriage: its moments.
+        moments: numbers of moments [n]; all of them where they are a slice.
+    """
+    if isinstance(moments, slice):
+        return _all_rates(corpus, carriage)
+    chain = carriage.begins, carriage.ends, len(carriage.weights) - len(carriage.turn)
+    leaving, arriving = (steps_at(moments, ahead, *chain) for ahead in (True, False))
+    return _mean_rates(corpus, carriage, len(moments), [(at, steps) for at, _, steps in (leaving, arriving)])
+
+
+@lru_cache(maxsize=1)
+def _all_rates(corpus: Corpus, carriage: Carriage) -> Rates:
+    """Return the velocities in all of the corpus's moments."""
+    steps = np.arange(len(carriage.begins))
+    return _mean_rates(
+        corpus, carriage, len(carriage.weights), [(at, steps) for at in (carriage.begins, carriage.ends)]
+    )
+
+
+def _mean_rates(corpus: Corpus, carriage: Carriage, count: int, steps: Sequence[tuple[Ints, Ints]]) -> Rates:
+    """Return the velocities in so many moments, means of those of steps: at which moment each is, and its number."""
+    moves, means = len(carriage.turn), []
+    counts = np.bincount(np.concatenate([at for at, _ in steps]), minlength=count)
+    of_steps = [_velocities(corpus, carriage, numbers, moves) for _, numbers in steps]
+    for k in range(2):
+        sums = np.zeros((count, *of_steps[0][k].shape[1:]))
+        for (at, _), velocities in zip(steps, of_steps, strict=True):
+            np.add.at(sums, at, velocities[k])
+        means.append(sums / np.maximum(counts, 1).reshape(-1, *(1,) * (sums.ndim - 1)))
+    return Rates.of_chains(means[0], means[1], len(corpus.skeleton))
+
+
+def _velocities(corpus: Corpus, carriage: Carriage, steps: Ints, moves: int) -> tuple[Floats, Floats]:
+    """Return the velocities of the chains [m, L, 3] and of the root [m, 3] in some of the steps."""
+    seconds, shown = 0.5 * corpus.moves.take(steps % moves).seconds[:, None], carriage.orientations
+    turned = rot.log(rot.inv_mul(shown[carriage.begins[steps]], shown[carriage.ends[steps]]))
+    return turned / seconds[..., None], carriage.travel[steps % moves] / seconds

@@ -1,0 +1,212 @@
+"""Walks over few of a corpus's moments, beside those over all of them."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from motionmind._typing import Floats, Ints
+from motionmind.body.skeleton import Skeleton
+from motionmind.corpus.corpus import Corpus
+from motionmind.corpus.gather import gather
+from motionmind.geometry import rotations as rot
+from motionmind.learned.carriage import Carriage, learn_carriage
+from motionmind.learned.neighbours import build_neighbours
+from motionmind.tween.engine import Engine
+from motionmind.walks import mean_walk, sparse
+from motionmind.walks.detail import likest_moves, moves_near
+from motionmind.walks.expectation import Expectation, expect
+from motionmind.walks.steps import follow, steps_at
+from motionmind.walks.stops import moments_rates, stop_at
+
+MOVES = 6
+
+
+@pytest.fixture(scope="module")
+def engine() -> Engine:
+    return Engine.load("karate")
+
+
+@pytest.fixture(scope="module")
+def carriage(engine: Engine) -> Carriage:
+    return grown(engine.corpus.skeleton, engine.carriage)
+
+
+def grown(skeleton: Skeleton, carriage: Carriage) -> Carriage:
+    """A carriage with trees, however few moments it has."""
+    return replace(carriage, trees=build_neighbours(skeleton, carriage.orientations, carriage.weights))
+
+
+def walk(engine: Engine, carriage: Carriage, start: int, path: bool) -> Expectation:
+    """What walks expect from a posture to one that follows on it, near what lies between if `path` says so."""
+    motion = engine.corpus.motion(engine.corpus.clips[0]).slice(start, start + MOVES + 1)
+    stops = {0: stop_at(engine.corpus, motion.posture(0)), MOVES: stop_at(engine.corpus, motion.posture(-1))}
+    chains = engine.corpus.to_chains(motion.rotations)[:, : len(motion.skeleton)]
+    return expect(engine.corpus, carriage, stops, np.linspace(0.0, 1.8, 2 * MOVES + 1), chains if path else None)
+
+
+@pytest.fixture(autouse=True)
+def _nothing_kept() -> Iterator[None]:
+    """Look-ups are kept by what is looked for; some tests change how much is looked up."""
+    for keeps in (sparse._near_ends, sparse._balls):
+        keeps.cache_clear()
+    yield
+    for keeps in (sparse._near_ends, sparse._balls):
+        keeps.cache_clear()
+
+
+@pytest.mark.parametrize("path", [False, True])
+def test_over_all_moments_one_by_one_the_sums_are_the_same(
+    engine: Engine, carriage: Carriage, path: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sparse, "ENDS", 10**6)
+    for start in (0, 11):
+        whole, few = (walk(engine, one, start, path) for one in (engine.carriage, carriage))
+        assert len(few.moments[0]) == len(engine.carriage.weights)
+        assert few.left_out == 0.0
+        # Means leave out what has a millionth of the weight, by part here and of all parts together there.
+        np.testing.assert_allclose(few.poses, whole.poses, atol=1e-3)
+        np.testing.assert_allclose(few.headings, whole.headings, atol=1e-3)
+        np.testing.assert_allclose(few.moments, whole.moments, atol=1e-12)
+        np.testing.assert_allclose(few.moves, whole.moves, atol=1e-12)
+
+
+@pytest.mark.parametrize("path", [False, True])
+def test_over_few_moments_the_mean_is_near_that_over_all(
+    engine: Engine, carriage: Carriage, path: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in (("ENDS", 24), ("NEAREST", 8), ("BY_PATH", 4)):
+        monkeypatch.setattr(sparse, name, value)
+    for start in (0, 11, 23):
+        whole, few = (walk(engine, one, start, path) for one in (engine.carriage, carriage))
+        straight = rot.slerp(whole.poses[:1], whole.poses[-1:], np.linspace(0.0, 1.0, 2 * MOVES + 1)[:, None])
+        adds = np.sqrt(np.mean(rot.angle(whole.poses, straight) ** 2))
+        off = np.sqrt(np.mean(rot.angle(whole.poses, few.poses) ** 2))
+        assert off < 0.3 * adds
+        # Rows of probabilities, and no more mass is missing at the ends than is said.
+        np.testing.assert_allclose(few.moments.sum(axis=1), 1.0)
+        assert 0.0 <= few.left_out < 1.0
+
+
+def test_what_is_chosen_stands_for_the_whole_corpus(engine: Engine, carriage: Carriage) -> None:
+    trees = carriage.trees
+    assert trees is not None
+    joints = len(engine.corpus.skeleton)
+    ends = np.asarray(carriage.orientations[[3, 40], :joints])
+    for number in range(len(trees.parts)):
+        chosen = sparse.choose(trees, number, carriage, ends, ends[:1], 12)
+        assert isinstance(chosen.moments, np.ndarray)
+        assert chosen.weights.sum() == pytest.approx(carriage.weights.sum())
+        assert (chosen.weights > 0.0).all()
+        leave = np.bincount(carriage.begins, carriage.shares, len(carriage.weights))[chosen.moments]
+        np.testing.assert_allclose(np.bincount(chosen.begins, chosen.shares, len(chosen.moments)), leave)
+        same = carriage.clusters[chosen.moments, number]
+        assert all(len(np.unique(same[chosen.clusters == k])) == 1 for k in range(chosen.clusters.max() + 1))
+
+
+def test_walks_lead_on_from_where_all_performances_of_a_dance_end(
+    engine: Engine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sparse, "ENDS", 12)
+    motion = engine.corpus.motion(engine.corpus.clips[0]).slice(0, 2 * MOVES + 1)
+    corpus = gather("many", [replace(motion, name=f"{number}") for number in range(40)])
+    carriage = grown(corpus.skeleton, learn_carriage(corpus))
+    stops = {0: stop_at(corpus, motion.posture(-1)), MOVES: stop_at(corpus, motion.posture(MOVES))}
+    found = expect(corpus, carriage, stops, np.linspace(0.0, 1.8, 2 * MOVES + 1))
+    np.testing.assert_allclose(found.moments.sum(axis=1), 1.0)
+    assert np.isfinite(found.poses).all()
+    assert np.isfinite(found.headings).all()
+
+
+def test_threads_change_no_byte(engine: Engine, carriage: Carriage, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = []
+    for threads in (1, 3):
+        monkeypatch.setattr(mean_walk, "THREADS", threads)
+        monkeypatch.setattr(mean_walk, "BUSY", 1)
+        found.append(walk(engine, carriage, 4, True))
+    for one, other in zip(*found, strict=True):
+        assert np.array_equal(one, other)
+
+
+@pytest.fixture(scope="module")
+def both_ways(engine: Engine) -> tuple[Corpus, Carriage]:
+    """A corpus that is learned backward as well."""
+    clips = [engine.corpus.motion(clip) for clip in engine.corpus.clips[:3]]
+    corpus = gather("both", clips, reverse=1.0, flips="keep")
+    return corpus, learn_carriage(corpus)
+
+
+def test_steps_are_found_from_their_ends(both_ways: tuple[Corpus, Carriage]) -> None:
+    _, carriage = both_ways
+    begins, ends = carriage.begins, carriage.ends
+    postures, rng = len(carriage.weights) - len(carriage.turn), np.random.default_rng(0)
+    some = np.sort(rng.choice(len(carriage.weights), 30, replace=False))
+    for ahead, here, there in ((True, begins, ends), (False, ends, begins)):
+        at, other, steps = steps_at(some, ahead, begins, ends, postures)
+        np.testing.assert_array_equal(some[at], here[steps])
+        np.testing.assert_array_equal(other, there[steps])
+        assert sorted(steps) == np.flatnonzero(np.isin(here, some)).tolist()
+        reached = follow(some[:1], ahead, 2, begins, ends, postures)
+        once = there[here == some[0]]
+        assert set(reached) == {*once, *there[np.isin(here, once)]}
+        # From a posture at most a moment more to either side with each step, by however many ways one comes there.
+        assert len(follow(some[:1], ahead, 40, begins, ends, postures)) <= 41 * 42
+
+
+def test_velocities_in_some_moments_are_those_in_all(both_ways: tuple[Corpus, Carriage]) -> None:
+    corpus, carriage = both_ways
+    some = np.arange(3, len(carriage.weights), 7)
+    both = moments_rates(corpus, carriage, some), moments_rates(corpus, carriage)
+    for few, whole in zip(*both, strict=True):
+        np.testing.assert_allclose(few, whole[some], atol=1e-12)
+
+
+def cost(engine: Engine, moves: Ints, poses: Floats) -> float:
+    """What fine detail from these moves costs, but for leaving runs."""
+    shown, corpus = engine.carriage.orientations[: len(engine.corpus), : poses.shape[1]], engine.corpus.moves
+    ends = (shown[corpus.begins[moves]], poses[:-1]), (shown[corpus.ends[moves]], poses[1:])
+    return float(sum(np.sum(4.0 * np.sin(0.5 * rot.angle(*pair)) ** 2) for pair in ends))
+
+
+def test_fine_detail_is_found_among_few_moves(engine: Engine, carriage: Carriage) -> None:
+    moves, shown = engine.corpus.moves, engine.carriage.orientations[: len(engine.corpus)]
+    poses = np.asarray(shown[5:12, : len(engine.corpus.skeleton)])
+    assert moves_near(moves, engine.carriage, poses) is None
+    among = moves_near(moves, carriage, poses)
+    assert among is not None
+    found, every = likest_moves(moves, shown, poses, among), likest_moves(moves, shown, poses)
+    np.testing.assert_array_equal(found, every)
+    np.testing.assert_array_equal(likest_moves(moves, shown, poses, np.arange(len(moves.begins))), every)
+    few = likest_moves(moves, shown, poses, among[::3])
+    assert np.isin(few, among[::3]).all()
+    assert cost(engine, few, poses) >= cost(engine, every, poses)
+
+
+def test_a_tween_of_a_corpus_with_trees_is_near_that_without(engine: Engine, carriage: Carriage) -> None:
+    indexed, motion = replace(engine, carriage=carriage), engine.corpus.motion(engine.corpus.clips[0])
+    for start, stop, seconds in ((3, 12, 1.8), (40, 15, 4.0)):
+        few, whole = (
+            one.tween(motion.posture(start), motion.posture(stop), duration=seconds) for one in (indexed, engine)
+        )
+        assert few.report()["left_out"] == few.left_out >= 0.0 == whole.left_out
+        assert np.sqrt(np.mean(rot.angle(few.motion.rotations, whole.motion.rotations) ** 2)) < 0.15
+
+
+def test_look_ups_are_kept_as_long_as_the_corpus_and_no_longer(engine: Engine, carriage: Carriage) -> None:
+    own = replace(carriage)
+    assert own.trees is not None
+    own = replace(own, trees=replace(own.trees))
+    ends = own.orientations[:2][:, own.trees.parts[0]].tobytes()
+    first = sparse._near_ends(own, 0, ends)
+    assert sparse._near_ends(own, 0, ends) is first
+    assert sparse._near_ends(carriage, 0, ends) is not first
+    assert sparse._balls(own.trees, 0) is sparse._balls(own.trees, 0)
+    alive, trees = weakref.ref(own), weakref.ref(own.trees)
+    del own
+    gc.collect()
+    assert alive() is trees() is None
