@@ -153,6 +153,7 @@ def find_bearing(
     flying: Bools,
     staying: int | None,
     moving: tuple[bool, bool],
+    passing: tuple[bool, bool],
     feet: list[Foot],
     fps: float,
     falls: Floats | None = None,
@@ -167,6 +168,7 @@ def find_bearing(
         flying: whether the body is in the air [N].
         staying: a foot that stands throughout, or None.
         moving: whether the body passes the first and the last frame with a velocity; else feet that are low rest there.
+        passing: whether it passes them, at whatever velocity; else a foot that is in the air there takes its time.
         feet: its feet.
         fps: frames a second.
         falls: how far the body would fall without each foot [N, feet], from 0 to 1; None where that is not known.
@@ -207,7 +209,7 @@ def find_bearing(
             if np.array_equal(bears, borne[k]):
                 continue  # as the last time
             borne[k] = bears
-            stances[k] = find_stances(tracks[:, k], shape.outward[:, k], *costs[k], bears, flying, fps)
+            stances[k] = find_stances(tracks[:, k], shape.outward[:, k], *costs[k], bears, flying, fps, passing)
             stands[:, k] = False
             for stance in stances[k]:
                 stands[stance.start : stance.end + 1, k] = True

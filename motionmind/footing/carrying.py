@@ -26,6 +26,7 @@ from motionmind.footing.knees import cover, smoothed
 from motionmind.footing.least_squares import joined, solve
 from motionmind.footing.root_rows import (
     hurry_rows,
+    jerk_rows,
     knee_rows,
     legs_of,
     legs_to_places,
@@ -49,12 +50,14 @@ class Ends(NamedTuple):
         aloft: share of the corpus's walks that are in the air in each frame [N], from 0 to 1.
         leaps: height of their lowest points above the floor there [N], metres.
         moving: whether the velocity is given in the first and in the last frame.
+        passing: whether the body passes the first and the last frame, at whatever velocity.
         rates: vertical velocities of the root there, metres a second; None where unknown.
     """
 
     aloft: Floats
     leaps: Floats
     moving: tuple[bool, bool]
+    passing: tuple[bool, bool]
     rates: tuple[float | None, float | None]
 
 
@@ -89,6 +92,7 @@ def carry(
     known: Ends,
     overhang: float,
     travels: float,
+    pushes: float,
     fastest: Floats,
     gravity: float,
     fps: float,
@@ -107,6 +111,7 @@ def carry(
         known: what is known of its ends, and of its flights.
         overhang: how far beyond its support the centre of mass may be, metres.
         travels: how fast the body travels at most, metres a second; infinite for any speed.
+        pushes: how much its root is accelerated at most, metres a second squared; infinite for any.
         fastest: speeds of the joints in the corpus [J], rad/s.
         gravity: metres a second squared.
         fps: frames a second.
@@ -132,7 +137,7 @@ def carry(
             fps,
         )
     flying, freedom = flying_frames(flights, (hovering[0], hovering[1]), count), leg_freedom(flights, count, fps)
-    planned = shape, root[:, [0, 2]], mass[:, [0, 2]], firm, flying, staying, known.moving, feet, fps
+    planned = shape, root[:, [0, 2]], mass[:, [0, 2]], firm, flying, staying, known.moving, known.passing, feet, fps
     bearing = find_bearing(*planned)
     if "steps" in without:
         bearing = bearing._replace(targets=np.broadcast_to(root[:, None, [0, 2]], bearing.targets.shape).copy())
@@ -157,7 +162,12 @@ def carry(
         steady += standing_rows(shape, bearing, floor, freedom)
         steady = [joined(steady + flight_rows(flights, mass, standing, gravity, fps))]
         for _ in range(ROUNDS[1]):
-            rows = [*steady, sunk_rows(shape, floor, start), hurry_rows(start, travels, freedom, fps)]
+            rows = [
+                *steady,
+                sunk_rows(shape, floor, start),
+                hurry_rows(start, travels, freedom, fps),
+                jerk_rows(start, pushes, freedom, fps),
+            ]
             reaching = legs_to_places(legs, shape, bearing, floor, start)
             rows += [
                 reach_rows(reaching, bearing, start, bones, fps),

@@ -62,7 +62,14 @@ def standing_costs(above: Floats, firm: Floats) -> tuple[Floats, Floats]:
 
 
 def find_stances(
-    track: Floats, outward: Floats, stand: Floats, swing: Floats, others: Bools, flying: Bools, fps: float
+    track: Floats,
+    outward: Floats,
+    stand: Floats,
+    swing: Floats,
+    others: Bools,
+    flying: Bools,
+    fps: float,
+    passing: tuple[bool, bool] = (False, False),
 ) -> list[Stance]:
     """Return when and where a foot stands: the way to part the time into standing and swinging that costs least.
 
@@ -77,11 +84,14 @@ def find_stances(
         others: whether another limb bears the body [N].
         flying: whether the body is in the air [N].
         fps: frames a second.
+        passing: whether the body passes the first and the last frame; else a foot in the air takes its time there.
     """
     track, outward = np.ascontiguousarray(track), np.ascontiguousarray(outward)
     brief = max(2, round(BRIEF * fps))
     stand, swing = _costs(stand, swing, others, flying, round(SHIFTS * fps), fps)
-    parted = _part(track - track[0], outward, stand, swing, brief, fps)
+    # A foot that is given in the air comes down in half a step; on its way or with the body it does so as it falls.
+    first, last = (0 if goes or flies else brief // 2 for goes, flies in zip(passing, flying[[0, -1]], strict=True))
+    parted = _part(track - track[0], outward, stand, swing, brief, (first, last), fps)
     places, slips = _places(track, outward, parted, brief)
     return [
         Stance(start, end, place, slip)
@@ -139,9 +149,12 @@ def _places(track: Floats, outward: Floats, parted: Ints, brief: int) -> tuple[F
 
 @jit
 def _part(  # noqa: PLR0915 - one table, filled in one go
-    track: Floats, outward: Floats, stand: Floats, swing: Floats, brief: int, fps: float
+    track: Floats, outward: Floats, stand: Floats, swing: Floats, brief: int, half: tuple[int, int], fps: float
 ) -> Ints:
-    """Return the intervals [K, 2] in which a foot stands, in order (see `find_stances`)."""
+    """Return the intervals [K, 2] in which a foot stands, in order (see `find_stances`).
+
+    A step takes so many frames at least, and half a step from the first frame and to the last.
+    """
     count = len(track)
     stand_sum, swing_sum = np.zeros(count + 1), np.zeros(count + 1)
     sums, squares = np.zeros((count + 1, 2)), np.zeros(count + 1)
@@ -183,7 +196,7 @@ def _part(  # noqa: PLR0915 - one table, filled in one go
             if (s == 0 and stand[0] * fps < FIRM) or (t == last and stand[last] * fps < FIRM):
                 continue  # it stands where it is given
             steps = s > 0 and t < last
-            if n < brief and steps:
+            if n < (brief if steps else half[0] if s == 0 else half[1]):
                 continue
             before = 0.0 if s == 0 else best[0, s - 1]
             if before == np.inf:

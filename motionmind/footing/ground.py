@@ -107,6 +107,7 @@ def set_on_floor(
     rates: tuple[Floats | None, Floats | None],
     fastest: Floats | None = None,
     travels: float = np.inf,
+    pushes: float = np.inf,
     without: Collection[Correction] = (),
 ) -> tuple[Floats, Floats]:
     """Return a movement that its feet carry: local rotations [N, J, 4] and positions of the root [N, 3], metres.
@@ -127,6 +128,7 @@ def set_on_floor(
         rates: its first and its last velocity [3], metres a second; None where unknown.
         fastest: speeds of the joints in the corpus [J], rad/s; None where there is no telling.
         travels: how fast the body travels at most, metres a second.
+        pushes: how much its root is accelerated at most, metres a second squared.
         without: corrections to leave out.
     """
     size = size_of(skeleton)
@@ -151,6 +153,7 @@ def set_on_floor(
         slow,
         fastest,
         travels / size,
+        pushes / size,
         gravity,
         without,
     )
@@ -172,6 +175,7 @@ def _set_down(
     rates: tuple[Floats | None, Floats | None],
     fastest: Floats,
     travels: float,
+    pushes: float,
     gravity: float,
     without: Collection[Correction],
 ) -> tuple[Floats, Floats]:
@@ -216,6 +220,7 @@ def _set_down(
             aloft[part],
             leaps[part],
             (rate[0] is not None, rate[1] is not None),
+            (number > 0 or rate[0] is not None, number < len(frames) - 2 or rate[1] is not None),
             (None if rate[0] is None else float(rate[0][1]), None if rate[1] is None else float(rate[1][1])),
         )
         carried = carry(
@@ -229,6 +234,7 @@ def _set_down(
             known,
             stance.overhang,
             travels,
+            pushes,
             fastest,
             gravity,
             fps,

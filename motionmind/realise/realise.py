@@ -165,8 +165,8 @@ def realise(
     keep_apart = keeper(clock, [*stops], fixed, wished, carriage, a.skeleton, without)
     rotations = _limit(keep_apart(rotations, None), postures, carriage.loose)
 
-    if peaks is not None:
-        most = peaks(LONGER * float(clock.frames[-1]), pace)
+    most = None if peaks is None else peaks(LONGER * float(clock.frames[-1]), pace)
+    if most is not None:
         high = np.sqrt(2.0 * GRAVITY * stance.leaps) > JUMPS_AT * most[-2] * a.skeleton.height
         high[given] = False
         stance = stance._replace(aloft=np.where(high, 0.0, stance.aloft))
@@ -183,6 +183,7 @@ def realise(
         (None if leaving is None else leaving.root, None if arriving is None else arriving.root),
         None if fastest is None else pace * fastest[: len(a.skeleton)],
         np.inf if fastest is None else float(HEADROOM * pace * fastest[-1] * a.skeleton.height),
+        np.inf if most is None else float(most[-1]) * a.skeleton.height,
         without,
     )
     settle = partial(

@@ -211,9 +211,11 @@ def _slower(motion: Motion, most: Floats, slides: float, moving: tuple[bool, boo
     middles, fps = 0.5 * (times[1:] + times[:-1]), 1.0 / float(times[1] - times[0])
     ends = [time for fixed, time in zip(moving, times[[0, -1]], strict=True) if fixed]
     free = np.minimum(_away(middles, ends, fps), _away(middles, times[_falling(motion, fps)], fps, PUSHES))
+    moved = moved_in(motion)
     shown = (fps * steps_of(motion) / most[:-1]).max(axis=1)
     # Twice as slow a movement has a quarter of its accelerations; each is between two steps.
-    changes = np.sqrt(accelerations(moved_in(motion), fps) / most[-1])
+    changes = np.sqrt(accelerations(moved, fps) / most[-1])
+    changes[_braking(moved, moving, fps)] = 1.0  # the slower the rest, the more a body brakes from what is given
     shown[1:], shown[:-1] = np.maximum(shown[1:], changes), np.maximum(shown[:-1], changes)
     if np.isfinite(slides) and body.height >= TALL:
         low = lowest_height(body, motion.rotations, motion.root)
@@ -230,6 +232,23 @@ def _slower(motion: Motion, most: Floats, slides: float, moving: tuple[bool, boo
 
     slower = 1.0 + free * (around(np.maximum(shown, 1.0)) - 1.0)
     return slower, free * (1.0 - around(np.minimum(shown, 1.0)))
+
+
+def _braking(moved: Floats, moving: tuple[bool, bool], fps: float) -> Bools:
+    """Return between which steps [N - 2] a body slows down from a velocity that is given, or comes to one.
+
+    Args:
+        moved: displacements of the root in each step [N - 1, 3].
+        moving: whether it passes the first and the last frame with a given velocity.
+        fps: frames a second.
+    """
+    faster, out = np.diff(np.linalg.norm(moved, axis=1)), np.zeros(len(moved) - 1, dtype=np.bool_)
+    near = round(SETTLES * fps)
+    if moving[0]:
+        out[:near] |= faster[:near] < 0.0
+    if moving[1]:
+        out[-near:] |= faster[-near:] > 0.0
+    return out
 
 
 def _within(slower: Floats, slack: Floats, seconds: Floats) -> Floats:

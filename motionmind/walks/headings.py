@@ -32,7 +32,8 @@ def turn_with_walks(
     for about RUN seconds, so V counts steps that vary together for as long. The turn still missing to each facing is
     distributed over the steps in proportion to their variance, as in the mean of normal variables given their sum; of
     all facings that differ by whole turns, the nearest to what the walks do is meant, or, where it is to be the `near`
-    way and that is less than NEARLY half a turn, the nearest to the facing before; a body that SPINS at an end goes on.
+    way and that is less than NEARLY half a turn, the nearest to the facing before; a body that SPINS at an end goes on,
+    by one whole turn more at most.
     As far as walks are not trusted, the body does not turn with them, and distributes what is missing evenly. A body
     that turns at an end does so there, too.
 
@@ -45,7 +46,7 @@ def turn_with_walks(
         rates: turning at the first and at the last, radians a second; None where it is unknown.
         near: whether the body is to turn the near way from each facing to the next.
     """
-    near = near and all(rate is None or abs(rate) < SPINS for rate in rates)
+    spins = [rate for rate in rates if rate is not None and abs(rate) >= SPINS]
     varies = np.maximum(spread - turn**2, 1e-4)
     variance = varies.sum() * RUN * len(turn) / (half_steps[-1] - half_steps[0])
     turn = trust * turn * (turn.sum() ** 2 / (turn.sum() ** 2 + variance))
@@ -55,10 +56,12 @@ def turn_with_walks(
         missing = rot.heading(facing[end // 2]) - out[end]
         way = rot.heading(facing[end // 2]) - rot.heading(facing[start // 2])
         way -= 2.0 * np.pi * np.round(way / (2.0 * np.pi))
-        if near and abs(way) < NEARLY:
-            missing = out[start] + way - out[end]
-        else:
-            missing -= 2.0 * np.pi * np.round(missing / (2.0 * np.pi))
+        missing -= 2.0 * np.pi * np.round(missing / (2.0 * np.pi))
+        if near:  # no more than the one turn that a spin, or having as far to either side, is worth
+            either = abs(way) >= NEARLY
+            fewest, most = either or any(rate < 0.0 for rate in spins), either or any(rate > 0.0 for rate in spins)
+            turns = np.round((out[end] + missing - out[start] - way) / (2.0 * np.pi))
+            missing += 2.0 * np.pi * (np.clip(turns, -int(fewest), int(most)) - turns)
         share = np.cumsum(varies[start:end]) / varies[start:end].sum()
         out[start + 1 : end + 1] += missing * share
         out[end + 1 :] += missing

@@ -328,6 +328,24 @@ def test_a_body_that_steps_travels_hardly_faster_than_it_may() -> None:
     assert speeds[2] < 1.15
 
 
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_body_that_passes_an_end_fast_does_not_stop_dead(way: float) -> None:
+    """It stands in balance on both feet, but for the 4 m/s that it is given in one end."""
+    q, frames = on_one_leg(46, 0.0), 46
+    root = stand(human23(), q, np.zeros((frames, 3)), np.zeros(frames))
+    fast = np.array([0.0, 0.0, 4.0])
+
+    def jolt(**options: Any) -> float:
+        """Its greatest acceleration level, m/s^2: knees that give way come later."""
+        went = grounded(q, root, rates=(fast, None) if way > 0.0 else (None, fast), **options)[1]
+        step = 30.0 * (went[1] - went[0] if way > 0.0 else went[-1] - went[-2])
+        assert step[2] > 3.0
+        return float(900.0 * np.linalg.norm(np.diff(went[:, [0, 2]], 2, axis=0), axis=1).max())
+
+    # The leg that it stands on reaches only so far: the rest it pays in how hard it brakes.
+    assert jolt(pushes=25.0) < 0.85 * jolt()
+
+
 def test_the_weight_comes_over_the_standing_foot() -> None:
     """A body whose trunk leans far aside on one leg; at both ends it stands upright."""
     frames = 91
@@ -667,7 +685,15 @@ def test_the_nearest_point_of_a_support_is_in_it_and_none_is_nearer() -> None:
         assert np.all((own[bears] @ around.T).max(axis=0) >= nearest @ around.T - 1e-9)
 
 
-def cost_of(stands: Sequence[bool], track: Floats, outward: Floats, stand: Floats, swing: Floats, fps: float) -> float:
+def cost_of(
+    stands: Sequence[bool],
+    track: Floats,
+    outward: Floats,
+    stand: Floats,
+    swing: Floats,
+    half: tuple[int, int],
+    fps: float,
+) -> float:
     """The cost of a way to part the time into standing and swinging, straight from its definition."""
     last, total, at = len(track) - 1, 0.0, 0
     while at <= last:
@@ -692,7 +718,8 @@ def cost_of(stands: Sequence[bool], track: Floats, outward: Floats, stand: Float
             if (at == 0 and stand[0] < FIRM) or (end == last and stand[-1] < FIRM):
                 return np.inf
             inner = at > 0 and end < last
-            if inner and end + 1 - at < max(2, round(BRIEF * fps)):
+            least = max(2, round(BRIEF * fps)) if inner else half[0] if at == 0 else half[1]
+            if end + 1 - at < least:
                 return np.inf
             off = track[min(end + 1, last)] - track[max(at - 1, 0)]
             total += swing[here].sum() / fps + float(off @ off) / ((end + 2 - at) / fps * QUICK**2) + inner * STEP_COST
@@ -708,14 +735,14 @@ def test_time_is_parted_in_the_way_that_costs_least(seed: int) -> None:
     angles = rng.uniform(0.0, 6.0) + np.cumsum(rng.normal(scale=0.1, size=frames))
     outward = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     stand, swing = rng.uniform(0.0, 8.0, frames), rng.uniform(0.0, 3.0, frames)
-    best = min(product((True, False), repeat=frames), key=lambda one: cost_of(one, track, outward, stand, swing, fps))
-    parted = _part(track, outward, stand / fps, swing / fps, max(2, round(BRIEF * fps)), fps)
+    half = (3 * seed % 4, seed % 3)  # frames that a foot swings at least which is given in the air
+    known = track, outward, stand, swing, half, fps
+    best = min(product((True, False), repeat=frames), key=lambda one: cost_of(one, *known))
+    parted = _part(track, outward, stand / fps, swing / fps, max(2, round(BRIEF * fps)), half, fps)
     found = np.zeros(frames, dtype=bool)
     for start, end in parted:
         found[start : end + 1] = True
-    assert cost_of(list(found), track, outward, stand, swing, fps) == pytest.approx(
-        cost_of(best, track, outward, stand, swing, fps), rel=1e-9
-    )
+    assert cost_of(list(found), *known) == pytest.approx(cost_of(best, *known), rel=1e-9)
 
 
 def test_a_foot_that_is_lifted_swings_and_one_that_stands_firmly_stands() -> None:
@@ -734,6 +761,27 @@ def test_a_foot_that_is_lifted_swings_and_one_that_stands_firmly_stands() -> Non
     assert [(one.start, one.end) for one in stances] == [(0, 9), (21, 29)]
     # Where nothing else bears, it is not lifted for so short a time.
     assert len(find_stances(track, outward, *standing_costs(high, np.ones(30)), none, none, 30.0)) == 1
+
+
+@pytest.mark.parametrize("end", [0, 1])
+def test_a_foot_that_is_given_in_the_air_takes_half_a_step_to_come_down(end: int) -> None:
+    frames, fps = 30, 30.0
+    track, outward = np.zeros((frames, 2)), np.tile([1.0, 0.0], (frames, 1))
+    high = np.zeros(frames)
+    high[-end] = 0.4
+    others, none = np.ones(frames, dtype=np.bool_), np.zeros(frames, dtype=np.bool_)
+
+    def comes_down(flying: Bools, moving: tuple[bool, bool]) -> int:
+        """Frames for which it swings at that end."""
+        (stance,) = find_stances(track, outward, *standing_costs(high, np.ones(frames)), others, flying, fps, moving)
+        return stance.start if end == 0 else frames - 1 - stance.end
+
+    assert comes_down(none, (False, False)) == round(BRIEF * fps) // 2
+    # On its way down, or with the body, it comes down as it falls.
+    assert comes_down(none, (end == 0, end == 1)) == 1
+    flying = none.copy()
+    flying[-end] = True
+    assert comes_down(flying, (False, False)) == 1
 
 
 def bent(bends: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:

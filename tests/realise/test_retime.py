@@ -179,3 +179,17 @@ def test_an_end_that_is_passed_at_a_velocity_keeps_it(end: int) -> None:
     assert speeds(slower)[first] == pytest.approx(speeds(motion)[first], rel=0.1)
     assert slower.times[-1] > motion.times[-1] + SETTLES
     assert speeds(slower)[last] == pytest.approx(speeds(motion)[last], rel=0.1)
+
+
+@pytest.mark.parametrize("end", [0, 1])
+def test_who_brakes_from_a_given_velocity_is_not_slowed_down_for_that(end: int) -> None:
+    """It would brake the harder; who starts as suddenly takes longer."""
+    motion, clock = bent(np.zeros(91))
+    steps = np.concatenate([[0.1] * 2, np.linspace(0.1, 0.0, 8), np.zeros(80)])
+    gone = np.concatenate([[0.0], np.cumsum(steps)])
+    gone = gone if end == 0 else gone[-1] - gone[::-1]
+    motion = replace(motion, root=motion.root + gone[:, None] * np.array([0.0, 0.0, 1.0]))
+    hard = most(9.0, 0.3 * accelerations(moved_in(motion), FPS).max())
+    assert slow_down(motion, clock, hard, (end == 0, end == 1))[1].frames[-1] == pytest.approx(3.0)
+    assert slow_down(motion, clock, hard, STILL)[1].frames[-1] > 3.2
+    assert slow_down(motion, clock, hard, (end == 1, end == 0))[1].frames[-1] > 3.2

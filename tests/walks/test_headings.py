@@ -111,6 +111,21 @@ def test_the_turning_at_an_end_is_that_of_its_own_step() -> None:
     np.testing.assert_allclose(np.diff(found)[[0, -1]] / times[1], [1.5, -2.0], atol=0.05)
 
 
+@pytest.mark.parametrize("rate", [6.0, -6.0])
+@pytest.mark.parametrize("end", [0, 1])
+def test_a_body_that_spins_at_an_end_turns_once_more_that_way_at_most(rate: float, end: int) -> None:
+    turning, rates = np.sign(rate) * np.radians(900.0) / 40.0 * np.ones(40), [None, None]
+    rates[end] = rate
+    walks = turning, turning**2 + 1e-6, SURE, TIMES, facings(0.0, 40.0)
+    wound = turn_with_walks(*walks, (rates[0], rates[1]))
+    assert np.degrees(wound[-1] - wound[0]) == pytest.approx(40.0 + (720.0 if rate > 0.0 else -1080.0), abs=1e-6)
+    near = turn_with_walks(*walks, (rates[0], rates[1]), near=True)
+    assert np.degrees(near[-1] - near[0]) == pytest.approx(40.0 + np.sign(rate) * 360.0, abs=1e-6)
+    # Not against its spin, whatever walks do.
+    against = turn_with_walks(-turning, *walks[1:], (rates[0], rates[1]), near=True)
+    assert np.degrees(against[-1] - against[0]) == pytest.approx(40.0, abs=1e-6)
+
+
 # --- near the states of a path ----------------------------------------------------------------------------------------
 
 
