@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +36,30 @@ def test_what_is_varied_is_the_piece_as_it_stands(studio_server: Served, studio_
     page.get_by_test_id("vary").click()
     wait_for(page, "studio.store.state.undo === 'vary the piece'", 20.0)
     assert "ballet/plies" in {block["source"] for block in piece(page)["blocks"]}
+
+
+def test_what_another_window_does_before_the_order_comes_is_varied_too(studio_server: Served, studio_page: Any) -> None:
+    page = studio_page.context.new_page()  # what is refused is told of on a page's console
+    page.goto(studio_server.url)
+    studio_server.insert("b1", "ballet/adagio", 0, 40)
+    page.get_by_test_id("open-vary").click()
+    page.get_by_test_id("tile-3").wait_for()
+    edited: list[str] = []
+
+    def late(route: Any) -> None:
+        """Let the other window be quicker, twice: here nobody has heard of it yet."""
+        if len(edited) < 2 and '"arrange"' in (route.request.post_data or ""):
+            edited.append(f"c{len(edited)}")
+            studio_server.insert(edited[-1], "ballet/plies", 0, 20, before="b1")
+        route.continue_()
+
+    page.route(re.compile("/api/(edits|vary/accept)$"), late)
+    page.get_by_test_id("vary").click()
+    wait_for(page, "studio.store.state.undo === 'vary the piece'", 20.0)
+    assert [block["id"] for block in studio_server.studio.project.state.about["original"]] == ["c0", "c1", "b1"]
+    page.get_by_text("edited in another window").wait_for()
+    page.get_by_test_id("undo").click()
+    wait_for(page, "piece.blocks.map(({ id }) => id).join() === 'c0,c1,b1'", 20.0)
 
 
 def test_a_double_click_does_a_thing_once(studio_server: Served, studio_page: Any) -> None:
