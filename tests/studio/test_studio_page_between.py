@@ -80,19 +80,39 @@ def test_from_the_open_page_to_a_file_in_six_clicks(studio_page: Any, tmp_path: 
     assert shared.evaluate("motionmind.motion.insertions.length") == 1
 
 
-def test_a_film_of_the_piece_is_taken_away(studio_server: Any, studio_page: Any, tmp_path: Path) -> None:
+def test_a_film_of_the_piece_is_taken_away_while_something_else_is_done(
+    studio_server: Any, studio_page: Any, tmp_path: Path
+) -> None:
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
-    studio_server.insert("b1", "ballet/adagio", 0, 1)
+    studio_server.insert("b1", "ballet/adagio", 0, 2)
     until(studio_page, "studio.viewer.piece?.end > 0")
     seconds = studio_page.evaluate("studio.viewer.piece.end")
     studio_page.get_by_test_id("open-take").click()
     with studio_page.expect_download(timeout=LONG) as download:
         studio_page.get_by_test_id("export-film").click()
+        studio_page.locator("progress[aria-label=Film]").wait_for()
+        studio_page.get_by_test_id("open-pose").click()
+        studio_page.get_by_test_id("handle-pelvis").wait_for()
+        studio_server.edit(edit="delete", block="b1")
     assert download.value.suggested_filename == "piece.webm"
     download.value.save_as(tmp_path / "piece.webm")
     _, found = ffmpeg.count_frames_and_secs(str(tmp_path / "piece.webm"))
     assert found == pytest.approx(seconds, abs=0.1)
-    until(studio_page, "!studio.viewer.busy")
+    studio_page.get_by_text("The film is made: piece.webm.").wait_for()
+
+
+def test_how_far_a_film_is_leads_to_where_it_is_stopped(studio_server: Any, studio_page: Any) -> None:
+    studio_server.insert("b1", "ballet/adagio", 0, 40)
+    until(studio_page, "studio.viewer.piece?.end > 0")
+    studio_page.get_by_test_id("open-take").click()
+    studio_page.get_by_test_id("export-film").click()
+    studio_page.get_by_test_id("open-vary").click()
+    told = studio_page.get_by_test_id("filming")
+    told.click()
+    studio_page.get_by_test_id("stop-film").click()
+    studio_page.get_by_test_id("export-film").wait_for()
+    told.wait_for(state="detached")
+    assert studio_page.get_by_test_id("toast").count() == 0
 
 
 def test_four_alternatives_play_in_step_and_say_what_they_are(studio_page: Any) -> None:
