@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from piece_page import piece, wait_for
+from piece_page import from_a_to_b, piece, until, wait_for, wait_for_alternatives
 from scores import BENDS
 
 if TYPE_CHECKING:
@@ -93,9 +93,7 @@ def test_a_movement_is_put_on_the_time_line_once(studio_page: Any, tmp_path: Pat
 
 def test_an_alternative_is_accepted_once_by_keys(studio_page: Any) -> None:
     page = studio_page
-    for posture in ("arabesque", "fifth"):
-        page.get_by_test_id(f"posture-{posture}").click()
-    page.wait_for_selector("[data-testid=alternatives][data-state=found]", timeout=120_000)
+    from_a_to_b(page)
     hold_up(page, "**/api/between/accept")
     page.keyboard.press("2")
     page.keyboard.press("Enter")
@@ -106,7 +104,7 @@ def test_an_alternative_is_accepted_once_by_keys(studio_page: Any) -> None:
     assert page.evaluate("[studio.desk.ends.a?.title, studio.desk.ends.b]") == ["fifth", None]
     # Whoever takes it back before it has come takes it back.
     page.get_by_test_id("posture-bow").click()
-    page.wait_for_selector("[data-testid=alternatives][data-state=found]", timeout=120_000)
+    wait_for_alternatives(page)
     page.keyboard.press("1")
     page.keyboard.press("Enter")
     page.keyboard.press("Control+z")
@@ -145,7 +143,7 @@ def test_a_field_shows_what_is_wished(studio_server: Served, studio_page: Any) -
     for given, shown, wished in (("999", "60", "60"), ("0", "", "null"), ("0.01", "0.1", "0.1")):
         field.fill(given)
         field.press("Tab")
-        assert field.input_value() == shown
+        until(page, "([field, shown]) => field.value === shown", [field.element_handle(), shown])
         wait_for(page, f"piece.seams[0].ask.seconds === {wished}", 10.0)
     # What is wished one after another is wished together.
     hold_up(page, "**/api/edits", 100)
@@ -157,4 +155,4 @@ def test_a_field_shows_what_is_wished(studio_server: Served, studio_page: Any) -
     for given in ("500", "999"):
         tempo.fill(given)
         tempo.press("Tab")
-        assert tempo.input_value() == "300"
+        until(page, "(tempo) => tempo.value === '300'", tempo.element_handle())

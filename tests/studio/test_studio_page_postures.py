@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from piece_page import blocks, wait_for
+from piece_page import blocks, wait_for, wait_for_alternatives
 
 if TYPE_CHECKING:
     from studio_server import Served
@@ -44,7 +44,7 @@ def test_a_posture_is_renamed_and_what_was_made_of_it_stays(studio_server: Serve
     assert blocks(page) == ["reach 0-0"]
     # It is A still, and what it leads to is found.
     page.get_by_test_id("posture-rest").click()
-    page.wait_for_selector("[data-testid=alternatives][data-state=found]", timeout=120_000)
+    wait_for_alternatives(page)
     page.get_by_test_id("undo").click()
     page.get_by_test_id("posture-reach").wait_for()
     assert sorted(saved(page)) == ["reach", "rest"]

@@ -102,9 +102,16 @@ def test_no_panel_shuts_anybody_out(studio_server: Served, browser: Any, scheme:
                 faults[f"{name} at {width}"] = found
         page.set_viewport_size({"width": 1440, "height": 900})
     page.keyboard.press("?")
-    page.wait_for_timeout(300)
+    page.get_by_test_id("keys").wait_for()
     if found := page.evaluate(_FAULTS):
         faults["keys"] = found
+    page.keyboard.press("Escape")
+    page.get_by_test_id("open-between").click()
+    page.get_by_test_id("manage-postures").click()
+    page.get_by_test_id("delete-mine").click()
+    page.get_by_test_id("restore").wait_for()
+    if found := page.evaluate(_FAULTS):
+        faults["own postures"] = found
     page.context.close()
     assert faults == {}, json.dumps(faults, indent=1)
     assert errors == []
