@@ -67,30 +67,35 @@ class Filming extends EventTarget {
  */
 async function filmed({ api, viewer }, told, signal) {
   const { piece, stage: seen, ghosts } = viewer;
+  if (!piece || !seen) throw new Error("the piece is not shown yet");
+  // As it is now: while the movement comes, another panel may turn the camera.
+  const [position, target] = [seen.camera.position.clone(), seen.controls.target.clone()];
   const { clientWidth, clientHeight } = seen.canvas;
   const canvas = document.createElement("canvas");
   const place = Object.assign(document.createElement("div"), { className: "filmed", ariaHidden: "true" });
   Object.assign(place.style, { width: `${clientWidth}px`, height: `${clientHeight}px` });
   place.append(canvas);
   document.body.append(place);
-  const movements = new Movements((/** @type {string} */ key) => movement(api, key));
-  await movements.load(piece.parts[0].key);
-  const motion = /** @type {any} */ (new Composed(piece.parts, movements, piece.name));
-  const stage = new Stage(canvas, motion, motion.body, motion.colours, () => {});
+  /** @type {Stage | undefined} */
+  let stage;
   try {
+    const movements = new Movements((/** @type {string} */ key) => movement(api, key));
+    await movements.load(piece.parts[0].key);
+    const motion = /** @type {any} */ (new Composed(piece.parts, movements, piece.name));
     await motion.load();
     signal.throwIfAborted();
+    stage = new Stage(canvas, motion, motion.body, motion.colours, () => {});
     stage.dark = viewer.theme.dark;
     stage.filming = false; // takes up the size
-    stage.camera.position.copy(seen.camera.position);
-    stage.controls.target.copy(seen.controls.target);
+    stage.camera.position.copy(position);
+    stage.controls.target.copy(target);
     stage.controls.update();
     stage.filming = true; // keeps it
     return await film(stage, motion, ghosts, (/** @type {number} */ time) => told(time / Math.max(motion.end, 1e-9)), signal);
   } finally {
-    stage.controls.dispose();
-    stage.renderer.dispose();
-    stage.renderer.forceContextLoss();
+    stage?.controls.dispose();
+    stage?.renderer.dispose();
+    stage?.renderer.forceContextLoss();
     place.remove();
   }
 }
