@@ -227,6 +227,7 @@ class Variation(_Answer):
     other: Numbers
     jumps: list[int]
     about: dict[str, Any]
+    basis: str
 
 
 class FactsView(_Answer):

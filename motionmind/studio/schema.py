@@ -35,7 +35,7 @@ from motionmind.studio.between import Acceptance, Between
 from motionmind.studio.corpora import Lesson
 from motionmind.studio.posing import Changing, Dragging, Keeping, Opening, Telling, Turning
 from motionmind.studio.uploads import Choices
-from motionmind.studio.varied import Wish
+from motionmind.studio.varied import Ordering, Wish
 
 
 class Call(NamedTuple):
@@ -75,6 +75,7 @@ CALLS = (
     Call("GET", "/api/between/{job}/{number}", None, MovementData),
     Call("GET", "/api/vary/map", None, Map),
     Call("POST", "/api/vary", Wish, Variation),
+    Call("POST", "/api/vary/accept", Ordering, ProjectView),
     Call("GET", "/api/imports", None, list[UploadView]),
     Call("POST", "/api/imports", None, UploadView),
     Call("POST", "/api/imports/{upload}", Choices, UploadView),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,8 +21,9 @@ from motionmind.errors import MotionMindError
 from motionmind.render.page import base64_of
 from motionmind.studio import api
 from motionmind.studio.attractor_map import drawn, map_of
-from motionmind.studio.edits import Block
+from motionmind.studio.edits import Arrange, Block
 from motionmind.studio.piece import State, arranged
+from motionmind.studio.project import RefusedError
 from motionmind.studio.varying import (
     EVERY,
     Clock,
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
     from motionmind.studio.studio import Studio
 
 _WORDS = "vary the piece"
+_ANOTHER = 412  # the status "precondition failed"
 _MOST_ESTIMATED = 800  # units between each two of which insertions are estimated, in a second and a half
 
 
@@ -61,6 +64,14 @@ class Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return Wanted(self.flow, self.depart, self.nudge, self.start, self.stretch, self.inserted, kept)
 
 
+class Ordering(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An order that becomes the piece, and the `basis` that it was proposed with."""
+
+    edit: Arrange
+    basis: Annotated[str, msgspec.Meta(max_length=64)]
+    window: api.Window
+
+
 def routes(studio: Studio) -> list[BaseRoute]:
     """Return what the page asks of variations."""
 
@@ -71,7 +82,22 @@ def routes(studio: Studio) -> list[BaseRoute]:
     async def vary(request: Request) -> Response:
         return api.json(await propose(studio, await api.body_of(request, Wish)))
 
-    return [Route("/api/vary/map", attractor), Route("/api/vary", vary, methods=["POST"])]
+    async def accept(request: Request) -> Response:
+        """Make an order the piece, unless the piece is another than it was proposed for."""
+        given = await api.body_of(request, Ordering)
+        if given.basis != basis_of(studio.project.state):
+            return api.error("the piece has become another meanwhile: look at its variation again", _ANOTHER)
+        try:
+            studio.project.edit(given.window, given.edit)
+        except RefusedError as refusal:
+            return api.error(str(refusal), 409)
+        return api.json(studio.view(given.window))
+
+    return [
+        Route("/api/vary/map", attractor),
+        Route("/api/vary", vary, methods=["POST"]),
+        Route("/api/vary/accept", accept, methods=["POST"]),
+    ]
 
 
 async def propose(studio: Studio, wish: Wish) -> dict[str, Any]:
@@ -177,7 +203,22 @@ def _shown(
         "other": encoded(drawn(order.other)),
         "jumps": (np.flatnonzero((steps != 0) & (steps != 1)) + 1).tolist(),
         "about": about,
+        "basis": basis_of(state),
     }
+
+
+def basis_of(state: State) -> str:
+    """Return the hash of all of a piece that a variation of it rests on, in hexadecimal: two pieces have the same
+    variations if it is the same.
+
+    >>> from motionmind.studio.edits import Insert, SetTitle, Trim
+    >>> from motionmind.studio.piece import State, apply
+    >>> piece = apply(State(), Insert("b1", "ballet/adagio", 0, 40))
+    >>> [basis_of(apply(piece, edit)) == basis_of(piece) for edit in (SetTitle("Swan"), Trim("b1", 0, 20))]
+    [True, False]
+    """
+    rests_on = [state.corpus, state.blocks, sorted(locked_in(state)), state.about]
+    return hashlib.sha256(msgspec.json.encode(rests_on, order="sorted")).hexdigest()[:32]
 
 
 def encoded(points: list[list[float]]) -> str:

@@ -1,9 +1,31 @@
-"""The piece on the studio's page, as a browser has it."""
+"""The piece on the studio's page, as a browser has it; and what tests of the page wait for."""
 
 from __future__ import annotations
 
 import time
 from typing import Any
+
+LONG = 120_000  # milliseconds: whoever searches first compiles
+
+
+def until(page: Any, expression: str, arg: Any = None, seconds: float = 60.0) -> None:
+    """Wait until an expression, or a function of an argument, is true; the page's policy forbids Playwright's way."""
+    end = time.monotonic() + seconds
+    while not page.evaluate(expression, arg):
+        assert time.monotonic() < end, expression
+        page.wait_for_timeout(30)
+
+
+def wait_for_alternatives(page: Any) -> None:
+    """Wait until all ways from A to B are found."""
+    page.wait_for_selector("[data-testid=alternatives][data-state=found]", timeout=LONG)
+
+
+def from_a_to_b(page: Any, a: str = "arabesque", b: str = "fifth") -> None:
+    """Click two postures of the gallery, and wait for the ways between them."""
+    for posture in (a, b):
+        page.get_by_test_id(f"posture-{posture}").click()
+    wait_for_alternatives(page)
 
 
 def piece(page: Any) -> Any:

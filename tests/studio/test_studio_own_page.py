@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from piece_page import until
 from scores import BENDS
 from studio_server import Served, serving
 
@@ -59,14 +59,6 @@ def open_page(served: Served, browser: Any) -> Iterator[Open]:
     for context in contexts:
         context.close()
     assert not errors
-
-
-def until(page: Any, expression: str, arg: Any = None) -> None:
-    """Wait until an expression, or a function of an argument, is true: the page's policy lets nothing be evaluated."""
-    end = time.monotonic() + LONG / 1000
-    while not page.evaluate(expression, arg):
-        assert time.monotonic() < end, expression
-        page.wait_for_timeout(50)
 
 
 def piece(served: Served) -> list[str]:

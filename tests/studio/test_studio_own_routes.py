@@ -59,6 +59,29 @@ def test_a_variation_becomes_the_piece_and_is_taken_back(served: Served) -> None
     assert served.post("/api/undo", {"window": "w1"})["piece"]["blocks"] == piece["blocks"]
 
 
+def test_an_order_is_taken_only_by_the_piece_that_it_was_proposed_for(served: Served) -> None:
+    found = served.post("/api/vary", {"depart": 0.2})
+    blocks = [
+        {name: b[name] for name in ("id", "source", "first", "last", "mirrored")} for b in found["piece"]["blocks"]
+    ]
+    order = {"edit": {"edit": "arrange", "blocks": blocks, "about": found["about"]}, "window": "w1"}
+    other = served.another("w2")
+    trim = {"edit": "trim", "block": "b1", "first": 0, "last": 30}
+    lock = {"edit": "decide", "left": "b1", "right": "b2", "decision": "locked"}
+    for edit in (trim, lock):
+        other.edit(**edit)
+        before = served.project()
+        answer = served.send("POST", "/api/vary/accept", order | {"basis": found["basis"]})
+        assert (answer.status, "has become another" in answer.value["error"]) == (412, True)
+        assert served.project() == before
+        other.post("/api/undo", {"window": "w2"})
+    # What no variation rests on may change meanwhile.
+    other.edit(edit="title", title="Swan")
+    state = served.post("/api/vary/accept", order | {"basis": found["basis"]})
+    assert (frames(state["piece"]["blocks"]), state["undo"]) == (frames(found["piece"]["blocks"]), "vary the piece")
+    assert served.send("POST", "/api/vary/accept", order | {"basis": found["basis"]}).status == 412
+
+
 def test_what_is_locked_and_what_is_kept_stays(served: Served) -> None:
     served.edit(edit="split", block="b1", at=20, id="b3")
     served.edit(edit="split", block="b2", at=10, id="b4")

@@ -6,10 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from piece_page import LONG, from_a_to_b, until, wait_for_alternatives
 from studio_server import LARGE, SMALL
-
-LONG = 120_000  # milliseconds: whoever searches first compiles
-FOUND = "[data-testid=alternatives][data-state=found]"
 
 
 class Counted:
@@ -21,21 +19,6 @@ class Counted:
     def click(self, testid: str) -> None:
         self.page.get_by_test_id(testid).click()
         self.clicks += 1
-
-
-def until(page: Any, script: str) -> None:
-    """Wait until a script holds; the page's own policy forbids Playwright's way to."""
-    for _ in range(400):
-        if page.evaluate(script):
-            return
-        page.wait_for_timeout(25)
-    raise AssertionError(f"never: {script}")
-
-
-def from_a_to_b(page: Any, a: str = "arabesque", b: str = "fifth") -> None:
-    page.get_by_test_id(f"posture-{a}").click()
-    page.get_by_test_id(f"posture-{b}").click()
-    page.wait_for_selector(FOUND, timeout=LONG)
 
 
 def drag(page: Any, source: Any, target: Any) -> None:
@@ -64,7 +47,7 @@ def test_from_the_open_page_to_a_file_in_six_clicks(studio_page: Any, tmp_path: 
     mouse = Counted(studio_page)
     mouse.click("posture-arabesque")
     mouse.click("posture-fifth")
-    studio_page.wait_for_selector(FOUND, timeout=LONG)
+    wait_for_alternatives(studio_page)
     mouse.click("alternative-2")
     mouse.click("accept")
     until(studio_page, "studio.store.selection?.seam && studio.viewer.isHome")  # what was accepted is what one sees
@@ -80,19 +63,45 @@ def test_from_the_open_page_to_a_file_in_six_clicks(studio_page: Any, tmp_path: 
     assert shared.evaluate("motionmind.motion.insertions.length") == 1
 
 
-def test_a_film_of_the_piece_is_taken_away(studio_server: Any, studio_page: Any, tmp_path: Path) -> None:
+def test_a_film_of_the_piece_is_taken_away_while_something_else_is_done(
+    studio_server: Any, studio_page: Any, tmp_path: Path
+) -> None:
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
-    studio_server.insert("b1", "ballet/adagio", 0, 1)
+    studio_server.insert("b1", "ballet/adagio", 0, 2)
     until(studio_page, "studio.viewer.piece?.end > 0")
     seconds = studio_page.evaluate("studio.viewer.piece.end")
     studio_page.get_by_test_id("open-take").click()
     with studio_page.expect_download(timeout=LONG) as download:
         studio_page.get_by_test_id("export-film").click()
+        studio_page.locator("progress[aria-label=Film]").wait_for()
+        studio_page.get_by_test_id("open-pose").click()
+        studio_page.get_by_test_id("handle-pelvis").wait_for()
+        studio_server.edit(edit="delete", block="b1")
     assert download.value.suggested_filename == "piece.webm"
     download.value.save_as(tmp_path / "piece.webm")
     _, found = ffmpeg.count_frames_and_secs(str(tmp_path / "piece.webm"))
     assert found == pytest.approx(seconds, abs=0.1)
-    until(studio_page, "!studio.viewer.busy")
+    studio_page.get_by_text("The film is made: piece.webm.").wait_for()
+
+
+def test_how_far_a_film_is_leads_to_where_it_is_stopped(studio_server: Any, studio_page: Any) -> None:
+    studio_server.insert("b1", "ballet/adagio", 0, 40)
+    until(studio_page, "studio.viewer.piece?.end > 0")
+    studio_page.get_by_test_id("open-take").click()
+    studio_page.get_by_test_id("export-film").click()
+    studio_page.get_by_test_id("open-vary").click()
+    told = studio_page.get_by_test_id("filming")
+    told.click()
+    stop = studio_page.get_by_test_id("stop-film")
+    stop.wait_for()
+    with studio_page.expect_event("dialog") as asked:  # whoever closes the page loses it
+        studio_page.close(run_before_unload=True)
+    assert asked.value.type == "beforeunload"
+    asked.value.dismiss()
+    stop.click()
+    studio_page.get_by_test_id("export-film").wait_for()
+    told.wait_for(state="detached")
+    assert studio_page.get_by_test_id("toast").count() == 0
 
 
 def test_four_alternatives_play_in_step_and_say_what_they_are(studio_page: Any) -> None:
@@ -112,7 +121,7 @@ def test_four_alternatives_play_in_step_and_say_what_they_are(studio_page: Any) 
     assert time.is_disabled()
     assert time.input_value() == "0"
     held[0].continue_()
-    studio_page.wait_for_selector(FOUND, timeout=LONG)
+    wait_for_alternatives(studio_page)
     assert [studio_page.get_by_test_id(f"alternative-{n}").count() for n in range(1, 6)] == [1, 1, 1, 1, 0]
     cards = studio_page.locator(".alternative .words")
     for text in cards.all_inner_texts():
@@ -181,7 +190,7 @@ def test_any_moment_of_a_clip_is_an_end(studio_page: Any) -> None:
     drag(page, page.get_by_test_id("moment"), page.locator(".end").nth(1))
     until(page, "studio.desk.ends.b?.frame === 30")
     assert page.evaluate("studio.desk.ends.a.frame") == 20
-    page.wait_for_selector(FOUND, timeout=LONG)
+    wait_for_alternatives(page)
 
 
 def test_a_whole_clip_goes_onto_the_line_of_time(studio_page: Any) -> None:
@@ -258,7 +267,7 @@ def test_it_all_goes_by_keyboard_alone(studio_page: Any) -> None:
             while not page.evaluate("document.activeElement.matches('[data-testid=posture-fifth]')"):
                 page.keyboard.press("Shift+Tab")
         page.keyboard.press("Enter")
-    page.wait_for_selector(FOUND, timeout=LONG)
+    wait_for_alternatives(page)
     page.keyboard.press("3")
     assert page.get_by_test_id("alternative-3").get_attribute("aria-checked") == "true"
     focused = "document.activeElement.dataset.testid"

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from piece_page import piece, wait_for
+from piece_page import from_a_to_b, piece, until, wait_for, wait_for_alternatives
 from scores import BENDS
 
 if TYPE_CHECKING:
@@ -35,6 +36,30 @@ def test_what_is_varied_is_the_piece_as_it_stands(studio_server: Served, studio_
     page.get_by_test_id("vary").click()
     wait_for(page, "studio.store.state.undo === 'vary the piece'", 20.0)
     assert "ballet/plies" in {block["source"] for block in piece(page)["blocks"]}
+
+
+def test_what_another_window_does_before_the_order_comes_is_varied_too(studio_server: Served, studio_page: Any) -> None:
+    page = studio_page.context.new_page()  # what is refused is told of on a page's console
+    page.goto(studio_server.url)
+    studio_server.insert("b1", "ballet/adagio", 0, 40)
+    page.get_by_test_id("open-vary").click()
+    page.get_by_test_id("tile-3").wait_for()
+    edited: list[str] = []
+
+    def late(route: Any) -> None:
+        """Let the other window be quicker, twice: here nobody has heard of it yet."""
+        if len(edited) < 2 and '"arrange"' in (route.request.post_data or ""):
+            edited.append(f"c{len(edited)}")
+            studio_server.insert(edited[-1], "ballet/plies", 0, 20, before="b1")
+        route.continue_()
+
+    page.route(re.compile("/api/(edits|vary/accept)$"), late)
+    page.get_by_test_id("vary").click()
+    wait_for(page, "studio.store.state.undo === 'vary the piece'", 20.0)
+    assert [block["id"] for block in studio_server.studio.project.state.about["original"]] == ["c0", "c1", "b1"]
+    page.get_by_text("edited in another window").wait_for()
+    page.get_by_test_id("undo").click()
+    wait_for(page, "piece.blocks.map(({ id }) => id).join() === 'c0,c1,b1'", 20.0)
 
 
 def test_a_double_click_does_a_thing_once(studio_server: Served, studio_page: Any) -> None:
@@ -68,9 +93,7 @@ def test_a_movement_is_put_on_the_time_line_once(studio_page: Any, tmp_path: Pat
 
 def test_an_alternative_is_accepted_once_by_keys(studio_page: Any) -> None:
     page = studio_page
-    for posture in ("arabesque", "fifth"):
-        page.get_by_test_id(f"posture-{posture}").click()
-    page.wait_for_selector("[data-testid=alternatives][data-state=found]", timeout=120_000)
+    from_a_to_b(page)
     hold_up(page, "**/api/between/accept")
     page.keyboard.press("2")
     page.keyboard.press("Enter")
@@ -81,7 +104,7 @@ def test_an_alternative_is_accepted_once_by_keys(studio_page: Any) -> None:
     assert page.evaluate("[studio.desk.ends.a?.title, studio.desk.ends.b]") == ["fifth", None]
     # Whoever takes it back before it has come takes it back.
     page.get_by_test_id("posture-bow").click()
-    page.wait_for_selector("[data-testid=alternatives][data-state=found]", timeout=120_000)
+    wait_for_alternatives(page)
     page.keyboard.press("1")
     page.keyboard.press("Enter")
     page.keyboard.press("Control+z")
@@ -120,7 +143,7 @@ def test_a_field_shows_what_is_wished(studio_server: Served, studio_page: Any) -
     for given, shown, wished in (("999", "60", "60"), ("0", "", "null"), ("0.01", "0.1", "0.1")):
         field.fill(given)
         field.press("Tab")
-        assert field.input_value() == shown
+        until(page, "([field, shown]) => field.value === shown", [field.element_handle(), shown])
         wait_for(page, f"piece.seams[0].ask.seconds === {wished}", 10.0)
     # What is wished one after another is wished together.
     hold_up(page, "**/api/edits", 100)
@@ -132,4 +155,4 @@ def test_a_field_shows_what_is_wished(studio_server: Served, studio_page: Any) -
     for given in ("500", "999"):
         tempo.fill(given)
         tempo.press("Tab")
-        assert tempo.input_value() == "300"
+        until(page, "(tempo) => tempo.value === '300'", tempo.element_handle())

@@ -102,9 +102,16 @@ def test_no_panel_shuts_anybody_out(studio_server: Served, browser: Any, scheme:
                 faults[f"{name} at {width}"] = found
         page.set_viewport_size({"width": 1440, "height": 900})
     page.keyboard.press("?")
-    page.wait_for_timeout(300)
+    page.get_by_test_id("keys").wait_for()
     if found := page.evaluate(_FAULTS):
         faults["keys"] = found
+    page.keyboard.press("Escape")
+    page.get_by_test_id("open-between").click()
+    page.get_by_test_id("manage-postures").click()
+    page.get_by_test_id("delete-mine").click()
+    page.get_by_test_id("restore").wait_for()
+    if found := page.evaluate(_FAULTS):
+        faults["own postures"] = found
     page.context.close()
     assert faults == {}, json.dumps(faults, indent=1)
     assert errors == []
@@ -167,5 +174,36 @@ def test_one_is_not_several(studio_server: Served, browser: Any) -> None:
     studio_server.insert("b1", "ballet/plies", 0, 20)
     page.get_by_test_id("insertion-1").and_(page.locator("[data-state=inserted]")).click()
     assert re.fullmatch(r"Insertion, [\d.]+ s +(?!\d).+", page.get_by_test_id("selected").inner_text())
+    page.context.close()
+    assert errors == []
+
+
+def test_what_is_shown_is_named_where_there_is_little_room(studio_server: Served, browser: Any) -> None:
+    studio_server.send("DELETE", "/api/seams")
+    studio_server.insert("b0", "ballet/adagio", 0, 40)
+    page, errors = _enter(studio_server, browser, "light", 820)
+    page.get_by_test_id("open-vary").click()
+    page.get_by_test_id("tile-2").wait_for()
+    page.get_by_test_id("beside").click()
+    name, views = page.locator(".caption .name"), page.locator(".views")
+    needs = "(name) => [name.scrollWidth, name.clientWidth]"
+    for width in (820, 1024, 1440):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_timeout(200)
+        needed, given = name.evaluate(needs)
+        assert needed <= given
+        one, other, half = name.bounding_box(), views.bounding_box(), page.locator(".half").nth(1).bounding_box()
+        assert one["x"] + one["width"] <= half["x"]
+        # The name of what is beside it is no element.
+        assert other["y"] >= half["y"] + 32 or other["x"] >= half["x"] + 130
+    page.set_viewport_size({"width": 820, "height": 900})
+    page.get_by_test_id("open-pose").click()
+    page.get_by_text("being changed").wait_for()
+    needed, given = name.evaluate(needs)
+    assert needed <= given
+    boxes = [one.bounding_box() for one in (name, page.locator(".caption .button"), views)]
+    for one, other in ((boxes[0], boxes[1]), (boxes[0], boxes[2]), (boxes[1], boxes[2])):
+        beside = one["x"] + one["width"] <= other["x"] or other["x"] + other["width"] <= one["x"]
+        assert beside or one["y"] + one["height"] <= other["y"] or other["y"] + other["height"] <= one["y"]
     page.context.close()
     assert errors == []

@@ -9,7 +9,8 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
-from studio_server import Client, Served
+from piece_page import until
+from studio_server import LARGE, SMALL, Client, Served
 
 
 class Elsewhere(BaseHTTPRequestHandler):
@@ -104,9 +105,9 @@ def test_a_posture_that_is_saved_again_is_pictured_again(studio_server: Served, 
         expect(picture).to_have_attribute("src", f"/api/thumbnails/{key}/0.png?height=96")
         studio_page.get_by_test_id("posture-mine").click()
         expect(studio_page.locator(".caption .name")).to_have_text("mine")
-        studio_page.wait_for_timeout(300)
-        assert studio_page.evaluate(shown) != before
+        until(studio_page, f"(before) => {shown} !== before", before)
         before = studio_page.evaluate(shown)
+        studio_page.evaluate("studio.desk.set('a', null)")  # which stays what it was: the new one would be B
     studio_page.reload()
     expect(picture).to_have_attribute("src", f"/api/thumbnails/{key}/0.png?height=96")
 
@@ -137,6 +138,9 @@ def test_a_browser_without_the_token_is_told_where_to_look(
     expect(page.get_by_test_id("toast").get_by_text("that the terminal shows")).to_be_visible()
     if not end:  # as a page that is still open when the studio is started again
         expect(page.get_by_test_id("offline")).to_contain_text("nothing is saved; open the studio at the address")
+    page.goto(studio_server.entry)  # in the same tab: nothing but the end of the address is another
+    expect(page.get_by_test_id("posture-arabesque")).to_be_visible()
+    assert studio_server.keys.token not in page.url
     context.close()
 
 
@@ -218,3 +222,20 @@ def test_a_search_is_begun_again_by_the_studio_that_was_started_again(
     page.get_by_test_id("export-project").click()
     expect(page.get_by_test_id("toast")).to_contain_text("The studio does not answer: has it ended?")
     context.close()
+
+
+@pytest.mark.parametrize("studio_page", [LARGE, SMALL, (820, 1180), (390, 844)], indirect=True)
+def test_what_is_said_hides_no_track_and_no_button(studio_server: Served, studio_page: Any, expect: Any) -> None:
+    page = studio_page
+    studio_server.insert("b1", "ballet/adagio", 0, 20)
+    expect(page.get_by_test_id("block-b1")).to_be_attached()
+    for number in range(3):
+        page.evaluate(f"studio.say('{'Something was not as it should have been, and so it is said. ' * 2}{number}')")
+    said = page.get_by_test_id("toast")
+    expect(said).to_have_count(3)
+    for other in (".strip", ".bar", ".rail", ".panel", "[data-testid=transport]"):
+        met = """(other, one) => {
+          const [a, b] = [other, document.querySelector(one)].map((each) => each.getBoundingClientRect());
+          return b.width > 0 && a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+        }"""
+        assert not any(one.evaluate(met, other) for one in said.all()), other

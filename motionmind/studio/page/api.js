@@ -2,8 +2,13 @@
 
 const AWAY = "The studio does not answer: has it ended?";
 
+const ANOTHER = 412; // the status of what was asked for a piece that is another now
+
 /** The request could not be made, for nobody answers. */
 export class AwayError extends Error {}
+
+/** What was asked for is of a piece that has become another meanwhile. */
+export class AnotherError extends Error {}
 
 export class Api extends EventTarget {
   constructor() {
@@ -75,6 +80,11 @@ export class Api extends EventTarget {
     return this.#change("/api/between/accept", { job, alternative });
   }
 
+  /** Make the order of a variation the piece that it was proposed for. @param {object} edit @param {string} basis of the proposal */
+  arrange(edit, basis) {
+    return this.#change("/api/vary/accept", { edit, basis });
+  }
+
   undo() {
     return this.#change("/api/undo");
   }
@@ -109,6 +119,7 @@ export class Api extends EventTarget {
     });
     if (answer.ok) return answer;
     const { error } = await answer.json().catch(() => ({}));
-    throw new Error(error ?? `The studio answered with ${answer.status}.`);
+    const Kind = answer.status === ANOTHER ? AnotherError : Error;
+    throw new Kind(error ?? `The studio answered with ${answer.status}.`);
   }
 }

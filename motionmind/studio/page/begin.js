@@ -9,6 +9,9 @@ const FIRST = 3; // of them, for which the body in 3D waits: where there is no G
 /** Requests to the server, the first of which are under way. */
 export const api = new Api();
 
+// The address of a studio that was started again, opened where its page is: nothing but the key in it is another.
+addEventListener("hashchange", () => location.hash.includes("token") && location.reload());
+
 /** @param {[any, any]} answers the gallery and the project */
 function expectPictures([gallery, project]) {
   knowPostures(project.postures);

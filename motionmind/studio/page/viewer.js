@@ -31,7 +31,6 @@ export class Viewer extends EventTarget {
     this.title = "";
     this.ghosts = { ends: true, onion: 0 };
     this.isHome = true;
-    this.busy = false; // whether a film is made with the stage
     this.covered = false; // whether something else is shown over it
     /** @type {any} */
     this.motion = undefined;
@@ -192,7 +191,7 @@ export class Viewer extends EventTarget {
   #draw(now) {
     this.player.advance(Math.min((now - this.last) / 1000, LONGEST));
     this.last = now;
-    if (!this.fresh && this.stage && this.motion && !this.busy && !this.covered) {
+    if (!this.fresh && this.stage && this.motion && !this.covered) {
       this.fresh = true;
       this.stage.show(this.player.time, this.ghosts);
       this.stage.render(this.player.playing);

@@ -6,6 +6,7 @@ import { icon } from "../shell/icons.js";
 import { movement } from "../movements.js";
 import { thumbnail } from "../places.js";
 import { deskOf, DRAGGED, same } from "./desk.js";
+import { Own } from "./own.js";
 
 const FEW = 24; // clips that are listed before somebody asks for all
 
@@ -13,8 +14,9 @@ const FEW = 24; // clips that are listed before somebody asks for all
 export function Gallery({ studio }) {
   const { store, api, act } = studio;
   const corpora = useChange(store, () => JSON.stringify(store.state?.corpora ?? null));
-  const own = useChange(store, () => JSON.stringify(store.state?.postures ?? null));
+  const saved = useChange(store, () => store.state?.postures);
   const [gallery, setGallery] = useState(/** @type {any} */ (null));
+  const [managing, manage] = useState(false);
   const [sought, seek] = useState("");
   useEffect(() => {
     if (corpora === "null") return; // nobody has let this browser in yet
@@ -23,16 +25,20 @@ export function Gallery({ studio }) {
       setGallery(found);
       greet(studio, found);
     });
-  }, [corpora, own]);
+  }, [corpora]);
+  // Which stay, though the posture is called something else.
+  const own = (saved ?? []).map((/** @type {any} */ { name, key }) => ({ key, title: name }));
   const fits = (/** @type {{title: string}} */ { title }) => title.toLowerCase().includes(sought.trim().toLowerCase());
   return html`<section class="gallery" data-testid="gallery" aria-label="Gallery">
+    ${managing && html`<${Own} key="own" studio=${studio} close=${() => manage(false)} />`}
     <label class="search">
       ${icon("search")}<span class="aside">Search postures and clips</span>
       <input class="field" type="search" placeholder="Search postures and clips" onInput=${(/** @type {any} */ event) => seek(event.target.value)} />
     </label>
     ${!gallery && html`<p class="hint" role="status">Looking through the corpus…</p>`}
-    ${gallery?.own.filter(fits).length > 0 && html`<h3>Your own</h3>
-      <${Postures} studio=${studio} postures=${gallery.own.filter(fits)} />`}
+    ${gallery && own.some(fits) && html`<div class="row"><h3 class="grow">Your own</h3>
+        <button class="button quiet" data-testid="manage-postures" aria-haspopup="dialog" onClick=${() => manage(true)}>Rename, delete</button></div>
+      <${Postures} studio=${studio} postures=${own.filter(fits)} />`}
     ${gallery?.corpora.map(
       (/** @type {any} */ corpus) => html`
         ${corpus.postures.filter(fits).length > 0 && html`<h3>Postures of ${corpus.name}</h3>
@@ -41,7 +47,7 @@ export function Gallery({ studio }) {
           <${Clips} studio=${studio} clips=${corpus.clips.filter(fits)} />`}
       `,
     )}
-    ${gallery && sought && nothing(gallery, fits) && html`<p class="empty">Nothing is called “${sought}”.</p>`}
+    ${gallery && sought && !own.some(fits) && nothing(gallery, fits) && html`<p class="empty">Nothing is called “${sought}”.</p>`}
   </section>`;
 }
 
@@ -55,7 +61,7 @@ async function greet(studio, gallery) {
 
 /** @param {any} gallery @param {(one: any) => boolean} fits */
 function nothing(gallery, fits) {
-  return ![gallery.own, ...gallery.corpora.flatMap((/** @type {any} */ corpus) => [corpus.postures, corpus.clips])].flat().some(fits);
+  return !gallery.corpora.flatMap((/** @type {any} */ corpus) => [...corpus.postures, ...corpus.clips]).some(fits);
 }
 
 /** @param {{studio: any, postures: {key: string, title: string}[]}} props */
@@ -72,6 +78,7 @@ function Postures({ studio, postures }) {
           class="thumb"
           data-testid="posture-${title}"
           aria-pressed=${String(Boolean(choice && same(choice, place)))}
+          title=${title}
           draggable="true"
           onDragStart=${(/** @type {DragEvent} */ event) => event.dataTransfer?.setData(DRAGGED, JSON.stringify(place))}
           onClick=${() => pick(studio, place)}

@@ -1,10 +1,8 @@
 /** Flow 6, take it away: a film, a file for other programs, the project, or a page that plays by itself. */
 
-import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
-import { film, obstacle } from "motionmind/film";
+import { html, useEffect, useState } from "../vendor/htm-preact-standalone.js";
 import { useChange } from "../shell/hooks.js";
-
-const UNSAFE = /[\\/:*?"<>|\u0000-\u001f\u007f]+/g; // in names of files, on some system
+import { filmingOf, offer } from "./filming.js";
 
 const FILES = [
   { format: "html", testid: "export-html", name: "A page", words: "One file that plays in any browser, without the studio: to send to somebody." },
@@ -87,48 +85,16 @@ function nameOf(answer) {
   return encoded && decodeURIComponent(encoded);
 }
 
-/** @param {Blob} blob @param {string} name */
-function offer(blob, name) {
-  const link = document.createElement("a");
-  Object.assign(link, { href: URL.createObjectURL(blob), download: name });
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
-}
-
-/** @param {{studio: any}} props */
+/** A film goes on while another panel is open: the bar leads back here. @param {{studio: any}} props */
 function Film({ studio }) {
-  const { viewer, store } = studio;
-  const [share, setShare] = useState(/** @type {number | null} */ (null));
-  const stopper = useRef(/** @type {AbortController | null} */ (null));
-  useEffect(() => () => stopper.current?.abort(), []);
-  const start = async () => {
-    const wrong = obstacle();
-    if (wrong) return studio.say(wrong, { kind: "error" });
-    if (!viewer.isHome) viewer.back();
-    const { motion, stage, player, ghosts } = viewer;
-    const before = player.time;
-    player.pause();
-    stopper.current = new AbortController();
-    viewer.busy = stage.filming = true;
-    setShare(0);
-    try {
-      const seen = (/** @type {number} */ time) => setShare((time - motion.start) / (motion.end - motion.start));
-      const title = (store.state.title || "piece").replace(UNSAFE, "-").replace(/^[. ]+|[. ]+$/g, "") || "piece";
-      offer(await film(stage, motion, ghosts, seen, stopper.current.signal), `${title}.webm`);
-    } catch (error) {
-      const stopped = stopper.current.signal.aborted;
-      if (!stopped) studio.say(`No film was made: ${error instanceof Error ? error.message : error}`, { kind: "error" });
-    }
-    viewer.busy = stage.filming = false;
-    player.seek(before);
-    setShare(null);
-  };
+  const filming = filmingOf(studio);
+  const share = useChange(filming, () => filming.share);
   return html`<${Way} name="Film" words="The piece as the viewer shows it now, from where the camera is (WebM).">
     ${
       share === null
-        ? html`<button class="button" data-testid="export-film" onClick=${start}>Film</button>`
+        ? html`<button class="button" data-testid="export-film" onClick=${() => filming.make()}>Film</button>`
         : html`<progress value=${share} aria-label="Film"></progress>
-            <button class="button" onClick=${() => stopper.current?.abort()}>Stop</button>`
+            <button class="button" data-testid="stop-film" onClick=${() => filming.stop()}>Stop</button>`
     }
   <//>`;
 }

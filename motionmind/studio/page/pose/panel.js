@@ -1,6 +1,7 @@
 /** Flow 4, postures: what is posed, what the corpus knows of it, its joints one by one, and what becomes of it. */
 
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.js";
+import { stable } from "../places.js";
 import { useChange, useKeys } from "../shell/hooks.js";
 import { Handles } from "./handles.js";
 import { Joints } from "./joints.js";
@@ -65,8 +66,8 @@ function Start({ studio }) {
     event.preventDefault();
     const given = event.dataTransfer?.getData("application/x-motionmind-posture");
     if (!given) return;
-    const { key, frame } = JSON.parse(given);
-    open(key, frame);
+    const { key, frame, title } = JSON.parse(given);
+    open(key, frame, title);
   };
   const moment = editor.shown ? null : studio.viewer.moment;
   return html`<div onDragOver=${(/** @type {Event} */ event) => event.preventDefault()} onDrop=${drop}>
@@ -75,7 +76,7 @@ function Start({ studio }) {
       <select
         data-testid="pose-from"
         value=${postures.some(({ of }) => of.some(({ key }) => key === editor.key)) ? editor.key : ""}
-        onChange=${(/** @type {any} */ event) => event.target.value && open(event.target.value)}
+        onChange=${(/** @type {any} */ event) => event.target.value && open(event.target.value, 0, event.target.selectedOptions[0].text)}
       >
         <option value="">${editor.title || "a posture"}</option>
         ${postures.map(
@@ -176,7 +177,7 @@ function momentName({ viewer, store }) {
 /** The postures that there are, in groups. @param {any} studio */
 function useGallery(studio) {
   const [found, setFound] = useState(/** @type {ReturnType<typeof listed>} */ ([]));
-  const saved = useChange(studio.store, () => studio.store.state?.postures?.length);
+  const saved = useChange(studio.store, () => JSON.stringify(studio.store.state?.postures ?? null));
   useEffect(() => {
     studio.act(async () => setFound(listed(await studio.api.get("/api/gallery"))));
   }, [saved]);
@@ -188,6 +189,7 @@ function useGallery(studio) {
  * @returns {{group: string, of: {key: string, title: string, frame?: number}[]}[]}
  */
 function listed({ corpora, own }) {
-  const groups = [{ group: "Your own", of: own }, ...corpora.map(({ name, postures }) => ({ group: name, of: postures }))];
+  const fixed = own.map(({ key, title }) => ({ key: stable(key), title })); // which stays, though it is called something else
+  const groups = [{ group: "Your own", of: fixed }, ...corpora.map(({ name, postures }) => ({ group: name, of: postures }))];
   return groups.filter(({ of }) => of.length > 0);
 }

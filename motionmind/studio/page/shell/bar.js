@@ -1,6 +1,7 @@
 /** The bar above everything: the piece's title, undo and redo, paper, keys, and whether the studio is there. */
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { filmingOf } from "../export/filming.js";
 import { preparing } from "../store.js";
 import { useChange, useKeys } from "./hooks.js";
 import { icon } from "./icons.js";
@@ -31,6 +32,7 @@ export function Bar({ studio }) {
     ${state?.corpus && html`<span class="hint corpus cut">moves like <strong>${state.corpus}</strong></span>`}
     <span class="space"></span>
     <${Readiness} store=${store} />
+    <${Film} studio=${studio} />
     ${!connected && html`<span class="offline" role="alert" data-testid="offline">Not connected: nothing is saved${refusal && `; ${refusal}`}</span>`}
     ${button("undo", "Undo", state?.undo, undo)} ${button("redo", "Redo", state?.redo, redo)}
     <button
@@ -63,6 +65,19 @@ function Readiness({ store }) {
     html`<span class="hint readiness" role="status">${job.words}
       <progress value=${job.done} max=${job.of || 1} aria-label="Getting ready"></progress>
     </span>`
+  );
+}
+
+/** How far a film is that is made; leads to where it can be stopped. @param {{studio: any}} props */
+function Film({ studio }) {
+  const filming = filmingOf(studio);
+  const share = useChange(filming, () => filming.share);
+  return (
+    share !== null &&
+    html`<button class="button quiet numbers" data-testid="filming" title="A film is being made: go to where it can be stopped"
+      onClick=${() => studio.open("take")}>
+      Film ${Math.round(100 * share)} %
+    </button>`
   );
 }
 

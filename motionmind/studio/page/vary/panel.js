@@ -1,6 +1,7 @@
 /** Variations: how far to depart, from where, what is kept; the new order at once, and both beside each other. */
 
 import { html, useEffect, useMemo, useState } from "../vendor/htm-preact-standalone.js";
+import { AnotherError } from "../api.js";
 import { movement } from "../movements.js";
 import { useChange } from "../shell/hooks.js";
 import { Composed, Movements } from "../timeline/composed.js";
@@ -12,6 +13,7 @@ const FARTHEST = 0.4; // share of the steps: no attractor departs farther
 const OFF = 0.06; // of a share that is wished: a variation that departs less departs as far as it can
 const STRETCHES = [1, 2, 4, 8]; // postures
 const AFTER = 150; // milliseconds after an edit of the piece
+const AGAIN = 5; // times that a variation is sought anew because another window has edited the piece
 const INSERTED = [
   [0.5, "half of the time"],
   [0.33, "a third of it"],
@@ -70,9 +72,18 @@ export function Panel({ studio }) {
       await changed;
       await varying.ask();
     }
-    if (varying.edit && !varying.error) await studio.api.edit(varying.edit);
+    if (varying.proposal && !varying.error) await studio.api.arrange(varying.edit, varying.proposal.basis);
   };
-  const vary = () => studio.once("vary", make);
+  const makeOfLatest = async (again = AGAIN) => {
+    try {
+      await make();
+      if (again < AGAIN) studio.say("The piece was edited in another window meanwhile: this is the variation of what it became.");
+    } catch (wrong) {
+      if (!(wrong instanceof AnotherError) || !again) throw wrong;
+      await makeOfLatest(again - 1); // another window was quicker
+    }
+  };
+  const vary = () => studio.once("vary", makeOfLatest);
   return html`<section class="stack vary">
     <h2>Variations</h2>
     <${AttractorMap} studio=${studio} varying=${varying} piece=${shown} playing=${view.playing} />

@@ -20,6 +20,7 @@ import { points } from "./chart.js";
  * @property {string} other trail of the variation, the same
  * @property {number[]} jumps postures of the variation that do not follow
  * @property {object} about what the edit says of it
+ * @property {string} basis of it in the piece, which is the same as long as the variation is that of the piece
  */
 
 /** The wish that a page begins with. @returns {Wish} */
