@@ -122,6 +122,10 @@ def test_four_alternatives_play_in_step_and_say_what_they_are(studio_page: Any) 
     assert time.input_value() == "0"
     held[0].continue_()
     wait_for_alternatives(studio_page)
+    until(studio_page, "document.querySelector('.alternatives input[type=range]').value > 0.1")
+    time.fill("0.05")  # who takes hold of the time stops there
+    assert float(time.input_value()) == pytest.approx(0.05)
+    assert play.get_attribute("aria-label") == "Play all"
     assert [studio_page.get_by_test_id(f"alternative-{n}").count() for n in range(1, 6)] == [1, 1, 1, 1, 0]
     cards = studio_page.locator(".alternative .words")
     for text in cards.all_inner_texts():
@@ -129,10 +133,6 @@ def test_four_alternatives_play_in_step_and_say_what_they_are(studio_page: Any) 
         assert "ballet" in text  # how usual it is
         assert "best" in text or "better" in text  # how sure
     assert ["unlike the first" in text for text in cards.all_inner_texts()] == [False, True, True, True]
-    until(studio_page, "document.querySelector('.alternatives input[type=range]').value > 0.1")
-    time.fill("0.05")  # who takes hold of the time stops there
-    assert float(time.input_value()) == pytest.approx(0.05)
-    assert play.get_attribute("aria-label") == "Play all"
     for n in range(1, 5):
         assert painted(studio_page, f"[data-testid=alternative-{n}] > canvas") > 50
 
