@@ -22,22 +22,28 @@ EVEN = (".bvh", ".npz")  # formats whose frames are even in time
 _RATE = 30.0  # frames a second of movement that has to be made even
 
 
-def read(path: Path, unit: str | None, asf: Path | None, source_fps: float | None) -> Motion:
+def read(path: Path, unit: str | None, asf: Path | None, source_fps: float | None, up: str | None) -> Motion:
     """Read movement from a file, given the values of the options that `options.reading` adds."""
     from motionmind.formats import read_motion
 
-    return read_motion(path, unit=unit, asf=asf, fps=source_fps)
+    return read_motion(path, unit=unit, asf=asf, fps=source_fps, up=up)
 
 
-def question_clock(path: Path, motion: Motion) -> None:
-    """Warn if the movement of a person in a file contradicts the file's clock; on any joints that map to human23."""
+def question_clock(path: Path, motion: Motion, up: str | None = None) -> None:
+    """Warn if the movement of a person in a file contradicts the file's clock; on any joints that map to human23.
+
+    Args:
+        path: the file.
+        motion: its movement.
+        up: the axis that is up in the movement; None finds it.
+    """
     from motionmind.body.tempo import question_tempo
     from motionmind.retarget.retarget import own_skeleton
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MotionMindWarning)  # whoever takes it onto human23 is warned then
-            doubt = question_tempo(own_skeleton(motion))
+            doubt = question_tempo(own_skeleton(motion, up=up))
     except SkeletonError:  # its zero pose does not show how it stands
         return
     if doubt:

@@ -104,6 +104,6 @@ def _read_file(path: Path, joints: Path | None, **source: Any) -> Motion:
     """Read the movement in a file, on human23 if its joints map to it."""
     from motionmind.retarget.retarget import own_skeleton
 
-    motion = own_skeleton(read(path, **source), read_mapping(joints))
+    motion = own_skeleton(read(path, **source), read_mapping(joints), up=source["up"] and "y")
     question_clock(path, motion)
     return motion

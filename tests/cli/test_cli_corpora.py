@@ -114,6 +114,20 @@ def test_the_clock_of_a_file_can_be_set_right(run: Run, suffix: str) -> None:
     assert len(right) == len(late)
 
 
+@pytest.mark.parametrize("suffix", [".bvh", ".npz"])
+def test_which_axis_is_up_can_be_said(run: Run, suffix: str) -> None:
+    write_motion(f"a{suffix}", clip(fps=30.0))
+    up = read_motion(f"a{suffix}").root
+    said, other = ("z", "y") if suffix == ".bvh" else ("y", "z")
+    assert run("convert", f"a{suffix}", "said.json", "--up", said, "--skeleton", "human23").code == 0
+    turned = up[:, [0, 2, 1]] * ([1.0, 1.0, -1.0] if said == "z" else [1.0, -1.0, 1.0])
+    np.testing.assert_allclose(read_motion("said.json").root, turned, atol=1e-6)
+    assert run("corpus", "build", "mine", f"a{suffix}", "--up", other).code == 0
+    ran = run("convert", f"a{suffix}", "x.json", "--up", "x")
+    assert ran.code == 2
+    assert "'x' is not one of 'y', 'z'" in ran.err
+
+
 def test_flips_are_repaired_kept_or_dropped(run: Run) -> None:
     write_motion("jump.bvh", flipped(60))
     write_motion("plain.bvh", clip(fps=120.0))
