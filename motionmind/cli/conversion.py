@@ -14,7 +14,7 @@ from motionmind.cli.files import (
     evened,
     note_licences,
     note_lossy_fields,
-    question_clock,
+    question_recording,
     read_mapping,
     write_all,
 )
@@ -145,7 +145,7 @@ def convert(
     motion = read_part(named, None, home, raw=True, **options)
     upright = "y" if options["up"] else None  # reading has turned it
     if named.source.kind == "file":
-        question_clock(named.source.paths[0], motion, upright)
+        question_recording(named.source.paths[0], motion, upright)
     if skeleton == "human23" or joints or (suffix == ".txt" and not is_human44(motion.skeleton)):
         motion = to_human23(motion, read_mapping(joints), up=upright)
     fps = fps or (taker.rates[suffix] if taker else None)

@@ -87,6 +87,12 @@ def find_gaps(motion: Motion) -> list[Gap]:
     return sorted([*held, *(leap for leap in leaps if leap.kind != "leap" or leap.start not in ends)])
 
 
+def describe_gaps(motion: Motion, begin: int = 0) -> str:
+    """Say how many frames a recording dropped, and where; "" if none were. `begin` is as of `fill_gaps`."""
+    gaps = [gap for gap in find_gaps(motion) if gap.start > begin]
+    return "; ".join([*_describe(gaps, "", 0), *_describe_leaps(gaps, 0)])
+
+
 def fill_gaps(motion: Motion, begin: int = 0, skipped: int = 0) -> Filled:
     """Fill the short gaps of a recording, as this module's docstring describes.
 
@@ -116,10 +122,9 @@ def fill_gaps(motion: Motion, begin: int = 0, skipped: int = 0) -> Filled:
         root[inner] = root[before] + share * (root[after] - root[before])
         at = (float(times[gap.start]), float(times[gap.stop - 1]))
         repairs += [JointRepair(name, gap.start, gap.stop, at, exact=False) for name in motion.skeleton.names]
-    report += _describe([gap for gap in gaps if gap not in left], "reconstructed", skipped)
-    report += _describe([gap for gap in left if gap.kind != "leap"], "left out", skipped)
-    if leaps := [f"{gap.start + skipped}" for gap in left if gap.kind == "leap"]:
-        report.append(f"the whole body leaps before {_frames(leaps)}: cut there")
+    report += _describe([gap for gap in gaps if gap not in left], ": reconstructed", skipped)
+    report += _describe([gap for gap in left if gap.kind != "leap"], ": left out", skipped)
+    report += [f"{leaps}: cut there" for leaps in _describe_leaps(left, skipped)]
     return Filled(replace(motion, rotations=rotations, root=root), tuple(repairs), tuple(left), "; ".join(report))
 
 
@@ -175,8 +180,14 @@ def _describe(gaps: Sequence[Gap], fate: str, skipped: int) -> list[str]:
             ends = [(gap.start + skipped, gap.stop - 1 + skipped) for gap in some]
             where = [f"{first}" + f"-{last}" * (last > first) for first, last in ends]
             frames = f"{number} frames {what}" if number > 1 else f"1 frame {what.replace('have', 'has')}"
-            out.append(f"{frames.replace('1 frame repeat', '1 frame repeats')} ({_frames(where)}): {fate}")
+            out.append(f"{frames.replace('1 frame repeat', '1 frame repeats')} ({_frames(where)}){fate}")
     return out
+
+
+def _describe_leaps(gaps: Sequence[Gap], skipped: int) -> list[str]:
+    """Say where the whole body leaps; nothing if it does not."""
+    leaps = [f"{gap.start + skipped}" for gap in gaps if gap.kind == "leap"]
+    return [f"the whole body leaps before {_frames(leaps)}"] if leaps else []
 
 
 def _frames(where: Sequence[str]) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind._typing import Floats, Ints
+from motionmind.body.contact import find_floor
 from motionmind.body.mirror import find_sides, mirrored
 from motionmind.body.motion import Motion
 from motionmind.body.rates import FILM_RATE
@@ -31,6 +32,8 @@ Rate = float | Literal["auto"] | None
 RECORDED_RATE = 5.0
 DETAIL_RATE = 30.0  # per second: the rate at which detail between postures is kept
 FAULT_DEGREES = 30.0  # a joint that departs by more between two postures was recorded badly
+FLOOR_OFF = 0.03  # metres off 0 above which a recording's floor is told
+_LOOKED_AT = 500  # frames of a recording, at most, that its floor is found from
 _JUMPING = 3  # joints that jump at once after a posture that was added
 _MOVES = 0.05  # degrees in a frame: a joint that turns by less is still
 _ADDED_SECONDS = 2.0  # for which such a posture is added at most
@@ -77,7 +80,8 @@ class Recording(NamedTuple):
         faults: the faults.
         pieces: its unbroken parts; none if it is left out.
         images: their mirror images, if they are wanted.
-        added: frames of one posture before the movement, as of `added_frames`; 0 where frames are skipped.
+        added: frames of one posture before the movement, as of `added_frames`, after those that are skipped.
+        floor: height of the floor that its feet stand on (`find_floor`), metres; 0 of keyframes.
     """
 
     name: str
@@ -88,6 +92,7 @@ class Recording(NamedTuple):
     pieces: tuple[Piece, ...]
     images: tuple[Piece, ...]
     added: int = 0
+    floor: float = 0.0
 
 
 class Source(NamedTuple):
@@ -111,7 +116,7 @@ def take(recording: Motion, taking: Taking) -> Recording:
     if skip >= len(recording):
         raise CorpusError(f"{recording.name} has {len(recording)} frames; skipping {skip} leaves none")
     motion = replace(recording.slice(skip, len(recording)), name=recording.name or "clip")
-    added = 0 if skip else added_frames(motion)
+    added = added_frames(motion)
     repairs: tuple[JointRepair, ...] = ()
     left: tuple[Gap, ...] = ()
     if taking.flips == "repair":
@@ -135,7 +140,14 @@ def take(recording: Motion, taking: Taking) -> Recording:
     between = frames_between(rate)
     pieces = tuple(as_piece(part, between) for part in parts)
     images = tuple(mirror_image(part, between) for part in parts) if taking.mirror else ()
-    return Recording(motion.name, motion.skeleton, rate, doubt, faults, pieces, images, added)
+    floor = floor_of(motion) if rate is not None else 0.0
+    return Recording(motion.name, motion.skeleton, rate, doubt, faults, pieces, images, added, floor)
+
+
+def floor_of(motion: Motion) -> float:
+    """Return the height of the floor that feet stand on in a recording, metres, as of `find_floor` with heels."""
+    some = slice(None, None, -(-len(motion) // _LOOKED_AT))
+    return find_floor(motion.skeleton, motion.rotations[some], motion.root[some], heels=True)
 
 
 def added_frames(recording: Motion) -> int:

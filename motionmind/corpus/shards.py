@@ -109,6 +109,7 @@ class _RecordingEntry(msgspec.Struct, frozen=True):
     pieces: tuple[Clip, ...]
     images: tuple[Clip, ...]
     added: int
+    floor: float
 
 
 class _Entry(msgspec.Struct, frozen=True):
@@ -361,7 +362,7 @@ def _encode(recordings: Sequence[Recording], said: tuple[str, ...], read: dict[s
         body = one.body
         entry = BodyEntry(body.name, body.names, body.parents, body.offsets.tolist(), body.tips.tolist())
         split = len(one.pieces)
-        kept = one.rate, one.doubt, one.faults, clips[:split], clips[split:], one.added
+        kept = one.rate, one.doubt, one.faults, clips[:split], clips[split:], one.added, one.floor
         entries.append(_RecordingEntry(one.name, entry, *kept))
     about = msgspec.json.encode(_Entry(tuple(entries), said, read))
     out = io.BytesIO()
@@ -396,4 +397,4 @@ def _decode(entry: _RecordingEntry, number: int, arrays: Mapping[str, NDArray[An
         )
 
     both = pieces(entry.pieces), pieces(entry.images)
-    return Recording(entry.name, skeleton, entry.rate, entry.doubt, entry.faults, *both, entry.added)
+    return Recording(entry.name, skeleton, entry.rate, entry.doubt, entry.faults, *both, entry.added, entry.floor)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bundled_clips import ballet_clip
 from cli_files import FIFTH, PLIE, built, clip, files_under
 from command_line import Run
 
@@ -126,6 +127,17 @@ def test_which_axis_is_up_can_be_said(run: Run, suffix: str) -> None:
     ran = run("convert", f"a{suffix}", "x.json", "--up", "x")
     assert ran.code == 2
     assert "'x' is not one of 'y', 'z'" in ran.err
+
+
+def test_what_is_wrong_with_a_recording_is_said_as_it_is_read(run: Run) -> None:
+    film = ballet_clip("adagio").resample(30.0)
+    root = film.root + np.array([0.0, -0.1, 0.0])
+    root[50:53] += [0.0, 0.0, 7.0]
+    write_motion("film.bvh", replace(film, root=root))
+    said = run("convert", "film.bvh", "film.json", "--unit", "cm").err
+    assert "note: film.bvh: 3 frames have the whole body elsewhere, or zeros (frames 50-52)\n" in said
+    assert "note: film.bvh: its feet stand 10 cm under 0, where the floor is\n" in said
+    assert "seems to play" not in said
 
 
 def test_flips_are_repaired_kept_or_dropped(run: Run) -> None:
