@@ -30,7 +30,7 @@ from motionmind.retarget.retarget import (
     read_joint_mapping,
     to_human23,
 )
-from motionmind.retarget.rigs import RIGS, plain_names, spine_shares
+from motionmind.retarget.rigs import RIGS, plain_names, spine_shares, without_endings
 from motionmind.retarget.vertical import stood_up
 
 BODY = human23()
@@ -230,6 +230,14 @@ def test_z_up_is_seen_and_can_be_said() -> None:
     assert np.ptp(to_human23(source, up="y").root[:, 2]) == pytest.approx(np.ptp(dance().root[:, 1]))
     with pytest.raises(MotionMindError, match='"y" or "z", not \'x\''):
         to_human23(source, up="x")
+
+
+@pytest.mark.parametrize("ending", ["_jnt", ".001", "#2", "_01", "_{}"])
+def test_endings_that_exporters_add_do_not_count(ending: str) -> None:
+    names = {joint: name + ending.format(i) for i, (joint, name) in enumerate(rig_names("Mixamo").items())}
+    same_movement(to_human23(disguise(dance(), names, spread())), dance())
+    assert without_endings(["Bone_1", "Bone_2"]) is None
+    assert without_endings(["Hips", "Spine_01"]) is None
 
 
 def standing(body: Skeleton = BODY) -> Motion:
