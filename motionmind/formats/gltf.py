@@ -102,7 +102,9 @@ def _read(gltf: Gltf, scale: float) -> Motion:
         if not np.all(np.abs(array) <= LARGEST):
             raise gltf.fault(f"its {what} reaches beyond {LARGEST:g} m")
     if others:
-        warnings.warn(f"{gltf.path}: the first animation is read, not {enumerated(others)}", MotionMindWarning, 5)
+        warnings.warn(
+            f"{gltf.path}: the first animation that moves is read, not {enumerated(others)}", MotionMindWarning, 5
+        )
     above = [joints.index(parents[node]) if i else -1 for i, node in enumerate(joints)]
     skeleton = skeleton_at(skin_name or name_of(gltf.path), called, above, rest)
     turned = rot.mul_inv(turns, rest_turns)
@@ -220,14 +222,32 @@ def _distinct(names: list[str]) -> tuple[str, ...]:
 
 
 def _find_tracks(gltf: Gltf, body: set[int]) -> tuple[Tracks, list[str]]:
-    """Return the tracks of the first animation that moves nodes of `body`, any if that is empty; and others' names."""
+    """Return the tracks of the first animation that moves nodes of `body`, any if that is empty; and others' names.
+
+    Animations of one key are poses: they count where there is nothing else. Several of one node each are one movement.
+    """
     animations = [
         one
         for one in gltf.document.animations
         if any(channel.target.path in KINDS and (channel.target.node in body or not body) for channel in one.channels)
     ]
+    animations.sort(key=lambda one: _is_pose(gltf, one))  # keeps their order otherwise
+    moving = [one for one in animations if not _is_pose(gltf, one)]
+    targets = [(channel.target.node, channel.target.path) for one in moving for channel in one.channels]
+    if (
+        len(moving) > 1
+        and len({*targets}) == len(targets)
+        and all(len({way.target.node for way in one.channels}) == 1 for one in moving)
+    ):
+        return {key: track for one in moving for key, track in _tracks(gltf, one).items()}, []
     names = [one.name or "one without a name" for one in animations[1:]]
     return (_tracks(gltf, animations[0]) if animations else {}), names
+
+
+def _is_pose(gltf: Gltf, animation: Animation) -> bool:
+    """Return whether an animation has one key alone."""
+    rows = gltf.document.accessors
+    return all(not 0 <= one.input < len(rows) or rows[one.input].count <= 1 for one in animation.samplers)
 
 
 def _tracks(gltf: Gltf, animation: Animation) -> Tracks:

@@ -52,6 +52,8 @@ _LARGEST_ARRAY = 2**30
 # From a world with z up, where a body faces -y, to ours, where it faces +z.
 _UPRIGHT = rot.from_axis_angle([1.0, 0.0, 0.0], -np.pi / 2)
 
+_TURNS = 20.0  # radians, in the median frame, by which no joint is turned
+
 _log = logging.getLogger(__name__)
 
 
@@ -88,7 +90,10 @@ def read_npz(path: FilePath, *, fps: float | None = None, up: str | None = None)
         raise FormatError(f"'trans' has the shape {list(trans.shape)}, not [{len(poses)}, 3] as 'poses' has", path=path)
     rate = _rate(arrays, fps, path)
     _log.info("%s: joints stand where human44's do; the file's body shape (betas) is not read", path)
-    rotations = rot.exp(poses.reshape(len(poses), -1, 3))
+    vectors = poses.reshape(len(poses), -1, 3)
+    if (longest := float(np.median(rot.norm(vectors).max(axis=1)))) > _TURNS:
+        raise FormatError(f"'poses' turns by {longest:.3g} radians: are these degrees?", path=path)
+    rotations = rot.exp(vectors)
     if (up or _vertical(skeleton, rotations, trans, path)) == "z":
         rotations[:, 0] = rot.mul(_UPRIGHT, rotations[:, 0])
         trans = rot.mul_vec(_UPRIGHT, trans)

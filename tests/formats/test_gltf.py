@@ -413,8 +413,27 @@ def test_a_posture_is_no_animation(tmp_path: Path) -> None:
 
 def test_others_are_named(file: File) -> None:
     file.json["animations"] = [file.json["animations"][0], file.json["animations"][0] | {"name": "wave"}]
-    with pytest.warns(MotionMindWarning, match="the first animation is read, not wave"):
+    with pytest.warns(MotionMindWarning, match="the first animation that moves is read, not wave"):
         read_gltf(file.write())
+
+
+def test_a_pose_before_the_movement_is_not_read(file: File) -> None:
+    wanted = read_gltf(file.write())
+    still = {"input": file.add(np.zeros(1), "SCALAR"), "output": file.add(np.array([[0.0, 0.0, 0.0, 1.0]]), "VEC4")}
+    channels = [{"sampler": 0, "target": {"node": 3, "path": "rotation"}}]
+    file.json["animations"].insert(0, {"name": "T", "samplers": [still], "channels": channels})
+    with pytest.warns(MotionMindWarning, match="the first animation that moves is read, not T"):
+        same_movement(read_gltf(file.write()), wanted)
+
+
+def test_an_animation_for_each_bone_is_one_movement(file: File) -> None:
+    wanted = read_gltf(file.write())
+    (whole,) = file.json["animations"]
+    file.json["animations"] = [
+        {"samplers": [whole["samplers"][one["sampler"]]], "channels": [one | {"sampler": 0}]}
+        for one in whole["channels"]
+    ]
+    same_movement(read_gltf(file.write()), wanted)
 
 
 # --- what cannot be read --------------------------------------------------------------------------------------------

@@ -146,6 +146,13 @@ def test_other_names_and_types_that_files_have(tmp_path: Path) -> None:
     assert motion.fps == pytest.approx(120.0)
 
 
+def test_degrees_are_refused(tmp_path: Path) -> None:
+    found = arrays()
+    found["poses"] = np.degrees(found["poses"])
+    with pytest.raises(FormatError, match=r"a\.npz: 'poses' turns by \d+ radians: are these degrees\?"):
+        read_npz(saved(tmp_path / "a.npz", found))
+
+
 def test_a_rate_that_is_not_said_must_be_given(tmp_path: Path) -> None:
     found = arrays()
     del found["mocap_framerate"]
