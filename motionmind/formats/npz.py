@@ -204,6 +204,7 @@ def _vertical(skeleton: Skeleton, rotations: Floats, root: Floats, path: FilePat
         trunk,
         usual="z",
         height=skeleton.height,
+        is_stated=True,
     )
     if doubt:
         message = f"{path}: taken with {axis} up, which is doubtful: {doubt}"

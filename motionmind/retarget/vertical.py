@@ -19,7 +19,7 @@ from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 
-_FRAMES = 500  # that are looked at, at most
+_FRAMES, _FEWEST = 500, 8  # frames that are looked at, at most; and at least, to see what is steady
 _ALONG = 0.7  # mean cosine between the trunk and the axis that a body stands along
 _STANDS = 0.5  # the same of the axis that a rig stands along, which needs less
 _RISES = (0.05, 0.6)  # quantiles of the lowest point's height between which a body is on the floor
@@ -66,7 +66,9 @@ def stood_up(motion: Motion) -> Motion:
     return replace(motion, rotations=rotations, root=rot.mul_vec(Z_UP, motion.root))
 
 
-def find_vertical(points: Callable[[slice], Floats], trunk: Floats, *, usual: str, height: float) -> Vertical:
+def find_vertical(
+    points: Callable[[slice], Floats], trunk: Floats, *, usual: str, height: float, is_stated: bool = False
+) -> Vertical:
     """Find which axis of a file's world is up, y or z.
 
     Args:
@@ -74,6 +76,7 @@ def find_vertical(points: Callable[[slice], Floats], trunk: Floats, *, usual: st
         trunk: directions of the trunk, up along the spine [T, 3].
         usual: "y" or "z", the axis that the rig stands along, or that is up in all files of a format.
         height: of the body, metres.
+        is_stated: whether the format says what is usual: then a floor at 0 tells nothing.
 
     >>> import numpy as np
     >>> ahead = np.tile([0.0, 0.0, 1.0], (60, 1))
@@ -89,9 +92,11 @@ def find_vertical(points: Callable[[slice], Floats], trunk: Floats, *, usual: st
     along = "-" * (sign < 0.0) + _NAMES[axis]
     places = points(slice(None, None, -(-len(trunk) // _FRAMES)))
     heights = (sign * places[..., axis]).min(axis=1), places[..., own].min(axis=1)
-    rises, usual_rises = (_rise(one, height) for one in heights)
+    rises, usual_rises = (_rise(one, height) for one in heights) if len(places) >= _FEWEST else (1.0, 1.0)
     at_floor, usual_at_floor = (abs(float(np.median(one))) < _AT_FLOOR * height for one in heights)
     steadier = usual_rises > _STEADIER * rises
+    if is_stated and not steadier:
+        return Vertical(usual)
     if rises > _STEADIER * usual_rises or not (steadier or at_floor):
         is_sure = rises > _STEADIER * usual_rises or usual_at_floor
         found = usual if is_sure or along != "y" else "y"
