@@ -80,7 +80,7 @@ def find_gaps(motion: Motion) -> list[Gap]:
     leaps = [*_elsewhere(motion, quick)]
     held = [
         gap
-        for gap in _repeated(turned + went, seconds)
+        for gap in _repeated(motion, turned + went, seconds)
         if not any(leap.start <= gap.start and gap.stop <= leap.stop for leap in leaps)
     ]
     ends = {gap.stop for gap in held}
@@ -151,10 +151,11 @@ def _returns(motion: Motion, before: int, after: int) -> bool:
     return seconds <= _LONG and turned < 0.5 * _TURNS * seconds and went < 0.5 * _FAST * seconds
 
 
-def _repeated(steps: Floats, seconds: Floats) -> Iterator[Gap]:
-    """Yield frames that are repeated in the midst of movement.
+def _repeated(motion: Motion, steps: Floats, seconds: Floats) -> Iterator[Gap]:
+    """Yield frames that are repeated in the midst of movement, which goes on from them, and not back.
 
     Args:
+        motion: the recording.
         steps: to each next frame, radians of all joints on average, plus metres of the root [T - 1].
         seconds: to each next frame [T - 1].
     """
@@ -166,8 +167,17 @@ def _repeated(steps: Floats, seconds: Floats) -> Iterator[Gap]:
         around = slice(max(first - _WINDOW, 0), stop + 1 + _WINDOW)
         pace = float(steps[around].sum() / seconds[around].sum())
         meanwhile = float(seconds[first : stop + 1].sum())
-        if pace > _MOVES and steps[first - 1] > 0.0 and steps[stop] > _GOES_ON * pace * meanwhile:
+        goes_on = (
+            steps[stop] > _GOES_ON * pace * meanwhile and _way(motion, int(first) - 1, int(stop) + 1) > steps[stop]
+        )
+        if pace > _MOVES and goes_on:
             yield Gap(int(first) + 1, int(stop) + 1, "repeated")
+
+
+def _way(motion: Motion, a: int, b: int) -> float:
+    """Return how far a body is from one frame to another, radians of all joints on average, plus metres of the root."""
+    turned = np.minimum(rot.angle(motion.rotations[a], motion.rotations[b]), _ONE).mean()
+    return float(turned) + float(np.linalg.norm(motion.root[b] - motion.root[a]))
 
 
 def _describe(gaps: Sequence[Gap], fate: str, skipped: int) -> list[str]:

@@ -104,6 +104,8 @@ def test_what_stands_still_or_is_slow_on_purpose_is_no_fault() -> None:
     smooth = np.convolve(np.pad(holds, 12, "edge"), np.ones(25) / 25.0, "valid")
     assert find_gaps(replace(motion.at(smooth / FPS + 1e-9 * np.arange(240)), times=motion.times)) == []
     assert find_gaps(replace(without(motion, 100, 104, "zeros"), keyframed=True)) == []
+    there = np.abs(np.arange(240) - 119.5).astype(int)  # back and forth, with the same frame twice where it turns
+    assert find_gaps(replace(motion, rotations=motion.rotations[there], root=motion.root[there])) == []
 
 
 def test_frames_that_are_all_doubled_are_told_and_stay() -> None:
