@@ -161,12 +161,12 @@ def gather(
     if body is None and not mix:
         raise CorpusError(f"corpus {name!r}: no recordings given")
     taken = max((one.rate for one in own if one.rate is not None), default=None)
-    remark(name, own, is_rate_given=rate != "auto", skip=skip)
     for other, _ in mix:
         body = body or other.skeleton
         difference = body.difference(other.skeleton)
         if difference is not None:
             raise CorpusError(f"corpus {other.name!r} is on another skeleton than {body.name}: {difference}")
+    remark(name, own, is_rate_given=rate != "auto", skip=skip)
     mixed = [(other, clip, weight) for other, weight in mix for clip in other.clips]
     if body is None or not (mixed or growing.clips):
         raise CorpusError(f"corpus {name!r}: every recording has faults, and without them nothing is left")
