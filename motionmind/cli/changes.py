@@ -63,6 +63,7 @@ def add(
     unit: str | None,
     asf: Path | None,
     source_fps: float | None,
+    up: str | None,
     details: bool,
     **options: Any,
 ) -> None:
@@ -83,7 +84,7 @@ def add(
     rate: Rate = "auto" if learned.corpus.rate is None else learned.corpus.rate
     mirror = any(clip.mirrored for clip in own)
     takes = Taking(rate, learned.corpus.skip, options["flips"], learned.corpus.flip_degrees, mirror)
-    source = Reading(takes, read_mapping(joints), unit, str(asf) if asf else None, source_fps)
+    source = Reading(takes, read_mapping(joints), unit, str(asf) if asf else None, source_fps, up)
     with open_team(1, None) as team, shards_of(name, home) as folder:
         taken = take_files(clip_names(files), source, folder, team, strict=True)
         workshop = Workshop(folder=folder)

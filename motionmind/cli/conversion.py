@@ -14,7 +14,7 @@ from motionmind.cli.files import (
     evened,
     note_licences,
     note_lossy_fields,
-    question_clock,
+    question_recording,
     read_mapping,
     write_all,
 )
@@ -143,10 +143,11 @@ def convert(
         raise MotionMindError(f"--out-unit {out_unit}: only BVH has no unit of its own, and {output} is not BVH")
     taker = program_for(program, output) if program else None
     motion = read_part(named, None, home, raw=True, **options)
+    upright = "y" if options["up"] else None  # reading has turned it
     if named.source.kind == "file":
-        question_clock(named.source.paths[0], motion)
+        question_recording(named.source.paths[0], motion, upright)
     if skeleton == "human23" or joints or (suffix == ".txt" and not is_human44(motion.skeleton)):
-        motion = to_human23(motion, read_mapping(joints))
+        motion = to_human23(motion, read_mapping(joints), up=upright)
     fps = fps or (taker.rates[suffix] if taker else None)
     if fps is not None:
         motion = motion.resample(fps)

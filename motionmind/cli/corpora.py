@@ -142,6 +142,7 @@ def build(
     unit: str | None,
     asf: Path | None,
     source_fps: float | None,
+    up: str | None,
     details: bool,
     workers: int,
     scheduler: str | None,
@@ -168,7 +169,7 @@ def build(
     others = parse_mixture(mix)
     discretization = make_discretization(discretize, *parse_tolerances(tolerance, 15.0))
     takes = Taking("auto" if rate is None else rate, options["skip"], options["flips"], flip_angle, options["mirror"])
-    reading = Reading(takes, read_mapping(joints), unit, str(asf) if asf else None, source_fps)
+    reading = Reading(takes, read_mapping(joints), unit, str(asf) if asf else None, source_fps, up)
     if scheduler:  # whose workers are in other folders
         files = tuple(file.absolute() for file in files)
     if others:  # a bundled one is learned as it is loaded

@@ -46,5 +46,5 @@ def _ledger(source: str, home: Path | None) -> Ledger:
     named = parse_movement(source, home)
     if named.source.kind == "file" and (ledger := read_ledger(Path(named.source.place))) is not None:
         return ledger
-    reading = {"unit": None, "asf": None, "source_fps": None}
+    reading = {"unit": None, "asf": None, "source_fps": None, "up": None}
     return ledger_of(read_movement(named.source, None, home, raw=True, **reading).credits)

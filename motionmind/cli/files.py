@@ -22,27 +22,49 @@ EVEN = (".bvh", ".npz")  # formats whose frames are even in time
 _RATE = 30.0  # frames a second of movement that has to be made even
 
 
-def read(path: Path, unit: str | None, asf: Path | None, source_fps: float | None) -> Motion:
+def read(path: Path, unit: str | None, asf: Path | None, source_fps: float | None, up: str | None) -> Motion:
     """Read movement from a file, given the values of the options that `options.reading` adds."""
     from motionmind.formats import read_motion
 
-    return read_motion(path, unit=unit, asf=asf, fps=source_fps)
+    return read_motion(path, unit=unit, asf=asf, fps=source_fps, up=up)
 
 
-def question_clock(path: Path, motion: Motion) -> None:
-    """Warn if the movement of a person in a file contradicts the file's clock; on any joints that map to human23."""
+def question_recording(path: Path, motion: Motion, up: str | None = None) -> None:
+    """Warn if a person in a file contradicts the file's clock, drops frames, or stands off the floor, y = 0.
+
+    Args:
+        path: the file.
+        motion: its movement, on any joints; only on those that map to human23 it is questioned.
+        up: the axis that is up in the movement; None finds it.
+    """
+    from motionmind.body.human import SHORTEST, TALLEST
+    from motionmind.body.rates import FILM_RATE
     from motionmind.body.tempo import question_tempo
+    from motionmind.corpus.dropped import describe_gaps, fill_gaps
+    from motionmind.corpus.recordings import FLOOR_OFF, added_frames, floor_of
+    from motionmind.retarget.joint_mapping import joint_mapping
     from motionmind.retarget.retarget import own_skeleton
 
+    if motion.keyframed or motion.insertions or joint_mapping(motion.skeleton) is None:
+        return
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MotionMindWarning)  # whoever takes it onto human23 is warned then
-            doubt = question_tempo(own_skeleton(motion))
+            person = own_skeleton(motion, up=up)
     except SkeletonError:  # its zero pose does not show how it stands
         return
-    if doubt:
-        message = f"{path}: seems to play {doubt} (check the frames per second, --source-fps, and the unit)"
-        warnings.warn(message, MotionMindWarning, stacklevel=2)
+    added = added_frames(person)
+    doubts = [gaps] if (gaps := describe_gaps(person, added)) else []
+    if clock := question_tempo(fill_gaps(person, added).motion if gaps else person):
+        doubts.append(f"seems to play {clock} (check the frames per second, --source-fps, and the unit)")
+    is_long = person.fps >= FILM_RATE and len(person) - added > person.fps
+    if is_long and SHORTEST <= person.skeleton.height <= TALLEST:  # else the unit is wrong
+        floor = floor_of(person.slice(added, len(person)))
+        if abs(floor) > FLOOR_OFF:
+            where = "over" if floor > 0.0 else "under"
+            doubts.append(f"its feet stand {100.0 * abs(floor):.0f} cm {where} 0, where the floor is")
+    for doubt in doubts:
+        warnings.warn(f"{path}: {doubt}", MotionMindWarning, stacklevel=2)
 
 
 def write(path: Path, movement: Motion | Posture) -> None:

@@ -238,15 +238,22 @@ CORPUS = option(
 
 
 def reading(function: _Function) -> _Function:
-    """Add the options of commands that read movement: `joints`, `unit`, `asf` and `source_fps`."""
+    """Add the options of commands that read movement: `joints`, `unit`, `asf`, `source_fps` and `up`."""
     for decorate in (
+        option(
+            "--up",
+            section=Section.INPUT,
+            advanced=True,
+            type=click.Choice(["y", "z"]),
+            help="Say which axis is up in the file  [default: the one that people stand along]",
+        ),
         option(
             "--source-fps",
             section=Section.INPUT,
             advanced=True,
             type=RATE,
             help="Set the frames per second of BVH, .amc, .npz, .pkl, .npy and .txt  "
-            "[default: what the file states; .amc 120, .pkl 60, .npy 30, .txt 1]",
+            "[default: what the file states; .amc 120, .pkl 60, .npy 30, else .txt 1]",
         ),
         option(
             "--asf",

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motionmind.cli.files import question_clock, read, read_mapping
+from motionmind.cli.files import question_recording, read, read_mapping
 from motionmind.errors import MotionMindError
 from motionmind.names.spelling import PostureName, Source, parse_posture
 
@@ -104,6 +104,6 @@ def _read_file(path: Path, joints: Path | None, **source: Any) -> Motion:
     """Read the movement in a file, on human23 if its joints map to it."""
     from motionmind.retarget.retarget import own_skeleton
 
-    motion = own_skeleton(read(path, **source), read_mapping(joints))
-    question_clock(path, motion)
+    motion = own_skeleton(read(path, **source), read_mapping(joints), up=source["up"] and "y")
+    question_recording(path, motion)
     return motion

@@ -133,7 +133,7 @@ def _project(file: Path | None, corpus: str, home: Path | None) -> Project:
         take_in(project, variation, _TERMINAL)
         return project
     source = parse_movement(str(file), home).source
-    motions = read_movements(source, (), home, joints=None, unit=None, asf=None, source_fps=None)
+    motions = read_movements(source, (), home, joints=None, unit=None, asf=None, source_fps=None, up=None)
     project = Project.create(place, corpus, home)
     keys = [project.movements.keep(motion) for motion in motions]
     blocks = [

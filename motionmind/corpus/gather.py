@@ -39,8 +39,8 @@ from motionmind.corpus.recordings import (
     renamed,
     take,
     take_clip,
-    usually_added,
 )
+from motionmind.corpus.remarks import remark
 from motionmind.errors import CorpusError, MotionMindWarning, enumerated
 from motionmind.executors.workshop import Workshop
 
@@ -95,7 +95,7 @@ def gather(
         motions: the recordings, named; repeated names are numbered. Those that were taken before
             (`motionmind.corpus.recordings.take`, with the same options) stay as they are.
         rate: postures per second; None keeps every frame with its own time. "auto" takes 5 postures a second of a
-            recording, which a log entry says (logger "motionmind.corpus.gather", level INFO), and every frame of
+            recording, which a log entry says (logger "motionmind.corpus.remarks", level INFO), and every frame of
             keyframes: of a motion that says so, and of one with fewer than 15 frames a second. Corpora that are mixed
             in are then brought to the recordings' rate, or where there are none to the lowest rate that any has.
         skip: frames to drop at each recording's start, such as an added T-pose; a log entry says where most begin with
@@ -162,21 +162,12 @@ def gather(
     if body is None and not mix:
         raise CorpusError(f"corpus {name!r}: no recordings given")
     taken = max((one.rate for one in own if one.rate is not None), default=None)
-    if rate == "auto" and taken is not None:
-        _log.info(
-            "corpus %s: %g postures a second of each recording (--rate, or rate=, for more or fewer)", name, taken
-        )
-    if added := usually_added(own):
-        frames = "a frame" if added == 1 else f"{added} frames"
-        text = (
-            "corpus %s: most recordings begin with %s of another posture (a T-pose?): --skip %d (or skip=) drops that"
-        )
-        _log.info(text, name, frames, added)
     for other, _ in mix:
         body = body or other.skeleton
         difference = body.difference(other.skeleton)
         if difference is not None:
             raise CorpusError(f"corpus {other.name!r} is on another skeleton than {body.name}: {difference}")
+    remark(name, own, is_rate_given=rate != "auto", skip=skip)
     mixed = [(other, clip, weight) for other, weight in mix for clip in other.clips]
     if body is None or not (mixed or growing.clips):
         raise CorpusError(f"corpus {name!r}: every recording has faults, and without them nothing is left")

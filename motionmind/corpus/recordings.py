@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal, NamedTuple
@@ -12,14 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind._typing import Floats, Ints
+from motionmind.body.contact import find_floor
 from motionmind.body.mirror import find_sides, mirrored
 from motionmind.body.motion import Motion
 from motionmind.body.rates import FILM_RATE
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.clip import FLIP_DEGREES, Clip, JointFlip, JointRepair
 from motionmind.corpus.corpus import Corpus, subdivide_times
+from motionmind.corpus.dropped import Gap, fill_gaps
 from motionmind.corpus.flips import find_flips, repair_flips
-from motionmind.errors import CorpusError, SkeletonError
+from motionmind.errors import CorpusError, MotionMindWarning, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
 
@@ -30,6 +33,8 @@ Rate = float | Literal["auto"] | None
 RECORDED_RATE = 5.0
 DETAIL_RATE = 30.0  # per second: the rate at which detail between postures is kept
 FAULT_DEGREES = 30.0  # a joint that departs by more between two postures was recorded badly
+FLOOR_OFF = 0.03  # metres off 0 above which a recording's floor is told
+_LOOKED_AT = 500  # frames of a recording, at most, that its floor is found from
 _JUMPING = 3  # joints that jump at once after a posture that was added
 _MOVES = 0.05  # degrees in a frame: a joint that turns by less is still
 _ADDED_SECONDS = 2.0  # for which such a posture is added at most
@@ -76,7 +81,8 @@ class Recording(NamedTuple):
         faults: the faults.
         pieces: its unbroken parts; none if it is left out.
         images: their mirror images, if they are wanted.
-        added: frames of one posture before the movement, as of `added_frames`; 0 where frames are skipped.
+        added: frames of one posture before the movement, as of `added_frames`, after those that are skipped.
+        floor: height of the floor that its feet stand on (`find_floor`), metres; 0 of keyframes.
     """
 
     name: str
@@ -87,6 +93,7 @@ class Recording(NamedTuple):
     pieces: tuple[Piece, ...]
     images: tuple[Piece, ...]
     added: int = 0
+    floor: float = 0.0
 
 
 class Source(NamedTuple):
@@ -110,22 +117,38 @@ def take(recording: Motion, taking: Taking) -> Recording:
     if skip >= len(recording):
         raise CorpusError(f"{recording.name} has {len(recording)} frames; skipping {skip} leaves none")
     motion = replace(recording.slice(skip, len(recording)), name=recording.name or "clip")
-    doubt = question_tempo(motion) or ""
-    added = 0 if skip else added_frames(motion)
-    found, cuts = find_flips(motion, taking.flip_degrees), list[int]()
+    added = added_frames(motion)
     repairs: tuple[JointRepair, ...] = ()
+    left: tuple[Gap, ...] = ()
+    if taking.flips == "repair":
+        motion, repairs, left, report = fill_gaps(motion, added, skip)
+        if report:
+            warnings.warn(f"{motion.name}: {report}", MotionMindWarning, stacklevel=2)
+    ends = sorted({0, *(frame for gap in left for frame in (gap.start, gap.stop)), len(motion)})
+    doubt = question_tempo(motion.slice(*max(pairwise(ends), key=lambda part: part[1] - part[0])))
+    found, cuts = find_flips(motion, taking.flip_degrees), list[int]()
     if found and taking.flips == "repair":
-        motion, found, repairs = repair_flips(motion, taking.flip_degrees)
-        cuts = sorted({flip.frame for flip in find_flips(motion, taking.flip_degrees)})
+        motion, found, mended = repair_flips(motion, taking.flip_degrees)
+        cuts = [flip.frame for flip in find_flips(motion, taking.flip_degrees)]
+        repairs += mended
+    cuts = sorted({*cuts, *ends[1:-1]})
     faults = tuple(replace(flip, frame=flip.frame + skip) for flip in found)
     if found and taking.flips == "drop":
         return Recording(motion.name, motion.skeleton, None, doubt, faults, (), (), added)
     rate = posture_rate(motion) if taking.rate == "auto" else taking.rate
-    parts = _cut(motion, cuts, rate, Clip(motion.name, 0, 0, repairs=_later(repairs, skip)))
+    whole = Clip(motion.name, 0, 0, repairs=_later(repairs, skip))
+    parts = _cut(motion, cuts, rate, whole, {gap.start for gap in left if gap.stop > gap.start})
     between = frames_between(rate)
     pieces = tuple(as_piece(part, between) for part in parts)
     images = tuple(mirror_image(part, between) for part in parts) if taking.mirror else ()
-    return Recording(motion.name, motion.skeleton, rate, doubt, faults, pieces, images, added)
+    floor = floor_of(motion) if rate is not None else 0.0
+    return Recording(motion.name, motion.skeleton, rate, doubt, faults, pieces, images, added, floor)
+
+
+def floor_of(motion: Motion) -> float:
+    """Return the height of the floor that feet stand on in a recording, metres, as of `find_floor` with heels."""
+    some = slice(None, None, -(-len(motion) // _LOOKED_AT))
+    return find_floor(motion.skeleton, motion.rotations[some], motion.root[some], heels=True)
 
 
 def added_frames(recording: Motion) -> int:
@@ -218,12 +241,15 @@ def _detail(postures: Motion, recording: Motion, between: int) -> NDArray[np.flo
     return out
 
 
-def _cut(motion: Motion, cuts: Sequence[int], rate: float | None, whole: Clip) -> list[Source]:
+def _cut(
+    motion: Motion, cuts: Sequence[int], rate: float | None, whole: Clip, dropped: Collection[int]
+) -> list[Source]:
     """Cut a recording before the frames `cuts`, and take its parts' postures; `whole` is its clip.
 
-    Parts are numbered, and those of a single posture, which have no move, are dropped.
+    Parts are numbered; those that begin at `dropped` frames are left out, and those of a single posture, which have no
+    move.
     """
-    parts = [motion.slice(start, stop) for start, stop in pairwise([0, *cuts, len(motion)])]
+    parts = [motion.slice(a, b) for a, b in pairwise([0, *cuts, len(motion)]) if a not in dropped]
     pieces = []
     for number, part in enumerate(parts, start=1):
         name = f"{motion.name}.{number}" if cuts else motion.name

@@ -50,7 +50,7 @@ class Reading:
     Attributes:
         taking: what to take of them.
         joints: the human23 joint of each of a file's; None recognises rigs by name.
-        unit, asf, fps: as `read_motion`.
+        unit, asf, fps, up: as `read_motion`.
     """
 
     taking: Taking
@@ -58,6 +58,7 @@ class Reading:
     unit: str | None = None
     asf: str | None = None
     fps: float | None = None
+    up: str | None = None
 
 
 class Job(NamedTuple):
@@ -108,6 +109,7 @@ class _RecordingEntry(msgspec.Struct, frozen=True):
     pieces: tuple[Clip, ...]
     images: tuple[Clip, ...]
     added: int
+    floor: float
 
 
 class _Entry(msgspec.Struct, frozen=True):
@@ -318,13 +320,13 @@ def _read(job: Job) -> Iterator[Motion]:
         yield from motions(read_score(job.file))
         return
     options = job.reading
-    motion = read_motion(job.file, unit=options.unit, asf=options.asf, fps=options.fps)
+    motion = read_motion(job.file, unit=options.unit, asf=options.asf, fps=options.fps, up=options.up)
     if len(motion) == 1:
         doubt = f"{job.file}: holds one posture, and no move to learn from"
         if options.taking.skip:  # which would drop it
             raise CorpusError(doubt)
         warnings.warn(doubt, MotionMindWarning, stacklevel=2)
-    yield own_skeleton(replace(motion, name=job.name), options.joints)
+    yield own_skeleton(replace(motion, name=job.name), options.joints, up="y" if options.up else None)
 
 
 def _key(job: Job) -> str:
@@ -360,7 +362,7 @@ def _encode(recordings: Sequence[Recording], said: tuple[str, ...], read: dict[s
         body = one.body
         entry = BodyEntry(body.name, body.names, body.parents, body.offsets.tolist(), body.tips.tolist())
         split = len(one.pieces)
-        kept = one.rate, one.doubt, one.faults, clips[:split], clips[split:], one.added
+        kept = one.rate, one.doubt, one.faults, clips[:split], clips[split:], one.added, one.floor
         entries.append(_RecordingEntry(one.name, entry, *kept))
     about = msgspec.json.encode(_Entry(tuple(entries), said, read))
     out = io.BytesIO()
@@ -395,4 +397,4 @@ def _decode(entry: _RecordingEntry, number: int, arrays: Mapping[str, NDArray[An
         )
 
     both = pieces(entry.pieces), pieces(entry.images)
-    return Recording(entry.name, skeleton, entry.rate, entry.doubt, entry.faults, *both, entry.added)
+    return Recording(entry.name, skeleton, entry.rate, entry.doubt, entry.faults, *both, entry.added, entry.floor)

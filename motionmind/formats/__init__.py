@@ -32,6 +32,7 @@ from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.files import FilePath, write_atomically
 from motionmind.formats.added import added_suffixes, read_added, write_added
 from motionmind.formats.lossy import WRITABLE, lossy_fields
+from motionmind.retarget.vertical import check_up, stood_up
 
 __all__ = ["lossy_fields", "read_motion", "read_posture", "write_atomically", "write_motion", "write_posture"]
 
@@ -52,6 +53,7 @@ def read_motion(
     asf: FilePath | None = None,
     fps: float | None = None,
     skeleton: Skeleton | None = None,
+    up: str | None = None,
 ) -> Motion:
     """Read a motion from a file of any readable format; a posture becomes a motion of one frame at time 0.
 
@@ -60,10 +62,12 @@ def read_motion(
         unit: BVH's unit of length (`read_bvh`); None guesses it from the skeleton. Also glTF's, if it is not the metre.
             Other formats define their own.
         asf: AMC's skeleton (`read_amc`); None finds it beside the file.
-        fps: frames per second: of AMC (default 120) and the papers' notation (default 1), which do not record them, and
-            of AIST++ and FineDance (default 60 and 30), and of BVH and `.npz` in place of those that the file states.
-            Frames of JSON and glTF have times of their own.
+        fps: frames per second: of AMC (default 120), which does not record them, of AIST++ and FineDance (default 60
+            and 30), and of BVH, `.npz` and the papers' notation in place of those that the file states. Frames of JSON
+            and glTF have times of their own.
         skeleton: the body of the papers' notation, which names joints only; None infers it from their names.
+        up: "y" or "z", the vertical in the file: with "z" the movement is turned, so that y is up. None leaves it as it
+            is, for `to_human23` to find; but of `.npz`, where it takes z, unless people stand along y.
 
     Returns:
         The motion, in metres and seconds, on the file's own skeleton.
@@ -87,6 +91,7 @@ def read_motion(
     check_type("unit", unit, str, Real, wanted="the name of a unit, or its metres", or_none=True)
     check_real("fps", fps, or_none=True)
     check_type("skeleton", skeleton, Skeleton, or_none=True)
+    check_up(up)
     # Formats are imported here, so a program loads only those it uses.
     match _suffix(path, _READABLE, "read"):
         case ".bvh":
@@ -100,9 +105,9 @@ def read_motion(
         case ".txt":
             from motionmind.formats.papers import read_papers
 
-            motion = read_papers(path, skeleton=skeleton, rate=1.0 if fps is None else fps)
+            motion = read_papers(path, skeleton=skeleton, rate=fps)
         case ".npz" | ".pkl" | ".npy" as suffix:
-            motion = _read_smpl(path, suffix, fps)
+            motion = _read_smpl(path, suffix, fps, up)
         case ".json":
             motion = _read_json(path)
         case ".glb" | ".gltf" | ".vrm" | ".vrma":
@@ -112,7 +117,7 @@ def read_motion(
         case _:
             motion = read_added(path, fps)
     _question_height(path, motion.skeleton)
-    return motion
+    return stood_up(motion) if up == "z" and Path(path).suffix.lower() != ".npz" else motion
 
 
 def _question_height(path: FilePath, skeleton: Skeleton) -> None:
@@ -128,12 +133,14 @@ def _question_height(path: FilePath, skeleton: Skeleton) -> None:
         warnings.warn(message, MotionMindWarning, stacklevel=3)
 
 
-def _read_smpl(path: FilePath, suffix: str, fps: float | None) -> Motion:
+def _read_smpl(path: FilePath, suffix: str, fps: float | None, up: str | None) -> Motion:
     """Read a motion on SMPL's joints, by the format of the suffix."""
     from motionmind.formats.npz import read_npz
     from motionmind.formats.smpl_data import read_aist, read_finedance
 
-    return {".npz": read_npz, ".pkl": read_aist, ".npy": read_finedance}[suffix](path, fps=fps)
+    if suffix == ".npz":
+        return read_npz(path, fps=fps, up=up)
+    return {".pkl": read_aist, ".npy": read_finedance}[suffix](path, fps=fps)
 
 
 def _read_json(path: FilePath) -> Motion:

@@ -31,6 +31,9 @@ from motionmind.geometry import rotations as rot
 _FRAMES = re.compile(r"\s*Frames\s*:?\s*(\S*)\s*", re.IGNORECASE)
 _FRAME_TIME = re.compile(r"\s*Frame\s*Time\s*:?\s*(\S*)\s*", re.IGNORECASE)
 
+_SEVERAL = 12  # frames, and joints, of which one expects some movement
+_SLOWEST = 2.0  # seconds from frame to frame of a movement
+_HARDLY = (1.0, 5.5)  # degrees that some joint turns by at most, if these are radians: pi about each of three axes
 _MANY = 10_000  # numbers that compiled code reads, if all are plain
 
 _log = logging.getLogger(__name__)
@@ -62,7 +65,8 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None, fps: float | No
         MotionMindError: `unit` or `fps` is invalid.
 
     Warns:
-        MotionMindWarning: something was repaired, as described above.
+        MotionMindWarning: something was repaired, as described above; or the frame time, or all angles, are such as
+            nobody means.
     """
     if fps is not None and not 0.0 < fps <= FASTEST:
         raise MotionMindError(f"fps must be a positive number of frames a second, {FASTEST:g} at most, not {fps}")
@@ -73,7 +77,7 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None, fps: float | No
         _log.info("%s: one unit taken as %.5g m (%s), by the height of the body", path, scale, name)
     else:
         scale = metres_per_unit(unit)
-    for message in body.repairs(scale):
+    for message in (*body.repairs(scale), *_doubts(body, stated if fps is None else 0.0)):
         warnings.warn(f"{path}: {message}", MotionMindWarning, stacklevel=2)
     raw = body.skeleton
     return Motion(
@@ -83,6 +87,23 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None, fps: float | No
         np.arange(len(body.root), dtype=np.float64) * frame_time,
         name=raw.name,
     )
+
+
+def _doubts(body: NormalisedRig, frame_time: float) -> Iterator[str]:
+    """Say what nobody can have meant: frames that are seconds apart, and angles that are no degrees."""
+    if len(body.root) >= _SEVERAL and frame_time > _SLOWEST:
+        yield (
+            f"Frame Time is {frame_time:g}, the seconds from frame to frame: milliseconds, or frames a second, do not "
+            "belong there (--source-fps sets it right)"
+        )
+    if min(body.rotations.shape[:2]) < _SEVERAL:
+        return
+    for step in (-(-len(body.root) // _SEVERAL), 1):  # some frames show of most files that angles are degrees
+        most = float(np.degrees(rot.angle(body.rotations[::step], rot.IDENTITY).max()))
+        if not most < _HARDLY[1]:
+            return
+    if most > _HARDLY[0]:
+        yield f"no joint turns by more than {most:.2g} degrees: are its angles in radians? BVH has degrees"
 
 
 def bvh_unit(path: FilePath) -> tuple[str, float]:

@@ -5,13 +5,14 @@ Section numbers refer to "glTF 2.0 Specification", version 2.0.1, The Khronos Gr
 The body is the nodes that are a person's bones, if the file says so (VRM), else the joints of its skins, else the nodes
 that move; with all nodes between them. Frames of bones are turned in every direction at rest, so that the movement is
 read onto joints whose axes at rest are the world's: with all rotations 0 the skeleton is in the file's rest pose. That
-is the pose in which the mesh was bound to the joints (3.7.3), or, without one, the one in which the nodes stand.
+is the pose in which the mesh was bound to the joints (3.7.3), or, without one, the one in which the nodes stand; or, if
+these stand as in a frame of the movement, that of no rotations.
 """
 
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import msgspec
 import numpy as np
@@ -25,63 +26,29 @@ from motionmind.errors import FormatError, MotionMindWarning, enumerated
 from motionmind.files import FilePath, name_of
 from motionmind.formats import _json
 from motionmind.formats._bvh_rig import NormalisedRig, Placed, normalise
-from motionmind.formats._gltf import Animation, Gltf, Humanoid, from_matrix, read_container, to_trs
+from motionmind.formats._gltf import Animation, Gltf, Humanoid, read_container
+from motionmind.formats._gltf_poses import (
+    KINDS,
+    MOMENT,
+    Track,
+    Tracks,
+    globals_at,
+    heading_of,
+    lineage,
+    rest_pose,
+    skeleton_at,
+)
 from motionmind.formats._json import MARKS, MarksSchema
 from motionmind.formats.text import LARGEST, MOST_JOINTS
 from motionmind.formats.units import bone_span, metres_per_unit
 from motionmind.geometry import rotations as rot
 
 _HUMANOIDS = ("VRMC_vrm", "VRMC_vrm_animation", "VRM")  # extensions that name a person's bones
-_KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
 _SAMPLED = 30.0  # frames a second of curves and jumps, where the file has no even clock that is faster
-_MOMENT = 1e-5  # seconds: keys no further apart are one; times have seven digits
 _UNEVEN = 0.02  # share of a step by which keys may be off an even clock
 _SPARSE = 4  # keys may lack from an even clock so that it has so many times as many
-_SAME_POSE = 1e-3  # radians
 _STILL = 1e-5  # share of the body's span by which a joint may be off its place at rest
-_LEAST_SCALE = 1e-9
 _UPRIGHT = 0.8  # likeness of a body's bones at rest to ours, if it stands as ours does
-
-
-@dataclass(frozen=True)
-class _Track:
-    """Keys of a node's translation, rotation or scale.
-
-    Attributes:
-        times: of the keys [K], seconds, increasing.
-        values: at the keys [K, 3 or 4]; for a curve [K, 3, 3 or 4], each between its tangents.
-        kind: "LINEAR", "STEP" or "CUBICSPLINE" (3.11).
-    """
-
-    times: Floats
-    values: Floats
-    kind: str
-
-    def at(self, times: Floats) -> Floats:
-        """Return the values at `times` [T], seconds; constant before the first key and after the last (appendix C)."""
-        turns = self.values.shape[-1] == 4
-        values = self.values[:, 1] if self.kind == "CUBICSPLINE" else self.values
-        after = np.searchsorted(self.times, times + _MOMENT, side="right").clip(1, max(len(self.times) - 1, 1))
-        before = after - 1
-        if len(self.times) == 1:
-            return np.asarray(values[np.zeros(len(times), dtype=int)])
-        span = self.times[after] - self.times[before]
-        share = ((times - self.times[before]) / span).clip(0.0, 1.0)
-        share = np.where(share * span < _MOMENT, 0.0, np.where((1.0 - share) * span < _MOMENT, 1.0, share))[:, None]
-        if self.kind == "STEP":
-            return np.asarray(values[np.where(share[:, 0] == 1.0, after, before)])
-        if self.kind == "CUBICSPLINE":
-            out, into = span[:, None] * self.values[before, 2], span[:, None] * self.values[after, 0]
-            s2, s3 = share**2, share**3
-            found = (2 * s3 - 3 * s2 + 1) * values[before] + (s3 - 2 * s2 + share) * out
-            found += (3 * s2 - 2 * s3) * values[after] + (s3 - s2) * into
-            return np.asarray(rot.normalise(found) if turns else found)
-        if turns:
-            return rot.slerp(values[before], values[after], share[:, 0])
-        return np.asarray(values[before] + share * (values[after] - values[before]))
-
-
-_Tracks = dict[tuple[int, str], _Track]  # by node, and by what moves
 
 
 def read_gltf(path: FilePath, *, unit: str | float | None = None) -> Motion:
@@ -118,24 +85,28 @@ def _read(gltf: Gltf, scale: float) -> Motion:
     """Read the motion; lengths in units of `scale` metres."""
     parents = _parents(gltf)
     names, skins = _bone_names(gltf), _skins(gltf)
+    is_person = bool(names)
     carriers = set(names) or {node for _, joints in skins for node in joints}
-    tracks, others = _find_tracks(gltf, set(_lineage(parents, carriers)))
+    tracks, others = _find_tracks(gltf, set(lineage(parents, carriers)))
     joints, skin_name = _find_joints(gltf, parents, names, skins, {node for node, path in tracks if path == "rotation"})
     for node, name in enumerate(gltf.document.nodes):
         names.setdefault(node, name.name or f"node {node}")
-    tracks = {key: track for key, track in tracks.items() if key[0] in set(_lineage(parents, joints))}
+    tracks = {key: track for key, track in tracks.items() if key[0] in set(lineage(parents, joints))}
     times = _clock(tracks, len(joints), str(gltf.path))
-    rest_turns, rest = _rest(gltf, parents, joints)
-    heading = _heading(gltf, parents, joints[0])
+    called = _distinct([names[node] for node in joints])
+    rest_turns, rest = rest_pose(gltf, parents, joints, None if is_person else called)
+    heading = heading_of(gltf, parents, joints[0])
     rest_turns, rest = rot.inv_mul(heading, rest_turns), rot.mul_vec(rot.inv(heading), rest)
-    turns, places = _globals(gltf, parents, joints, tracks, times)
+    turns, places = globals_at(gltf, parents, joints, tracks, times)
     for what, array in (("rest pose", rest), ("movement", places)):
         if not np.all(np.abs(array) <= LARGEST):
             raise gltf.fault(f"its {what} reaches beyond {LARGEST:g} m")
     if others:
-        warnings.warn(f"{gltf.path}: the first animation is read, not {enumerated(others)}", MotionMindWarning, 5)
+        warnings.warn(
+            f"{gltf.path}: the first animation that moves is read, not {enumerated(others)}", MotionMindWarning, 5
+        )
     above = [joints.index(parents[node]) if i else -1 for i, node in enumerate(joints)]
-    skeleton = _skeleton(skin_name or name_of(gltf.path), _distinct([names[node] for node in joints]), above, rest)
+    skeleton = skeleton_at(skin_name or name_of(gltf.path), called, above, rest)
     turned = rot.mul_inv(turns, rest_turns)
     rig = _placed(skeleton, turned, places)
     for message in rig.repairs(scale):
@@ -177,18 +148,6 @@ def _parents(gltf: Gltf) -> list[int]:
     return parents
 
 
-def _lineage(parents: list[int], nodes: list[int] | set[int]) -> list[int]:
-    """Return nodes and all that they hang from, each after its parent."""
-    found: dict[int, None] = {}
-    for last in sorted(nodes):
-        path, node = [], last
-        while node >= 0 and node not in found:
-            path.append(node)
-            node = parents[node]
-        found |= dict.fromkeys(reversed(path))
-    return list(found)
-
-
 def _bone_names(gltf: Gltf) -> dict[int, str]:
     """Return the nodes that are bones of a person, as VRM says, with VRM's names; empty if it does not."""
     for extension in _HUMANOIDS:
@@ -218,16 +177,16 @@ def _find_joints(
         raise gltf.fault("no skin, no person's bones and no animation of nodes: nothing that moves")
     if len(wanted) > MOST_JOINTS:
         raise gltf.fault(f"{len(wanted)} joints are more than a body has, {MOST_JOINTS}")
-    lineage = _lineage(parents, wanted)
-    tops = [node for node in lineage if parents[node] < 0]
+    line = lineage(parents, wanted)
+    tops = [node for node in line if parents[node] < 0]
     if len(tops) > 1:
         raise gltf.fault(f"its joints hang from {len(tops)} roots, not from one")
     # Nodes above the body move it, and are not joints: from the first that is one, or that two branches hang from.
-    below = dict.fromkeys(lineage, 0)
-    for node in lineage[1:]:
+    below = dict.fromkeys(line, 0)
+    for node in line[1:]:
         below[parents[node]] += 1
-    top = next(node for node in lineage if node in wanted or below[node] > 1)
-    joints = lineage[lineage.index(top) :]
+    top = next(node for node in line if node in wanted or below[node] > 1)
+    joints = line[line.index(top) :]
     if len(joints) > MOST_JOINTS:
         raise gltf.fault(f"{len(joints)} joints are more than a body has, {MOST_JOINTS}")
     return joints, name
@@ -262,29 +221,47 @@ def _distinct(names: list[str]) -> tuple[str, ...]:
 # --- the movement ---------------------------------------------------------------------------------------------------
 
 
-def _find_tracks(gltf: Gltf, body: set[int]) -> tuple[_Tracks, list[str]]:
-    """Return the tracks of the first animation that moves nodes of `body`, any if that is empty; and others' names."""
+def _find_tracks(gltf: Gltf, body: set[int]) -> tuple[Tracks, list[str]]:
+    """Return the tracks of the first animation that moves nodes of `body`, any if that is empty; and others' names.
+
+    Animations of one key are poses: they count where there is nothing else. Several of one node each are one movement.
+    """
     animations = [
         one
         for one in gltf.document.animations
-        if any(channel.target.path in _KINDS and (channel.target.node in body or not body) for channel in one.channels)
+        if any(channel.target.path in KINDS and (channel.target.node in body or not body) for channel in one.channels)
     ]
+    animations.sort(key=lambda one: _is_pose(gltf, one))  # keeps their order otherwise
+    moving = [one for one in animations if not _is_pose(gltf, one)]
+    targets = [(channel.target.node, channel.target.path) for one in moving for channel in one.channels]
+    if (
+        len(moving) > 1
+        and len({*targets}) == len(targets)
+        and all(len({way.target.node for way in one.channels}) == 1 for one in moving)
+    ):
+        return {key: track for one in moving for key, track in _tracks(gltf, one).items()}, []
     names = [one.name or "one without a name" for one in animations[1:]]
     return (_tracks(gltf, animations[0]) if animations else {}), names
 
 
-def _tracks(gltf: Gltf, animation: Animation) -> _Tracks:
+def _is_pose(gltf: Gltf, animation: Animation) -> bool:
+    """Return whether an animation has one key alone."""
+    rows = gltf.document.accessors
+    return all(not 0 <= one.input < len(rows) or rows[one.input].count <= 1 for one in animation.samplers)
+
+
+def _tracks(gltf: Gltf, animation: Animation) -> Tracks:
     """Return the tracks of an animation."""
-    found: _Tracks = {}
+    found: Tracks = {}
     for number, channel in enumerate(animation.channels):
         node, path = channel.target.node, channel.target.path
-        if node is None or path not in _KINDS:
+        if node is None or path not in KINDS:
             continue
         what = f"animation {animation.name or 'without a name'}, channel {number}"
         gltf.member(gltf.document.nodes, node, f"{what}: node")
         sampler = gltf.member(animation.samplers, channel.sampler, f"{what}: sampler")
         times = gltf.numbers(sampler.input, "SCALAR", what)[:, 0]
-        values = gltf.numbers(sampler.output, _KINDS[path], what)
+        values = gltf.numbers(sampler.output, KINDS[path], what)
         if sampler.interpolation not in ("LINEAR", "STEP", "CUBICSPLINE"):
             raise gltf.fault(f"{what}: interpolation {sampler.interpolation!r} is unknown")
         if np.any(np.diff(times) <= 0.0):
@@ -298,16 +275,16 @@ def _tracks(gltf: Gltf, animation: Animation) -> _Tracks:
             if not np.all(rot.norm(keys) > _STILL):
                 raise gltf.fault(f"{what}: a rotation is zero")
             values = values if curve else rot.normalise(values)
-        found[node, path] = _Track(times, values, sampler.interpolation)
+        found[node, path] = Track(times, values, sampler.interpolation)
     return found
 
 
-def _clock(tracks: _Tracks, joints: int, name: str) -> Floats:
+def _clock(tracks: Tracks, joints: int, name: str) -> Floats:
     """Return the times of frames [T], seconds: those of the keys, on an even clock if they lie on one."""
     if not tracks:
         return np.zeros(1)
     times = np.unique(np.concatenate([track.times for track in tracks.values()]))
-    times = times[np.concatenate([[True], np.diff(times) > max(_MOMENT, 1e-6 * float(np.abs(times).max()))])]
+    times = times[np.concatenate([[True], np.diff(times) > max(MOMENT, 1e-6 * float(np.abs(times).max()))])]
     check_size(len(times), joints, name)
     if len(times) == 1:
         return np.asarray(times)
@@ -326,81 +303,6 @@ def _clock(tracks: _Tracks, joints: int, name: str) -> Floats:
     count = np.floor(span * rate + 1e-3)
     check_size(count + 1.0, joints, name)
     return np.asarray(times[0] + np.arange(count + 1) / rate)
-
-
-def _globals(
-    gltf: Gltf, parents: list[int], joints: list[int], tracks: _Tracks, times: Floats
-) -> tuple[Floats, Floats]:
-    """Return the joints' orientations [T, J, 4] and places [T, J, 3] in the world at `times`."""
-    turns = np.empty((len(times), len(joints), 4))
-    places = np.empty((len(times), len(joints), 3))
-    number = {node: i for i, node in enumerate(joints)}
-    frames: dict[int, tuple[Floats, Floats, Floats]] = {-1: (np.zeros((1, 3)), rot.IDENTITY[None], np.ones((1, 3)))}
-    for node in _lineage(parents, joints):
-        try:
-            local = to_trs(gltf.document.nodes[node])
-        except ValueError as error:
-            raise gltf.fault(f"node {node}: {error}") from error
-        moved = [
-            tracks[node, path].at(times) if (node, path) in tracks else value[None]
-            for path, value in zip(_KINDS, local, strict=True)
-        ]
-        place, turn, scale = frames[parents[node]]
-        least = np.prod(moved[2], axis=-1).min()
-        if not least > _LEAST_SCALE:
-            raise gltf.fault(f"node {node} has a scale that mirrors it, or leaves nothing of it")
-        frames[node] = (
-            place + rot.mul_vec(turn, scale * moved[0]),
-            rot.mul(turn, moved[1]),
-            scale * moved[2],
-        )
-        if node in number:
-            places[:, number[node]], turns[:, number[node]] = frames[node][:2]
-    return rot.normalise(turns), places
-
-
-def _rest(gltf: Gltf, parents: list[int], joints: list[int]) -> tuple[Floats, Floats]:
-    """Return the joints' orientations [J, 4] and places [J, 3] at rest, in the world."""
-    turns, places = _globals(gltf, parents, joints, {}, np.zeros(1))
-    turns, places = turns[0], places[0]
-    bound: dict[int, tuple[Floats, Floats]] = {}
-    for skin in gltf.document.skins:
-        if skin.inverse_bind_matrices is None:
-            continue
-        for node, numbers in zip(skin.joints, gltf.numbers(skin.inverse_bind_matrices, "MAT4", "skin"), strict=False):
-            if node in joints:
-                place, turn, scale = from_matrix(numbers)
-                bound[joints.index(node)] = -rot.mul_vec(rot.inv(turn), place / scale), rot.inv(turn)
-    known = sorted(bound)
-    if len(known) < len(joints) - 1:
-        return turns, places
-    to_world = rot.mul_inv(turns[known], np.array([bound[i][1] for i in known]))
-    if np.all(rot.angle(to_world, to_world[:1]) < _SAME_POSE):  # the nodes stand as they were bound
-        return turns, places
-    there = np.array([bound[i][0] for i in known])
-    above = [known.index(i) if (i := joints.index(parents[joints[one]])) in bound else -1 for one in known[1:]]
-    pairs = [(i + 1, parent) for i, parent in enumerate(above) if parent >= 0]
-    ours = sum(np.linalg.norm(places[known[i]] - places[known[j]]) for i, j in pairs)
-    theirs = sum(np.linalg.norm(there[i] - there[j]) for i, j in pairs)
-    turns, places = turns.copy(), places.copy()
-    turns[known] = [bound[i][1] for i in known]
-    places[known] = there * (ours / theirs if theirs > 0.0 else 1.0)
-    return turns, places
-
-
-def _heading(gltf: Gltf, parents: list[int], top: int) -> Floats:
-    """Return the turn [4] of what the body hangs from, which is none of its rest pose, if it is about the vertical."""
-    if parents[top] < 0:
-        return rot.IDENTITY
-    turn = _globals(gltf, parents, [parents[top]], {}, np.zeros(1))[0][0, 0]
-    heading = rot.about_vertical(rot.heading(turn))
-    return heading if rot.angle(turn, heading) < _SAME_POSE else rot.IDENTITY
-
-
-def _skeleton(name: str, names: tuple[str, ...], parents: list[int], rest: Floats) -> Skeleton:
-    """Return the skeleton of places [J, 3] at rest."""
-    offsets = rest - rest[[max(parent, 0) for parent in parents]]
-    return Skeleton(name, names, tuple(parents), offsets, np.zeros_like(offsets))
 
 
 def _placed(skeleton: Skeleton, turned: Floats, places: Floats) -> NormalisedRig:

@@ -56,12 +56,12 @@ def lossy_fields(motion: Motion, path: FilePath, source: FilePath | None = None)
         lossy += ["the variation's original, alternatives and decisions"] * holds_variation(source)
     if suffix == ".json":
         return lossy
-    if suffix == ".txt":
-        if len(motion) > 1:
-            lossy.append("times")
-        lossy.append("where the body is")
+    if suffix == ".txt" and not motion.is_even:
+        lossy.append("times")
     elif abs(motion.times[0]) > _TINY:
         lossy.append(f"the time when it begins, {motion.times[0]:.6g} s")
+    if suffix == ".txt":
+        lossy.append("where the body is")
     if suffix != ".glb":
         lossy += _lossy_marks(motion)
     return lossy + _lossy_body(motion, suffix)

@@ -8,8 +8,9 @@ holds numpy arrays; those of movement are
     trans            [T, 3]    the body's place, metres
     mocap_framerate  []        frames per second; mocap_frame_rate in SMPL-X files
 
-The world is z up. At rest SMPL stands in a T-pose, y up, facing +z, and all its joints' axes are the world's, like
-human23's. So rotations are copied unchanged, and only the root's is turned upright.
+The world is z up; y in files of some programs, which people who stand along y show. At rest SMPL stands in a T-pose, y
+up, facing +z, and all its joints' axes are the world's, like human23's. So rotations are copied unchanged, and only the
+root's is turned upright.
 
 SMPL's joint positions are not in the file: they follow from `betas` and `gender` by the body model, whose licence
 forbids bundling it. Files are read onto joints placed as in human44, so soles may be some centimetres off the floor.
@@ -22,6 +23,7 @@ from __future__ import annotations
 import io
 import logging
 import math
+import warnings
 import zipfile
 from typing import IO, Any
 
@@ -31,12 +33,14 @@ from numpy.typing import NDArray
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
 from motionmind.body.rates import FASTEST, MOST_PLACES
-from motionmind.errors import FormatError, MotionMindError
+from motionmind.body.skeleton import Skeleton
+from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.files import FilePath, name_of, read_bytes, write_atomically
 from motionmind.formats._clock import even_step
 from motionmind.formats._smpl import smpl_bodies, to_smpl
 from motionmind.formats.text import LARGEST
 from motionmind.geometry import rotations as rot
+from motionmind.retarget.vertical import find_vertical
 
 _RATES = ("mocap_framerate", "mocap_frame_rate")
 
@@ -48,10 +52,12 @@ _LARGEST_ARRAY = 2**30
 # From a world with z up, where a body faces -y, to ours, where it faces +z.
 _UPRIGHT = rot.from_axis_angle([1.0, 0.0, 0.0], -np.pi / 2)
 
+_TURNS = 20.0  # radians, in the median frame, by which no joint is turned
+
 _log = logging.getLogger(__name__)
 
 
-def read_npz(path: FilePath, *, fps: float | None = None) -> Motion:
+def read_npz(path: FilePath, *, fps: float | None = None, up: str | None = None) -> Motion:
     """Read a motion from an AMASS file, on SMPL's joints, placed as in human44.
 
     `to_human23` knows these joints; `write_npz` writes the same orientations and places again. A log entry says that
@@ -60,12 +66,16 @@ def read_npz(path: FilePath, *, fps: float | None = None) -> Motion:
     Args:
         path: the file; its stem becomes the motion's name.
         fps: frames per second in place of the file's.
+        up: "y" or "z", the vertical in the file; None takes z, unless the movement stands along y.
 
     Returns:
         The motion, in metres and seconds, y up.
 
     Raises:
         FormatError: the file does not exist, or is not an AMASS file; the message names the array.
+
+    Warns:
+        MotionMindWarning: it is doubtful which axis is up.
     """
     arrays = _read_arrays(path)
     for needed in ("poses", "trans"):
@@ -80,10 +90,15 @@ def read_npz(path: FilePath, *, fps: float | None = None) -> Motion:
         raise FormatError(f"'trans' has the shape {list(trans.shape)}, not [{len(poses)}, 3] as 'poses' has", path=path)
     rate = _rate(arrays, fps, path)
     _log.info("%s: joints stand where human44's do; the file's body shape (betas) is not read", path)
-    rotations = rot.exp(poses.reshape(len(poses), -1, 3))
-    rotations[:, 0] = rot.mul(_UPRIGHT, rotations[:, 0])
+    vectors = poses.reshape(len(poses), -1, 3)
+    if (longest := float(np.median(rot.norm(vectors).max(axis=1)))) > _TURNS:
+        raise FormatError(f"'poses' turns by {longest:.3g} radians: are these degrees?", path=path)
+    rotations = rot.exp(vectors)
+    if (up or _vertical(skeleton, rotations, trans, path)) == "z":
+        rotations[:, 0] = rot.mul(_UPRIGHT, rotations[:, 0])
+        trans = rot.mul_vec(_UPRIGHT, trans)
     times = np.arange(len(poses), dtype=np.float64) / rate
-    return Motion(skeleton, rot.normalise(rotations), rot.mul_vec(_UPRIGHT, trans), times, name=name_of(path))
+    return Motion(skeleton, rot.normalise(rotations), trans, times, name=name_of(path))
 
 
 def write_npz(path: FilePath, motion: Motion) -> None:
@@ -179,6 +194,22 @@ def checked_numbers(array: NDArray[np.generic], what: str, path: FilePath) -> Fl
         value = numbers[tuple(bad[0])]
         raise FormatError(f"{what}{bad[0].tolist()} is {value:g}, not a place or an angle", path=path)
     return numbers
+
+
+def _vertical(skeleton: Skeleton, rotations: Floats, root: Floats, path: FilePath) -> str:
+    """Return the axis that is up in a file of rotations [T, J, 4] and places of the root [T, 3], metres: "y" or "z"."""
+    trunk = rot.mul_vec(rotations[:, 0], np.array([0.0, 1.0, 0.0]))
+    axis, doubt = find_vertical(
+        lambda some: skeleton.positions_and_tips(rotations[some], root[some]),
+        trunk,
+        usual="z",
+        height=skeleton.height,
+        is_stated=True,
+    )
+    if doubt:
+        message = f"{path}: taken with {axis} up, which is doubtful: {doubt}"
+        warnings.warn(message, MotionMindWarning, stacklevel=4)
+    return axis
 
 
 def _rate(arrays: dict[str, Floats], fps: float | None, path: FilePath) -> float:

@@ -12,7 +12,10 @@ its listing; this is our reading:
     pelvis 0.37187 0 0 0.92823 left_hip 0 0 0 1 ...
 
 In both, names are written with blanks, underscores or hyphens, in either case, and # begins a comment. There are no
-times and no places: postures come at an even rate, and the body stands on the floor at the origin.
+times and no places: postures come at an even rate, and the body stands on the floor at the origin. The papers have no
+rate; a comment before the first posture states it, if it is not one a second:
+
+    # 30 postures a second
 """
 
 from __future__ import annotations
@@ -27,6 +30,7 @@ import numpy as np
 from motionmind._typing import Floats, Indices
 from motionmind.body.human import BODIES
 from motionmind.body.motion import Motion
+from motionmind.body.rates import FASTEST
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath, name_of, write_atomically
@@ -39,6 +43,7 @@ _NUMBER = re.compile(r"[+-]?(\.?[0-9]|(inf|infinity|nan)\b)", re.IGNORECASE)
 # Numbers printed with five digits, as in the papers, are off unit length by about 1e-5; only more needs a warning.
 _PRINTED_TOLERANCE = 1e-3
 _WRITTEN_TOLERANCE = 1e-9
+_RATE = re.compile(r"\s*#\s*([0-9.]+(?:e[+-]?[0-9]+)?) postures a second\s*", re.IGNORECASE)
 
 # One joint of a posture in the file: its name, the four words that should be numbers, and their line.
 _Entry = tuple[str, list[str], int]
@@ -46,7 +51,7 @@ _Entry = tuple[str, list[str], int]
 Form = Literal["braces", "lines"]
 
 
-def read_papers(path: FilePath, *, skeleton: Skeleton | None = None, rate: float = 1.0) -> Motion:
+def read_papers(path: FilePath, *, skeleton: Skeleton | None = None, rate: float | None = None) -> Motion:
     """Read a motion from a file in the papers' notation, in either form.
 
     Joints that the file never names stay at rest, with a warning (the papers' bodies had no fingers or toes). A joint
@@ -56,7 +61,7 @@ def read_papers(path: FilePath, *, skeleton: Skeleton | None = None, rate: float
     Args:
         path: the file; its stem becomes the motion's name.
         skeleton: the body whose joints are named; None takes human23, or human44 if it has more of the named joints.
-        rate: postures per second.
+        rate: postures per second; None takes what a comment before the first posture says, or 1.
 
     Returns:
         The motion, in metres and seconds.
@@ -67,9 +72,11 @@ def read_papers(path: FilePath, *, skeleton: Skeleton | None = None, rate: float
     Warns:
         MotionMindWarning: joints stay at rest, or a quaternion's length was off by more than 1e-3.
     """
-    if not (np.isfinite(rate) and rate > 0.0):
+    if rate is not None and not (np.isfinite(rate) and rate > 0.0):
         raise MotionMindError(f"a rate must be a positive number of postures a second, not {rate}")
-    lines = [line.split("#")[0] for line in read_lines(path)]
+    written = read_lines(path)
+    rate = _stated_rate(written, path) if rate is None else rate
+    lines = [line.split("#")[0] for line in written]
     braces = any("{" in line or "}" in line for line in lines)
     postures = list(_split_braces(lines, path) if braces else _split_lines(lines, path))
     if not postures:
@@ -82,9 +89,9 @@ def read_papers(path: FilePath, *, skeleton: Skeleton | None = None, rate: float
 
 
 def write_papers(path: FilePath, motion: Motion, *, form: Form = "braces") -> None:
-    """Write the rotations of `motion` in the papers' notation; root and times are lost.
+    """Write the rotations of `motion` in the papers' notation; the root is lost, and times if they are not even.
 
-    Read back, rotations agree to 1e-9.
+    Read back, rotations agree to 1e-9. A comment states the rate, if it is even and not one posture a second.
 
     Args:
         path: the file to write.
@@ -95,7 +102,8 @@ def write_papers(path: FilePath, motion: Motion, *, form: Form = "braces") -> No
         MotionMindError: the notation cannot hold a joint's name, or the file cannot be written.
     """
     names = [_name_as_written(name, motion.skeleton, form) for name in motion.skeleton.names]
-    lines = []
+    is_told = len(motion) > 1 and motion.is_even and abs(motion.fps - 1.0) > _WRITTEN_TOLERANCE
+    lines = [f"# {motion.fps:.9g} postures a second"] * is_told
     for rotation in np.asarray(np.round(motion.rotations, 10) + 0.0).tolist():
         numbers = [[f"{value:.10f}".rstrip("0").rstrip(".") for value in quaternion] for quaternion in rotation]
         if form == "braces":
@@ -123,6 +131,20 @@ def _key(name: str) -> str:
 
 
 # --- reading -------------------------------------------------------------------------------------------------------
+
+
+def _stated_rate(lines: list[str], path: FilePath) -> float:
+    """Return the postures a second that a comment before the first posture states; 1 if none does."""
+    for number, line in enumerate(lines, start=1):
+        if line.split("#")[0].strip():
+            break
+        if match := _RATE.fullmatch(line):
+            (rate,) = to_numbers([match[1]], path, number)
+            if not 0.0 < rate <= FASTEST:
+                message = f"{match[1]} postures a second: more than 0 are wanted, and {FASTEST:g} at most"
+                raise FormatError(message, path=path, line=number)
+            return rate
+    return 1.0
 
 
 def _split_braces(lines: list[str], path: FilePath) -> Iterator[list[_Entry]]:

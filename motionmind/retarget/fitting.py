@@ -123,6 +123,18 @@ def fit_human23(movement: Motion | Posture, joints: Mapping[str, str] | None) ->
     return _fit(sources, alignment, sources, () if has_frames else _find_chest(sources))
 
 
+def zero_pose_rests(skeleton: Skeleton) -> bool | None:
+    """Return whether a person's skeleton stands at rest with all rotations 0; None if its joints are no known rig's."""
+    known = known_rig(skeleton)
+    if known is None:
+        return None
+    try:
+        sources = _find_sources(skeleton, known[1])
+    except SkeletonError:  # whoever takes it onto human23 is told
+        return None
+    return stands([sources.place(name) for name in human23().names])
+
+
 @lru_cache(_SHAPES)
 def _align_shape(shape: _Shape, given: tuple[tuple[str, str], ...] | None) -> tuple[_Sources, Floats | None, bool]:
     """Return the sources of human23's joints, their alignments [23, 4], and whether these are of the rig's table.

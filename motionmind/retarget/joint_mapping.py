@@ -9,11 +9,11 @@ from functools import lru_cache
 from pathlib import Path
 
 from motionmind.arguments import check_path
-from motionmind.body.human import human23
+from motionmind.body.human import BODIES, human23
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, SkeletonError, enumerated
 from motionmind.files import parse_toml, read_bytes
-from motionmind.retarget.rigs import RIGS, Rig, plain_names, spine_shares
+from motionmind.retarget.rigs import RIGS, Rig, plain_names, spine_shares, without_endings
 
 # A skeleton must have one joint of each tuple; any other joint of human23 moves with its parent.
 _ESSENTIAL = (
@@ -118,11 +118,12 @@ def known_rig(skeleton: Skeleton) -> tuple[Rig, dict[str, str]] | None:
 @lru_cache(_TREES)
 def _known_tree(names: tuple[str, ...], parents: tuple[int, ...]) -> tuple[Rig, dict[str, str]] | None:
     """Recognise a rig as `known_rig`, of joints with these parents; all files of a collection have the same."""
-    plain = plain_names(names)
-    for rig in RIGS:
-        mapping = _map_by_names(rig, plain, parents)
-        if rig.marks <= set(plain) and not _missing(mapping.values()):
-            return rig, {names[i]: mapping[i] for i in sorted(mapping)}
+    for some in (names, without_endings(names)):
+        plain = plain_names(some) if some else []
+        for rig in (one for one in RIGS if some is names or (some and one.name not in BODIES)):
+            mapping = _map_by_names(rig, plain, parents)
+            if rig.marks <= set(plain) and not _missing(mapping.values()):
+                return rig, {names[i]: mapping[i] for i in sorted(mapping)}
     return None
 
 

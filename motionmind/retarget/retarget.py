@@ -17,11 +17,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.arguments import check_mapping, check_text, check_type
+from motionmind.arguments import check_mapping, check_type
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import MotionMindError, MotionMindWarning, enumerated
+from motionmind.errors import MotionMindWarning, enumerated
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.fitting import Fit, fit_human23, unit
 from motionmind.retarget.joint_mapping import (
@@ -31,6 +31,7 @@ from motionmind.retarget.joint_mapping import (
     read_joint_mapping,
 )
 from motionmind.retarget.rigs import plain_names
+from motionmind.retarget.vertical import Z_UP, Vertical, check_up, find_vertical
 
 __all__ = ["filled_joints", "joint_mapping", "read_joint_mapping", "to_human23"]
 
@@ -38,10 +39,6 @@ Movement = TypeVar("Movement", Motion, Posture)
 
 _STANDS = 0.7  # cosine between the trunk and the vertical of a body that stands
 _POINTS = 0.01  # metres of a bone below which it points nowhere
-_AT_FLOOR = 0.15  # share of a body's height by which the lowest point of one that stands may be off the floor
-
-# From z up to y up: z becomes y, and a body that faced -y faces +z.
-_Z_UP = rot.from_axis_angle([1.0, 0.0, 0.0], -np.pi / 2)
 
 
 def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, up: str | None = None) -> Movement:
@@ -58,15 +55,16 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
     Args:
         movement: a motion or posture on the file's own skeleton.
         joints: {file's joint: human23's joint} as for `joint_mapping`; None recognises the rig by its names.
-        up: "y" or "z", the vertical in the file. None takes z if the zero pose stands along z, unless the movement
-            itself stands along y; and if the movement stands along z on a floor at 0. Otherwise it takes y.
+        up: "y" or "z", the vertical in the file. None takes the one that the zero pose stands along, unless the
+            movement stands along the other, by where its feet stay (`motionmind.retarget.vertical`).
 
     Returns:
         The movement on human23, y up, in metres.
 
     Raises:
         SkeletonError: the skeleton does not map to human23, or its zero pose does not show how the body stands.
-        MotionMindWarning: the zero pose does not stand, and the movement does not show how limbs are turned.
+        MotionMindWarning: the zero pose does not stand, and the movement does not show how limbs are turned; or nothing
+            shows whether people stand or lie.
         MotionMindError: `up` is neither "y" nor "z".
 
     >>> import numpy as np
@@ -77,9 +75,7 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
     """
     check_type("movement", movement, Motion, Posture)
     check_mapping("joints", joints, or_none=True)
-    check_text("up", up, or_none=True)
-    if up not in (None, "y", "z"):
-        raise MotionMindError(f'up must be "y" or "z", not {up!r}')
+    check_up(up)
     if (
         joints is None
         and up != "z"
@@ -95,7 +91,12 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
         mapping = joint_mapping(movement.skeleton, joints) or {}
         renamed["insertions"] = tuple(one.renamed(mapping) for one in movement.insertions)
     turned = movement.skeleton.global_rotations(movement.rotations)[..., fit.turns, :]
-    upright = _Z_UP if (up or _vertical(fit, movement, turned[..., 0, :])) == "z" else rot.IDENTITY
+    vertical = Vertical(up) if up else _vertical(fit, movement, turned[..., 0, :])
+    if vertical.doubt:
+        name = (movement.name if isinstance(movement, Motion) else "") or movement.skeleton.name
+        message = f"{name}: taken with {vertical.axis} up, which is doubtful: {vertical.doubt}"
+        warnings.warn(message, MotionMindWarning, stacklevel=2)
+    upright = Z_UP if vertical.axis == "z" else rot.IDENTITY
     turned = rot.mul(rot.mul(upright, turned), fit.alignment)
     root = movement.root
     if fit.pelvis > 0 or fit.chest:
@@ -138,12 +139,13 @@ def from_human23(motion: Motion, like: Posture, joints: Mapping[str, str] | None
     return replace(motion, skeleton=rig, rotations=rotations, root=root, insertions=())
 
 
-def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None) -> Movement:
+def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None, *, up: str | None = None) -> Movement:
     """Retarget movement to human23 if its joints map there; return it unchanged otherwise.
 
     Args:
         movement: a motion or posture.
         joints: {file's joint: human23's joint} as for `joint_mapping`; None recognises the rig by its names.
+        up: as `to_human23`; of a rig that stays on its own skeleton, nothing is turned.
 
     Returns:
         The movement on human23 or on its own skeleton. On human44, which has joints that human23 lacks, it stays
@@ -162,9 +164,9 @@ def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None) ->
     check_type("movement", movement, Motion, Posture)
     check_mapping("joints", joints, or_none=True)
     if joints is None and is_human44(movement.skeleton):
-        return _turned_up(movement) if _lies(movement.skeleton) else movement
+        return _turned_up(movement, up) if _lies(movement.skeleton) else movement
     known = joint_mapping(movement.skeleton) is not None
-    return to_human23(movement, joints) if known or joints is not None else movement
+    return to_human23(movement, joints, up=up) if known or joints is not None else movement
 
 
 def _aim_lumbar(fit: Fit, turned: Floats, places: Floats) -> Floats:
@@ -197,19 +199,18 @@ def _describe_unclear(name: str, joints: Sequence[str]) -> str:
     )
 
 
-def _vertical(fit: Fit, movement: Motion | Posture, turned: Floats) -> str:
-    """Return "z" if the zero pose or the movement stands along z, as `to_human23` says, else "y".
+def _vertical(fit: Fit, movement: Motion | Posture, turned: Floats) -> Vertical:
+    """Find which axis is up in a file, given the orientations [..., 4] of its pelvis's source in the world."""
+    body = movement.skeleton
+    rotations, root = movement.rotations.reshape(-1, len(body), 4), movement.root.reshape(-1, 3)
+    joints = np.unique(fit.turns)
 
-    The pelvis's source is `turned` [..., 4] in the world.
-    """
-    mean = rot.mul_vec(turned, fit.up).reshape(-1, 3).mean(axis=0)
-    if fit.stands and fit.up[2] >= _STANDS:
-        return "y" if mean[1] > 0.5 and mean[1] > mean[2] else "z"
-    if mean[2] < _STANDS:
-        return "y"
-    # A body that lies on its back has its lowest point along z wherever the room begins.
-    lowest = np.median(movement.skeleton.positions_and_tips(movement.rotations, movement.root)[..., 2].min(axis=-1))
-    return "z" if abs(lowest) < _AT_FLOOR * fit.skeleton.height else "y"
+    def points(some: slice) -> Floats:
+        return body.positions_and_tips(rotations[some], root[some])[:, np.concatenate([joints, joints + len(body)])]
+
+    usual = "z" if fit.stands and fit.up[2] >= _STANDS else "y"
+    trunk = rot.mul_vec(turned, fit.up).reshape(-1, 3)
+    return find_vertical(points, trunk, usual=usual, height=fit.skeleton.height)
 
 
 def _lies(skeleton: Skeleton) -> bool:
@@ -220,9 +221,13 @@ def _lies(skeleton: Skeleton) -> bool:
     return bool(up[2] >= _STANDS)
 
 
-def _turned_up(movement: Movement) -> Movement:
-    """Return movement with z up, zero pose and all, with y up."""
+def _turned_up(movement: Movement, up: str | None) -> Movement:
+    """Return movement whose zero pose stands along z with one that stands along y; `up` is its vertical, None for z."""
     body = movement.skeleton
-    skeleton = replace(body, offsets=rot.mul_vec(_Z_UP, body.offsets), tips=rot.mul_vec(_Z_UP, body.tips))
-    rotations = rot.mul_inv(rot.mul(_Z_UP, movement.rotations), _Z_UP)
-    return replace(movement, skeleton=skeleton, rotations=rotations, root=rot.mul_vec(_Z_UP, movement.root))
+    skeleton = replace(body, offsets=rot.mul_vec(Z_UP, body.offsets), tips=rot.mul_vec(Z_UP, body.tips))
+    rotations = rot.mul_inv(rot.mul(Z_UP, movement.rotations), Z_UP)
+    root = rot.mul_vec(Z_UP, movement.root)
+    if up == "y":
+        rotations[..., 0, :] = rot.inv_mul(Z_UP, rotations[..., 0, :])
+        root = movement.root
+    return replace(movement, skeleton=skeleton, rotations=rotations, root=root)

@@ -25,6 +25,8 @@ from motionmind._typing import Floats
 from motionmind.body.human import human23, human44
 from motionmind.geometry import rotations as rot
 
+_MOST = 0.8  # share of a file's joints whose names end in numbers, if these tell its nodes apart
+
 
 @dataclass(frozen=True, eq=False)
 class Rig:
@@ -63,6 +65,24 @@ def plain_names(names: Sequence[str]) -> list[str]:
     if not prefix and len(bare) > 1 and all(re.match(re.escape(bare[0]) + "[^A-Za-z0-9]", name) for name in bare[1:]):
         prefix = bare[1][: len(bare[0]) + 1]  # "Bip01", "Bip01 Pelvis", "Bip01 Spine"
     return [re.sub(r"[^a-z0-9]", "", name.removeprefix(prefix).lower()) for name in bare]
+
+
+def without_endings(names: Sequence[str]) -> list[str] | None:
+    """Return names without an ending that all have ("Hips_jnt"), or a number that most end in ("Hips_01, Head_05").
+
+    Exporters add these, so that names are unique in a scene. None if there is none, or names are then alike.
+
+    >>> without_endings(["Hips_01", "Spine_02", "Head_03"])
+    ['Hips', 'Spine', 'Head']
+    """
+    last = re.search(r"[^A-Za-z0-9][A-Za-z0-9]*$", names[0])
+    if last and all(name.endswith(last[0]) for name in names):
+        bare = [name.removesuffix(last[0]) for name in names]
+    else:
+        bare = [re.sub(r"[^A-Za-z0-9]\d+$", "", name) for name in names]
+        if sum(map(str.__ne__, bare, names)) <= _MOST * len(names):
+            return None
+    return bare if len({*bare}) == len(bare) else None
 
 
 def spine_shares(chain: Sequence[str]) -> dict[str, str]:
@@ -401,7 +421,13 @@ _OPTITRACK = {"hip": "pelvis", "neck": "cervical", "head": "atlantal"} | _both_s
     }
 )
 
-_BIPED = {"pelvis": "pelvis", "neck": "cervical", "neck1": "cervical", "head": "atlantal"} | _both_sides(
+_BIPED = {
+    "pelvis": "pelvis",
+    "neck": "cervical",
+    "neck1": "cervical",
+    "head": "atlantal",
+    "head1": "atlantal",
+} | _both_sides(
     {
         "{s}thigh": "hip",
         "{s}calf": "knee",

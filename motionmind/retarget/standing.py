@@ -1,7 +1,8 @@
 """Finds how human23's axes lie in a rig whose zero pose does not stand, from its movement.
 
 Rigs of MotionBuilder, Maya and others lay every joint's own axis along its bone: with all rotations 0 the body is a
-straight line, which does not tell how its joints are turned. Movement does, in each joint's own frame:
+straight line, which does not tell how its joints are turned. Nor does a zero pose that is taken from a movement, such
+as a frame of it. Movement does, in each joint's own frame:
 
 - a bone points where the next joint is, and a pelvis or a chest has hips or arms at its sides;
 - limbs turn about their bones as the hinges of knees and elbows say: knees bend backwards, elbows forwards;
@@ -11,7 +12,7 @@ straight line, which does not tell how its joints are turned. Movement does, in 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -27,6 +28,7 @@ from motionmind.retarget.joint_mapping import in_a_row
 _FRAMES = 500  # that are looked at, at most
 _SAME_PLACE = 1e-6  # metres below which two joints coincide
 _SPREAD = np.cos(np.radians(60.0))  # legs that stand are no further from the vertical
+_UNEVEN = 0.05  # share of a body's reach by which its sides differ at rest; 0.03 in recordings
 _LEANS = np.cos(np.radians(25.0))  # an axis of a joint that is no further from the trunk is along it
 _BENDS = 0.05  # the mean sine of a hinge's bend above which its axis can be seen
 _STEADY = 0.7  # the share of its bends that go one way
@@ -46,7 +48,9 @@ _HINGES = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
 
 
 def stands(places: Sequence[Floats | None]) -> bool:
-    """Return whether a body stands upright: its legs below it, its head above, hips and shoulders facing one way.
+    """Return whether a body stands at rest: its legs below it, its head above, hips and shoulders facing one way.
+
+    Its left side is then the mirror image of its right one, as in no frame of most movement.
 
     Args:
         places: for each joint of human23 its place [3], metres; None for one that a rig lacks.
@@ -63,7 +67,21 @@ def stands(places: Sequence[Floats | None]) -> bool:
     if any(up @ (of[joint] - middle) <= 0.0 for joint in ("cervical", "atlantal") if joint in of):
         return False
     bones = [of[f"{side}_{joint}"] - of[f"{side}_hip"] for side in _SIDES for joint in ("knee", "ankle")]
-    return all(up @ _unit(bone) <= -_SPREAD for bone in bones)
+    return all(up @ _unit(bone) <= -_SPREAD for bone in bones) and _is_even(of, middle, _unit(lines[0]))
+
+
+def _is_even(places: Mapping[str, Floats], middle: Floats, left: Floats) -> bool:
+    """Return whether limbs are mirror images in the plane through `middle` [3] that the direction `left` [3] is across.
+
+    Args:
+        places: the place [3] of each joint of human23 that a rig has, metres.
+        middle: between the hips [3], metres.
+        left: from the right hip to the left one.
+    """
+    pairs = [[f"{side}_{joint}" for side in _SIDES] for limb in _HINGES for joint in limb]
+    ends = np.array([[places[joint] for joint in pair] for pair in pairs if places.keys() >= {*pair}]) - middle
+    image = ends[:, 0] - 2.0 * (ends[:, 0] @ left)[:, None] * left
+    return float(rot.norm(image - ends[:, 1]).max()) <= _UNEVEN * float(rot.norm(ends).max())
 
 
 @dataclass(frozen=True, eq=False)

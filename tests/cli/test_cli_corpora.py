@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bundled_clips import ballet_clip
 from cli_files import FIFTH, PLIE, built, clip, files_under
 from command_line import Run
 
@@ -112,6 +113,31 @@ def test_the_clock_of_a_file_can_be_set_right(run: Run, suffix: str) -> None:
     late, right = read_motion(f"late{suffix}"), read_motion("right.json")
     np.testing.assert_allclose(right.times, late.times / 2.0, atol=1e-9)
     assert len(right) == len(late)
+
+
+@pytest.mark.parametrize("suffix", [".bvh", ".npz"])
+def test_which_axis_is_up_can_be_said(run: Run, suffix: str) -> None:
+    write_motion(f"a{suffix}", clip(fps=30.0))
+    up = read_motion(f"a{suffix}").root
+    said, other = ("z", "y") if suffix == ".bvh" else ("y", "z")
+    assert run("convert", f"a{suffix}", "said.json", "--up", said, "--skeleton", "human23").code == 0
+    turned = up[:, [0, 2, 1]] * ([1.0, 1.0, -1.0] if said == "z" else [1.0, -1.0, 1.0])
+    np.testing.assert_allclose(read_motion("said.json").root, turned, atol=1e-6)
+    assert run("corpus", "build", "mine", f"a{suffix}", "--up", other).code == 0
+    ran = run("convert", f"a{suffix}", "x.json", "--up", "x")
+    assert ran.code == 2
+    assert "'x' is not one of 'y', 'z'" in ran.err
+
+
+def test_what_is_wrong_with_a_recording_is_said_as_it_is_read(run: Run) -> None:
+    film = ballet_clip("adagio").resample(30.0)
+    root = film.root + np.array([0.0, -0.1, 0.0])
+    root[50:53] += [0.0, 0.0, 7.0]
+    write_motion("film.bvh", replace(film, root=root))
+    said = run("convert", "film.bvh", "film.json", "--unit", "cm").err
+    assert "note: film.bvh: 3 frames have the whole body elsewhere, or zeros (frames 50-52)\n" in said
+    assert re.search(r"note: film.bvh: its feet stand 1\d cm under 0, where the floor is\n", said)
+    assert "seems to play" not in said
 
 
 def test_flips_are_repaired_kept_or_dropped(run: Run) -> None:

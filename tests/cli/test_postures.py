@@ -95,9 +95,9 @@ def test_a_frame_of_every_format_is_the_frame_with_the_movement_around_it(name: 
     b, after = read_end(parse_posture(f"{name}@9~"), None, "after")
     assert before is not None
     assert after is not None
-    around = 0 if name.endswith(".txt") else 6  # 0.2 s; the papers' notation has a posture a second, and one suffices
-    np.testing.assert_array_equal(before.times, whole.times[9 - max(around, 1) : 10])
-    np.testing.assert_array_equal(after.times, whole.times[9 : 10 + max(around, 1)])
+    around = 6  # 0.2 s
+    np.testing.assert_array_equal(before.times, whole.times[9 - around : 10])
+    np.testing.assert_array_equal(after.times, whole.times[9 : 10 + around])
     for posture, neighbour in ((a, before.posture(-1)), (b, after.posture(0))):
         np.testing.assert_array_equal(posture.rotations, whole.rotations[9])
         np.testing.assert_array_equal(neighbour.rotations, whole.rotations[9])

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bundled_clips import ballet_clip
 
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
@@ -14,6 +15,7 @@ from motionmind.corpus.clip import Clip
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.flips import find_flips
 from motionmind.corpus.gather import gather
+from motionmind.corpus.recordings import floor_of
 from motionmind.errors import CorpusError, MotionMindError
 from motionmind.geometry import rotations as rot
 
@@ -80,7 +82,9 @@ def test_recordings_give_5_postures_a_second_and_keyframes_all_of_theirs(caplog:
     np.testing.assert_array_equal(corpus.times[6:37], score.times)
     assert corpus.rate == 5.0
     assert [record.getMessage() for record in caplog.records] == [
-        "corpus arms: 5 postures a second of each recording (--rate, or rate=, for more or fewer)"
+        "corpus arms: 5 postures a second of each recording (--rate, or rate=, for more or fewer)",
+        "corpus arms: stays on the recordings' own 3 joints: the joints of arm do not map to human23: they have the "
+        "names of no known rig (--joints maps them)",
     ]
 
 
@@ -92,7 +96,7 @@ def test_a_posture_that_was_added_before_the_movement_is_noticed(
     posed = np.concatenate([np.tile(rot.from_axis_angle([1.0, 0.0, 0.0], [1.5] * 3), (frames, 1, 1)), plain.rotations])
     times = np.arange(len(posed)) / 60.0
     added = replace(plain, rotations=posed, root=np.tile(plain.root[0], (len(posed), 1)), times=times)
-    said = f"most recordings begin with {words} of another posture (a T-pose?): --skip {frames} (or skip=) drops that"
+    said = f"most recordings begin with {words} of another posture (a T-pose?): built with --skip {frames} "
     for motions, skip, is_said in (
         ([added, added, plain], 0, True),
         ([added, plain], 0, False),
@@ -103,6 +107,26 @@ def test_a_posture_that_was_added_before_the_movement_is_noticed(
         with caplog.at_level("INFO", "motionmind"):
             gather("arms", motions, skip=skip)
         assert (said in caplog.text) is is_said
+
+
+def test_a_posture_that_skipping_leaves_is_noticed(caplog: pytest.LogCaptureFixture) -> None:
+    plain = swing("plain", 121, fps=60.0)
+    posed = np.concatenate([np.tile(rot.from_axis_angle([1.0, 0.0, 0.0], [1.5] * 3), (30, 1, 1)), plain.rotations])
+    added = replace(plain, rotations=posed, root=np.tile(plain.root[0], (151, 1)), times=np.arange(151) / 60.0)
+    with caplog.at_level("INFO", "motionmind"):
+        gather("arms", [added], skip=1)
+    assert "begin with 29 frames of another posture (a T-pose?): built with --skip 30" in caplog.text
+
+
+def test_a_floor_that_is_off_is_told(caplog: pytest.LogCaptureFixture) -> None:
+    film = ballet_clip("adagio").resample(30.0)
+    own = floor_of(film)
+    for height, said in ((0.0, ""), (0.02, ""), (0.045, "film by 4 cm over"), (-0.11, "film by 11 cm under")):
+        caplog.clear()
+        with caplog.at_level("INFO", "motionmind"):
+            gather("mine", [replace(film, name="film", root=film.root + np.array([0.0, height - own, 0.0]))])
+        assert ("feet stand off 0 in 1 of 1 recordings" in caplog.text) is bool(said)
+        assert said in caplog.text
 
 
 def test_keyframes_alone_have_no_rate_and_nothing_is_said(caplog: pytest.LogCaptureFixture) -> None:
@@ -119,7 +143,7 @@ def test_a_rate_that_is_given_is_for_all(rate: float | None, caplog: pytest.LogC
     with caplog.at_level("INFO", "motionmind"):
         corpus = gather("arms", motions, rate=rate)
     assert [len(clip) for clip in corpus.clips] == ([11, 11] if rate else [121, 31])
-    assert (corpus.rate, caplog.records) == (rate, [])
+    assert (corpus.rate, "postures a second" in caplog.text) == (rate, False)
 
 
 def test_a_score_among_recordings_has_no_detail() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import random
+import re
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -674,3 +675,24 @@ def test_any_bytes(tmp_path_factory: pytest.TempPathFactory, data: bytes) -> Non
     path.write_bytes(data)
     with pytest.raises(FormatError):
         read_bvh(path)
+
+
+def test_a_clock_and_angles_that_nobody_means_are_told(tmp_path: Path) -> None:
+    turns = rot.exp(0.3 * np.random.default_rng(0).normal(size=(20, 23, 3)))
+    motion = Motion(human23(), turns, np.zeros((20, 3)), np.arange(20) / 30.0)
+    write_bvh(tmp_path / "a.bvh", motion)
+    text = (tmp_path / "a.bvh").read_text()
+    slow = re.sub(r"Frame Time: .*", "Frame Time: 33.333", text)
+    (tmp_path / "slow.bvh").write_text(slow)
+    with pytest.warns(MotionMindWarning, match=r"slow\.bvh: Frame Time is 33\.333, the seconds from frame to frame"):
+        assert read_bvh(tmp_path / "slow.bvh", unit="cm").fps == pytest.approx(1 / 33.333)
+    head, _, rows = text.partition("Frame Time")
+    lines = [line.split() for line in rows.splitlines()[1:]]
+    turned = [[*row[:3], *(f"{np.radians(float(word)):.6f}" for word in row[3:])] for row in lines]
+    (tmp_path / "radians.bvh").write_text(head + "Frame Time: 0.03\n" + "\n".join(map(" ".join, turned)))
+    with pytest.warns(MotionMindWarning, match=r"no joint turns by more than .* degrees: are its angles in radians\?"):
+        read_bvh(tmp_path / "radians.bvh", unit="cm")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert read_bvh(tmp_path / "slow.bvh", unit="cm", fps=30.0).fps == pytest.approx(30.0)
+        read_bvh(tmp_path / "a.bvh", unit="cm")

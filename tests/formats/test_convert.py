@@ -252,9 +252,10 @@ def test_proportions(suffix: str, tmp_path: Path) -> None:
     assert to_human23(read_motion(tmp_path / f"a.{suffix}")).skeleton == human23()
 
 
-def test_the_papers_know_neither_times_nor_places() -> None:
+def test_the_papers_know_no_places_and_no_uneven_times() -> None:
     motion = moving(human23())
-    assert lossy_fields(motion, "a.txt") == ["times", "where the body is"]
+    assert lossy_fields(motion, "a.txt") == ["where the body is"]
+    assert lossy_fields(replace(motion, times=motion.times**2), "a.txt") == ["times", "where the body is"]
     assert lossy_fields(motion.posture(3).as_motion(), "a.txt") == ["where the body is"]
 
 

@@ -26,6 +26,21 @@ from motionmind.geometry import rotations as rot
 from motionmind.retarget.retarget import own_skeleton, to_human23
 
 RATE = 24.0
+MIXAMO = {"pelvis": "Hips", "lumbar": "Spine", "thorax": "Spine1", "cervical": "Neck", "atlantal": "Head"} | {
+    f"{side}_{joint}": side.title() + name
+    for side in ("left", "right")
+    for joint, name in {
+        "hip": "UpLeg",
+        "knee": "Leg",
+        "ankle": "Foot",
+        "toes": "ToeBase",
+        "clavicle": "Shoulder",
+        "shoulder": "Arm",
+        "elbow": "ForeArm",
+        "wrist": "Hand",
+        "fingers": "HandMiddle1",
+    }.items()
+}
 
 
 def wandering(skeleton: Skeleton, frames: int = 8, seed: int = 0) -> Motion:
@@ -308,6 +323,32 @@ def test_an_armature_without_a_mesh(file: File) -> None:
     same_movement(read_gltf(file.write()), wanted)
 
 
+@pytest.mark.parametrize("along_bones", [False, True])
+def test_nodes_without_a_skin_that_stand_as_in_a_frame(along_bones: bool, file: File) -> None:
+    """As exporters leave them that write no mesh: where no rotations stand at rest, that is the rest pose."""
+    file = File(file.path, ballet_clip("adagio").resample(RATE).slice(30, 150))
+    wanted = read_gltf(file.write())
+    for node in file.json["nodes"]:
+        node["name"] = MIXAMO.get(node["name"], node["name"])
+    if along_bones:
+        reframed(file)
+    del file.json["skins"], file.json["meshes"]
+    file.json["nodes"].pop()
+    file.json["scenes"][0]["nodes"] = [0]
+    for sampler, channel in zip(file.samplers, file.json["animations"][0]["channels"], strict=True):
+        target = file.json["nodes"][channel["target"]["node"]]
+        target[channel["target"]["path"]] = file.array(sampler["output"])[0].tolist()
+    if not along_bones:
+        same_movement(to_human23(read_gltf(file.write())), wanted, atol=1e-5)
+        return
+    with pytest.warns(MotionMindWarning, match="no skin shows its rest pose, and its nodes stand in none"):
+        found = to_human23(read_gltf(file.write()))
+    np.testing.assert_allclose(found.positions(), wanted.positions(), atol=1e-5)
+    legs = [0, *(human23().index(f"{side}_{joint}") for side in ("left", "right") for joint in ("hip", "knee"))]
+    turned, meant = (one.skeleton.global_rotations(one.rotations)[:, legs] for one in (found, wanted))
+    assert np.median(np.degrees(rot.angle(turned, meant)), axis=0).max() < 12.0
+
+
 def test_a_bone_on_the_floor_that_everything_hangs_from(tmp_path: Path) -> None:
     from motionmind.formats.glb import write_glb
 
@@ -372,8 +413,27 @@ def test_a_posture_is_no_animation(tmp_path: Path) -> None:
 
 def test_others_are_named(file: File) -> None:
     file.json["animations"] = [file.json["animations"][0], file.json["animations"][0] | {"name": "wave"}]
-    with pytest.warns(MotionMindWarning, match="the first animation is read, not wave"):
+    with pytest.warns(MotionMindWarning, match="the first animation that moves is read, not wave"):
         read_gltf(file.write())
+
+
+def test_a_pose_before_the_movement_is_not_read(file: File) -> None:
+    wanted = read_gltf(file.write())
+    still = {"input": file.add(np.zeros(1), "SCALAR"), "output": file.add(np.array([[0.0, 0.0, 0.0, 1.0]]), "VEC4")}
+    channels = [{"sampler": 0, "target": {"node": 3, "path": "rotation"}}]
+    file.json["animations"].insert(0, {"name": "T", "samplers": [still], "channels": channels})
+    with pytest.warns(MotionMindWarning, match="the first animation that moves is read, not T"):
+        same_movement(read_gltf(file.write()), wanted)
+
+
+def test_an_animation_for_each_bone_is_one_movement(file: File) -> None:
+    wanted = read_gltf(file.write())
+    (whole,) = file.json["animations"]
+    file.json["animations"] = [
+        {"samplers": [whole["samplers"][one["sampler"]]], "channels": [one | {"sampler": 0}]}
+        for one in whole["channels"]
+    ]
+    same_movement(read_gltf(file.write()), wanted)
 
 
 # --- what cannot be read --------------------------------------------------------------------------------------------

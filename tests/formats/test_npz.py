@@ -99,6 +99,17 @@ def test_who_faces_the_other_way_of_y_faces_ahead(tmp_path: Path) -> None:
     np.testing.assert_allclose(motion.root, [[0.0, 0.9, 0.0], [0.0, 0.9, 1.0], [0.5, 0.9, 1.0]], atol=1e-12)
 
 
+def test_people_who_stand_along_y_are_not_laid_down(tmp_path: Path) -> None:
+    """As programs write it that track people in video; which axis is up can be said, too."""
+    found = arrays(frames=40)
+    found["poses"] *= 0.05
+    found["trans"] = np.linspace([0.0, 0.9, 0.0], [0.5, 0.9, 2.0], 40)
+    motion = read_npz(saved(tmp_path / "a.npz", found))
+    np.testing.assert_allclose(motion.root, found["trans"], atol=1e-9)
+    np.testing.assert_array_equal(motion.root, read_motion(tmp_path / "a.npz", up="y").root)
+    np.testing.assert_allclose(read_motion(tmp_path / "a.npz", up="z").root, y_up(found["trans"]), atol=1e-9)
+
+
 @pytest.mark.parametrize("joints", COUNTS)
 def test_at_rest_every_smpl_is_human23(tmp_path: Path, joints: int) -> None:
     found = arrays(joints, frames=2)
@@ -133,6 +144,13 @@ def test_other_names_and_types_that_files_have(tmp_path: Path) -> None:
     np.testing.assert_array_equal(motion.rotations, expected.rotations)
     np.testing.assert_allclose(motion.root, expected.root, atol=1e-6)
     assert motion.fps == pytest.approx(120.0)
+
+
+def test_degrees_are_refused(tmp_path: Path) -> None:
+    found = arrays()
+    found["poses"] = np.degrees(found["poses"])
+    with pytest.raises(FormatError, match=r"a\.npz: 'poses' turns by \d+ radians: are these degrees\?"):
+        read_npz(saved(tmp_path / "a.npz", found))
 
 
 def test_a_rate_that_is_not_said_must_be_given(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import contextlib
 import random
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -75,6 +76,13 @@ def test_the_rate_is_the_readers(tmp_path: Path) -> None:
             read(tmp_path, BRACES, rate=rate)
 
 
+def test_a_rate_that_a_comment_states(tmp_path: Path) -> None:
+    assert read(tmp_path, "# a dance\n#12.5 postures a second\n" + BRACES).fps == pytest.approx(12.5)
+    assert read(tmp_path, BRACES + "\n# 12.5 postures a second").fps == 1.0
+    with pytest.raises(FormatError, match=r"dance\.txt:1: 0 postures a second: more than 0 are wanted"):
+        read(tmp_path, "# 0 postures a second\n" + BRACES)
+
+
 def test_the_body_stands_on_the_floor(tmp_path: Path) -> None:
     motion = read(tmp_path, BRACES)
     lowest = TOY.positions_and_tips(motion.rotations, motion.root)[..., 1].min(axis=1)
@@ -136,13 +144,16 @@ def test_faults(tmp_path: Path, text: str, message: str) -> None:
 @pytest.mark.parametrize("form", ["braces", "lines"])
 def test_what_is_written_reads_back(tmp_path: Path, form: Form) -> None:
     there = random_motion(human23(), 20, seed=1)
+    there = replace(there, times=there.times / 30.0)
     write_papers(tmp_path / "a.txt", there, form=form)
     text = (tmp_path / "a.txt").read_text()
-    assert len(text.splitlines()) == 20
+    assert text.splitlines()[0] == "# 30 postures a second"
+    assert len(text.splitlines()) == 21
     assert ("left hip," in text) == (form == "braces")
     assert ("left_hip " in text) == (form == "lines")
     back = read_papers(tmp_path / "a.txt")
     assert rot.angle(there.rotations, back.rotations).max() < 1e-9
+    np.testing.assert_allclose(back.times, there.times - there.times[0], atol=1e-9)
     write_papers(tmp_path / "b.txt", back, form=form)
     assert (tmp_path / "b.txt").read_text() == text
 

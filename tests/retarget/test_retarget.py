@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -28,7 +30,8 @@ from motionmind.retarget.retarget import (
     read_joint_mapping,
     to_human23,
 )
-from motionmind.retarget.rigs import RIGS, plain_names, spine_shares
+from motionmind.retarget.rigs import RIGS, plain_names, spine_shares, without_endings
+from motionmind.retarget.vertical import stood_up
 
 BODY = human23()
 SIDES = (("left", 1.0), ("right", -1.0))
@@ -229,6 +232,14 @@ def test_z_up_is_seen_and_can_be_said() -> None:
         to_human23(source, up="x")
 
 
+@pytest.mark.parametrize("ending", ["_jnt", ".001", "#2", "_01", "_{}"])
+def test_endings_that_exporters_add_do_not_count(ending: str) -> None:
+    names = {joint: name + ending.format(i) for i, (joint, name) in enumerate(rig_names("Mixamo").items())}
+    same_movement(to_human23(disguise(dance(), names, spread())), dance())
+    assert without_endings(["Bone_1", "Bone_2"]) is None
+    assert without_endings(["Hips", "Spine_01"]) is None
+
+
 def standing(body: Skeleton = BODY) -> Motion:
     """Movement of a body that stands on a floor at 0."""
     rng = np.random.default_rng(5)
@@ -257,13 +268,54 @@ def test_z_up_in_the_movement_but_not_in_the_zero_pose(rig: str) -> None:
     np.testing.assert_allclose(np.ptp(turned.skeleton.positions(turned.rotations, turned.root)[..., 1]), 1.6, atol=0.2)
 
 
+def test_z_up_in_the_movement_on_a_floor_that_is_not_at_0() -> None:
+    source = disguise(standing(), rig_names("Mixamo"), spread())
+    turned = root_turned(source)
+    for height in (-0.9, 0.4, 2.0):
+        there = replace(turned, root=turned.root + np.array([0.3, 0.1, height]))
+        found = to_human23(there)
+        np.testing.assert_allclose(found.rotations, to_human23(source).rotations, atol=1e-9)
+        np.testing.assert_allclose(
+            found.root - to_human23(source).root, np.tile([0.3, height, -0.1], (12, 1)), atol=1e-9
+        )
+
+
+def lying(limbs: float = 0.3) -> Motion:
+    """On its back, its head along +z, in the middle of a room: its limbs move, and its lowest point is on the floor."""
+    rng = np.random.default_rng(6)
+    turns = rot.exp(limbs * rng.standard_normal((12, 23, 3)))
+    turns[:, 0] = about("x", 90.0)
+    low = BODY.positions_and_tips(turns, np.zeros((12, 3)))[..., 1].min(axis=1)
+    return Motion(BODY, turns, np.stack([0.0 * low, -low, 0.0 * low + 3.0], axis=1), np.arange(12) / 30.0, "rest")
+
+
 def test_a_body_that_lies_is_not_stood_up() -> None:
-    """On its back, its head along +z, in the middle of a room."""
-    source = disguise(root_turned(standing()), rig_names("Mixamo"), spread())
-    lying = Motion(source.skeleton, source.rotations, source.root + np.array([0.0, 0.1, 3.0]), source.times)
-    found = to_human23(lying)
-    np.testing.assert_allclose(found.root, lying.root, atol=1e-9)
-    assert np.ptp(found.skeleton.positions(found.rotations, found.root)[..., 1]) < 1.0
+    source = disguise(lying(), rig_names("Mixamo"), spread())
+    found = to_human23(source)
+    np.testing.assert_allclose(found.root, source.root, atol=1e-9)
+    assert np.ptp(found.positions()[..., 1]) < 1.3
+
+
+def test_who_lies_still_or_stands_is_asked_of_the_user() -> None:
+    """Nothing moves, and it begins at 0 along both axes: who knows."""
+    still = lying(0.0)
+    low = still.skeleton.positions_and_tips(still.rotations, still.root)[..., 2].min()
+    source = disguise(replace(still, root=still.root - [0.0, 0.0, low]), rig_names("Mixamo"), spread())
+    with pytest.warns(MotionMindWarning, match=r"x: taken with z up, which is doubtful: .* \(--up y or --up z does\)"):
+        to_human23(source)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        np.testing.assert_allclose(to_human23(source, up="y").root, source.root, atol=1e-9)
+        np.testing.assert_allclose(own_skeleton(source, up="y").root, source.root, atol=1e-9)
+
+
+def test_people_who_stand_along_x_are_told() -> None:
+    source = disguise(standing(), rig_names("Mixamo"), spread())
+    turn = about("z", -90.0)
+    rotations = source.rotations.copy()
+    rotations[:, 0] = rot.mul(turn, rotations[:, 0])
+    with pytest.warns(MotionMindWarning, match="its people stand along x, which is up in no file that is read"):
+        to_human23(replace(source, rotations=rotations, root=rot.mul_vec(turn, source.root)))
 
 
 @pytest.mark.parametrize("body", [human23(), human44()], ids=["human23", "human44"])
@@ -283,6 +335,9 @@ def test_our_own_bodies_with_z_up_zero_pose_and_all(body: Skeleton, tmp_path: Pa
         assert found.skeleton.height == pytest.approx(body.height, abs=1e-6)
         assert np.max(rot.angle(found.rotations, wanted.rotations)) < 1e-5
         np.testing.assert_allclose(found.root, wanted.root, atol=1e-6)
+    stood = stood_up(source)  # as reading it with z up does
+    assert np.max(rot.angle(own_skeleton(stood, up="y").rotations, wanted.rotations)) < 1e-5
+    np.testing.assert_allclose(own_skeleton(stood, up="y").root, wanted.root, atol=1e-9)
     lying = root_turned(wanted)
     assert own_skeleton(lying) is lying  # what we write has y up
 

@@ -1,0 +1,204 @@
+"""Finds frames that a recording dropped, and fills or leaves out what they leave.
+
+Where a tracker or a network loses frames, files hold something else in their place: the last frame again, zeros, or a
+body elsewhere; or nothing, and the frames after them follow at once. A *gap* is
+
+- *repeated* frames in the midst of movement: after them the body is where it would be, had it gone on meanwhile;
+- frames in which the whole body is *elsewhere*: it leaps there and back again within a frame, faster than any body;
+- a *leap* without a way back, from one frame to the next.
+
+Short gaps are filled by going evenly from the frame before to the frame after, long ones are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats
+from motionmind.body.motion import Motion
+from motionmind.body.rates import FILM_RATE
+from motionmind.corpus.clip import JointRepair
+from motionmind.errors import enumerated
+from motionmind.geometry import rotations as rot
+
+_SAME = 1e-7  # radians on average, and metres, by which a frame that is repeated may be off
+_WINDOW = 8  # frames on either side in which a body's pace is seen
+_GOES_ON = 0.35  # share of that pace that a body has after repeated frames, had it gone on meanwhile
+_MOVES = 0.1  # radians a second on average, and metres: slower bodies are still
+_MANY = 0.1  # share of a recording's frames that are repeated where this is its clock's doing
+_FAST, _TURNS = 12.0, np.radians(750.0)  # metres, and radians a second of all joints on average: no body is as fast
+_ONE = np.radians(45.0)  # of a turn in a frame that count: joints that flip are no whole body
+_FAR = np.radians(20.0)  # on average, and metres: less is noise of a fast camera
+_SHORT = 0.25  # seconds that are filled
+_LONG = 1.0  # seconds for which a body is elsewhere, at most
+
+
+class Gap(NamedTuple):
+    """Frames of a recording from `start` up to, not including, `stop` that it dropped; none at a leap."""
+
+    start: int
+    stop: int
+    kind: Literal["repeated", "elsewhere", "leap"]
+
+
+class Filled(NamedTuple):
+    """A recording whose gaps were filled.
+
+    Attributes:
+        motion: the recording as it is now.
+        repairs: the frames that were filled, by joint.
+        left: the gaps that are too long to be filled, and leaps.
+        report: says how many frames were dropped, and where; "" if none were.
+    """
+
+    motion: Motion
+    repairs: tuple[JointRepair, ...]
+    left: tuple[Gap, ...]
+    report: str
+
+
+def find_gaps(motion: Motion) -> list[Gap]:
+    """Find the frames that a recording dropped, in order of time; none in keyframes.
+
+    >>> import numpy as np
+    >>> from motionmind import Motion, human23
+    >>> at_rest, root = np.tile([0.0, 0.0, 0.0, 1.0], (60, 23, 1)), np.linspace([0, 1, 0], [0, 1, 2], 60)
+    >>> root[30:32] = 0.0
+    >>> find_gaps(Motion(human23(), at_rest, root, np.arange(60) / 30))
+    [Gap(start=30, stop=32, kind='elsewhere')]
+    """
+    if motion.keyframed or len(motion) < 4 or motion.fps < FILM_RATE:
+        return []
+    turned = np.minimum(rot.angle(motion.rotations[:-1], motion.rotations[1:]), _ONE).mean(axis=1)
+    went = rot.norm(np.diff(motion.root, axis=0))
+    seconds = np.diff(motion.times)
+    quick = (went > _FAST * seconds) & (went > _FAR) | (turned > _TURNS * seconds) & (turned > _FAR)
+    leaps = [*_elsewhere(motion, quick)]
+    held = [
+        gap
+        for gap in _repeated(motion, turned + went, seconds)
+        if not any(leap.start <= gap.start and gap.stop <= leap.stop for leap in leaps)
+    ]
+    ends = {gap.stop for gap in held}
+    return sorted([*held, *(leap for leap in leaps if leap.kind != "leap" or leap.start not in ends)])
+
+
+def describe_gaps(motion: Motion, begin: int = 0) -> str:
+    """Say how many frames a recording dropped, and where; "" if none were. `begin` is as of `fill_gaps`."""
+    gaps = [gap for gap in find_gaps(motion) if gap.start > begin]
+    return "; ".join([*_describe(gaps, "", 0), *_describe_leaps(gaps, 0)])
+
+
+def fill_gaps(motion: Motion, begin: int = 0, skipped: int = 0) -> Filled:
+    """Fill the short gaps of a recording, as this module's docstring describes.
+
+    Args:
+        motion: the recording.
+        begin: frames at its start that are none of the movement, such as an added T-pose.
+        skipped: frames of the file before it, which the report counts, too.
+    """
+    gaps = [gap for gap in find_gaps(motion) if gap.start > begin]
+    repeated = sum(gap.stop - gap.start for gap in gaps if gap.kind == "repeated")
+    if repeated > _MANY * len(motion):
+        gaps = [gap for gap in gaps if gap.kind != "repeated"]
+    report = [f"{repeated} of {len(motion)} frames repeat the one before; they stay"] * (repeated > _MANY * len(motion))
+    if not gaps:
+        return Filled(motion, (), (), "".join(report))
+    rotations, root, times = motion.rotations.copy(), motion.root.copy(), motion.times
+    repairs: list[JointRepair] = []
+    left: list[Gap] = []
+    for gap in gaps:
+        before, after = gap.start - 1, gap.stop
+        if gap.kind == "leap" or times[after] - times[before] > _SHORT:
+            left.append(gap)
+            continue
+        inner = slice(gap.start, gap.stop)
+        share = ((times[inner] - times[before]) / (times[after] - times[before]))[:, None]
+        rotations[inner] = rot.normalise(rot.slerp(rotations[before], rotations[after], share))
+        root[inner] = root[before] + share * (root[after] - root[before])
+        at = (float(times[gap.start]), float(times[gap.stop - 1]))
+        repairs += [JointRepair(name, gap.start, gap.stop, at, exact=False) for name in motion.skeleton.names]
+    report += _describe([gap for gap in gaps if gap not in left], ": reconstructed", skipped)
+    report += _describe([gap for gap in left if gap.kind != "leap"], ": left out", skipped)
+    report += [f"{leaps}: cut there" for leaps in _describe_leaps(left, skipped)]
+    return Filled(replace(motion, rotations=rotations, root=root), tuple(repairs), tuple(left), "; ".join(report))
+
+
+def _elsewhere(motion: Motion, quick: Bools) -> Iterator[Gap]:
+    """Yield frames in which the body is elsewhere, and leaps, given in which steps [T - 1] it leaps."""
+    leaps = np.flatnonzero(quick)
+    at = 0
+    while at < len(leaps):
+        start = int(leaps[at]) + 1
+        back = next((n for n in range(at + 1, len(leaps)) if _returns(motion, start - 1, int(leaps[n]) + 1)), None)
+        if back is None:
+            yield Gap(start, start, "leap")
+            at += 1
+        else:
+            yield Gap(start, int(leaps[back]) + 1, "elsewhere")
+            at = back + 1
+
+
+def _returns(motion: Motion, before: int, after: int) -> bool:
+    """Return whether a body may have gone from one frame to another by itself, within a second."""
+    seconds = float(motion.times[after] - motion.times[before])
+    turned = float(rot.angle(motion.rotations[before], motion.rotations[after]).mean())
+    went = float(np.linalg.norm(motion.root[after] - motion.root[before]))
+    return seconds <= _LONG and turned < 0.5 * _TURNS * seconds and went < 0.5 * _FAST * seconds
+
+
+def _repeated(motion: Motion, steps: Floats, seconds: Floats) -> Iterator[Gap]:
+    """Yield frames that are repeated in the midst of movement, which goes on from them, and not back.
+
+    Args:
+        motion: the recording.
+        steps: to each next frame, radians of all joints on average, plus metres of the root [T - 1].
+        seconds: to each next frame [T - 1].
+    """
+    same = steps < _SAME
+    edges = np.diff(np.concatenate([[0], same, [0]]).astype(int))
+    for first, stop in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+        if first == 0 or stop == len(steps):
+            continue  # it begins, or ends, still
+        around = slice(max(first - _WINDOW, 0), stop + 1 + _WINDOW)
+        pace = float(steps[around].sum() / seconds[around].sum())
+        meanwhile = float(seconds[first : stop + 1].sum())
+        goes_on = (
+            steps[stop] > _GOES_ON * pace * meanwhile and _way(motion, int(first) - 1, int(stop) + 1) > steps[stop]
+        )
+        if pace > _MOVES and goes_on:
+            yield Gap(int(first) + 1, int(stop) + 1, "repeated")
+
+
+def _way(motion: Motion, a: int, b: int) -> float:
+    """Return how far a body is from one frame to another, radians of all joints on average, plus metres of the root."""
+    turned = np.minimum(rot.angle(motion.rotations[a], motion.rotations[b]), _ONE).mean()
+    return float(turned) + float(np.linalg.norm(motion.root[b] - motion.root[a]))
+
+
+def _describe(gaps: Sequence[Gap], fate: str, skipped: int) -> list[str]:
+    """Say how many frames of gaps there are, and where; nothing if there are none."""
+    out = []
+    for kind, what in (("repeated", "repeat the one before"), ("elsewhere", "have the whole body elsewhere, or zeros")):
+        some = [gap for gap in gaps if gap.kind == kind]
+        if some:
+            number = sum(gap.stop - gap.start for gap in some)
+            ends = [(gap.start + skipped, gap.stop - 1 + skipped) for gap in some]
+            where = [f"{first}" + f"-{last}" * (last > first) for first, last in ends]
+            frames = f"{number} frames {what}" if number > 1 else f"1 frame {what.replace('have', 'has')}"
+            out.append(f"{frames.replace('1 frame repeat', '1 frame repeats')} ({_frames(where)}){fate}")
+    return out
+
+
+def _describe_leaps(gaps: Sequence[Gap], skipped: int) -> list[str]:
+    """Say where the whole body leaps; nothing if it does not."""
+    leaps = [f"{gap.start + skipped}" for gap in gaps if gap.kind == "leap"]
+    return [f"the whole body leaps before {_frames(leaps)}"] if leaps else []
+
+
+def _frames(where: Sequence[str]) -> str:
+    return f"frame{'s' * (len(where) > 1 or '-' in where[0])} {enumerated(where, 6)}"
