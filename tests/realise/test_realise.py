@@ -28,7 +28,7 @@ from motionmind.realise.detail import GOES_OVER, LIVELIER, MISSES, detail_of, li
 from motionmind.realise.expectation import Expectation
 from motionmind.realise.feet import find_free_feet
 from motionmind.realise.marginals import posterior_marginals
-from motionmind.realise.mean_walk import mean_rotations
+from motionmind.realise.means import mean_rotations
 from motionmind.realise.realise import FIRMLY, LINGERS, realise
 from motionmind.realise.retime import HEADROOM, keep_pace
 from motionmind.realise.root import LEAST, root_trajectory, stand, steps_easily
