@@ -18,9 +18,9 @@ from motionmind._typing import Bools, Floats
 from motionmind.geometry.distances import squared_distance
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.neighbours import LEAVES, build_neighbours
-from motionmind.realise.marginals import posterior_marginals
-from motionmind.realise.sparse import all_of, choose
-from motionmind.realise.walks import squared_distances, variance_at_ends
+from motionmind.walks.likelihood import squared_distances, variance_at_ends
+from motionmind.walks.marginals import posterior_marginals
+from motionmind.walks.sparse import all_of, choose
 
 STEPS = 12  # half steps of a walk
 

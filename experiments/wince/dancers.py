@@ -17,9 +17,9 @@ from motionmind.body.contact import FAR, floor_height, foot_slides, lowest_heigh
 from motionmind.body.plausibility import CALM, GRAVITY
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import find_support, stands_alone
+from motionmind.footing.flight import FALLING
+from motionmind.footing.legs import find_legs
 from motionmind.geometry import rotations as rot
-from motionmind.realise.flight import FALLING
-from motionmind.realise.legs import find_legs
 
 MEASURES = ("root speed", "root acceleration", "slide", "joints", "legs")
 BEYOND = 99.5  # percentile of the dancers' own windows

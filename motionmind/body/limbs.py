@@ -4,7 +4,7 @@
   stands, which is a leg. Where an arm forks into thumb and fingers these are limbs, and the arm belongs to the trunk.
 - `limb_of_points`: the same, as a number for each joint and tip; what belongs to no limb is the trunk.
 - `parts_of`: the whole body, its lower and upper half, and trunk and limbs: overlapping parts in three sizes, over
-  which the mean of walks is taken (`motionmind.realise.mean_walk`). Its limbs are those of `limbs_of`.
+  which the mean of walks is taken (`motionmind.walks.mean_walk`). Its limbs are those of `limbs_of`.
 - `sided_parts`: limbs by side, from the names of joints: a whole arm from the clavicle with all its fingers is one
   part. For what a viewer sees as one limb: shuffling limbs against each other, phrases of a limb.
 

@@ -18,8 +18,8 @@ from motionmind.cli.options import Section, given_option, option
 from motionmind.cli.types import COUNT, NATS, NATURAL, POSITIVE, RATE, Moves, Number, Size
 from motionmind.cli.words import parse_avoided, parse_pins, parse_vias
 from motionmind.errors import MotionMindError
+from motionmind.footing.corrections import Correction
 from motionmind.grammar.schemes import Scheme, Weights
-from motionmind.realise.corrections import Correction
 from motionmind.tween.request import PACES, TweenRequest
 
 if TYPE_CHECKING:

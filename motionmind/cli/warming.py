@@ -205,7 +205,7 @@ def search() -> None:
 def realise() -> None:
     """Realise moves of the corpus, which no search has to find, see how deep limbs are in each other, and reach."""
     from motionmind.body.capsules import penetration
-    from motionmind.realise.legs import find_legs, reach
+    from motionmind.footing.legs import find_legs, reach
     from motionmind.tween.engine import Engine
 
     engine = Engine.load("ballet")
@@ -237,10 +237,10 @@ def learn() -> None:
     """Learn a clip anew, find its moves in the corpus, realise them by few of its moments; sample a path; read it."""
     from motionmind.discretize import make_discretization
     from motionmind.learned.neighbours import build_neighbours
-    from motionmind.realise.detail import likest_moves
     from motionmind.search.sample import sample_path
     from motionmind.search.solve import solve
     from motionmind.tween.engine import Engine
+    from motionmind.walks.detail import likest_moves
 
     engine = Engine.load("ballet")
     clip = engine.corpus.motion(engine.corpus.clips[0])

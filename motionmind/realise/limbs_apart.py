@@ -21,10 +21,10 @@ from motionmind.body.anatomy import SIDES
 from motionmind.body.capsules import ARM, LEG, Capsules, capsules_of, pair_depths
 from motionmind.body.contact import limb_heights, lowest_height
 from motionmind.body.skeleton import Skeleton
+from motionmind.footing.least_squares import solve_rows
+from motionmind.footing.legs import find_legs, reach
 from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
-from motionmind.realise.least_squares import solve_rows
-from motionmind.realise.legs import find_legs, reach
 from motionmind.realise.limb_turns import LEAST, Limbs, Placed, is_any_deeper, least_turns, planes_between, turn
 
 ROUNDS = 18  # corrections, each of what those before it have left

@@ -18,17 +18,13 @@ from motionmind.body.plausibility import GRAVITY
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import size_of
 from motionmind.corpus.corpus import Corpus, subdivide_times
+from motionmind.footing.corrections import Correction
+from motionmind.footing.ground import Stance, ends_in_air, set_on_floor
+from motionmind.footing.legs import find_legs
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.grammar import Grammar
 from motionmind.learned.carriage import Carriage
-from motionmind.realise.corrections import Correction
-from motionmind.realise.detail import detail_of, likest_moves, moves_near, share_of_detail
-from motionmind.realise.expectation import Expectation, expect
-from motionmind.realise.ground import Stance, ends_in_air, set_on_floor
-from motionmind.realise.headings import correct_headings, travel_along
-from motionmind.realise.legs import find_legs
-from motionmind.realise.minimal import departure
 from motionmind.realise.retime import (
     ENDS_AT,
     HEADROOM,
@@ -41,8 +37,12 @@ from motionmind.realise.retime import (
     slow_down,
 )
 from motionmind.realise.settling import keeper, settled
-from motionmind.realise.stops import Stop, stop_at
 from motionmind.realise.timeline import Timeline, stretch, timeline
+from motionmind.walks.detail import detail_of, likest_moves, moves_near, share_of_detail
+from motionmind.walks.expectation import Expectation, expect
+from motionmind.walks.headings import correct_headings, travel_along
+from motionmind.walks.minimal import departure
+from motionmind.walks.stops import Stop, stop_at
 
 # Tolerances by which a chain may be off its state at a move: where something is asked of it, with room for the arc
 # between two frames, and elsewhere.
@@ -93,12 +93,12 @@ def realise(
     Its first and last frames are `a` and `b`, exactly, and at the moves in `through` its joints and its facing are as
     in the postures there. Between them the body is, at the times of the moves, at the mean of the walks that the corpus
     knows from `a` to `b` in that time and that count the more the nearer they are to the path
-    (`motionmind.realise.walks`); a C2 spline joins them. Where that leaves a chain too far from its state, the movement
+    (`motionmind.walks.likelihood`); a C2 spline joins them. Where that leaves a chain too far from its state, the movement
     is bent towards it, smoothly. Fine detail of the corpus's recordings is added
-    (`motionmind.realise.detail`).
+    (`motionmind.walks.detail`).
 
     Feet that stand carry the body; where none stands it travels as the corpus's bodies do, and it ends where `b`
-    stands. The legs hold what one root cannot (`motionmind.realise.feet`), but for those with `fixed` joints. The
+    stands. The legs hold what one root cannot (`motionmind.footing.feet`), but for those with `fixed` joints. The
     lowest point stays as far above the floor as in the corpus's postures; the floor is at 0, or lower under ends that
     are lower, or higher under ends higher than the corpus knows of such postures. Limbs that would then pass through
     each other are kept apart (`motionmind.realise.limbs_apart`).

@@ -24,14 +24,14 @@ from motionmind.body.plausibility import GRAVITY
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, size_of
 from motionmind.corpus.corpus import Corpus
+from motionmind.footing.flight import PUSHES, find_falls
+from motionmind.footing.knees import bell
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.learned.pace import moved_in, steps_of, ways
 from motionmind.learned.peaks import accelerations
-from motionmind.realise.expectation import Expectation
-from motionmind.realise.flight import PUSHES, find_falls
-from motionmind.realise.knees import bell
 from motionmind.realise.timeline import Timeline, stretch
+from motionmind.walks.expectation import Expectation
 
 HEADROOM = 0.9  # share of the fastest speeds that is kept to: fine detail, and what holds the feet, come later
 ENDS_AT = 0.92  # share of the peaks that is kept to in the end; chosen on cmu-05

@@ -14,13 +14,13 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.contact import lowest_height
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
+from motionmind.footing.corrections import Correction
+from motionmind.footing.flight import fall_freely
+from motionmind.footing.ground import SINKS
+from motionmind.footing.knees import cover, smoothed
+from motionmind.footing.leaning import shift_weight
+from motionmind.footing.legs import find_legs
 from motionmind.learned.carriage import Carriage
-from motionmind.realise.corrections import Correction
-from motionmind.realise.flight import fall_freely
-from motionmind.realise.ground import SINKS
-from motionmind.realise.knees import cover, smoothed
-from motionmind.realise.leaning import shift_weight
-from motionmind.realise.legs import find_legs
 from motionmind.realise.limbs_apart import keep_limbs_apart
 from motionmind.realise.timeline import Timeline
 

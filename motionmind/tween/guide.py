@@ -2,7 +2,7 @@
 
 A likeliest path of chains that each know their last state alone is not the likeliest movement: on its own clock every
 joint freezes and rushes. The walks know whole limbs and bodies. For T moves from A to B they expect an orientation
-m_j(t) of each chain at each move (`motionmind.realise.expectation`), and a state x_j(t) pays
+m_j(t) of each chain at each move (`motionmind.walks.expectation`), and a state x_j(t) pays
 
     kappa (seconds of a move / 0.2) (angle(x_j(t), m_j(t)) / width)^2   nats,
 
@@ -26,11 +26,11 @@ from motionmind.geometry.splines import rotation_spline
 from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.pace import over_seconds, way_between
 from motionmind.realise.detour import detour
-from motionmind.realise.expectation import expect
-from motionmind.realise.minimal import NO_WAY
-from motionmind.realise.stops import stop_at
 from motionmind.realise.timeline import usual
 from motionmind.tween.pacing import usual_times
+from motionmind.walks.expectation import expect
+from motionmind.walks.minimal import NO_WAY
+from motionmind.walks.stops import stop_at
 
 CREEPING = 0.25  # share of the time in which walks may creep
 SELDOM = 2.0  # standard deviations: dancers seldom, one time in forty, take so long for so far a way

@@ -24,8 +24,8 @@ from motionmind.arguments import (
 )
 from motionmind.body.rates import FASTEST
 from motionmind.errors import MotionMindError, WrongTypeError, did_you_mean
+from motionmind.footing.corrections import Correction
 from motionmind.grammar.schemes import Scheme, Weights
-from motionmind.realise.corrections import Correction
 
 if TYPE_CHECKING:
     from motionmind._typing import States
@@ -87,7 +87,7 @@ class TweenRequest:
         bridge_price: nats for each degree of an unattested move.
         guide: kappa, nats for a joint that is off what walks through the corpus expect by its tolerance for 0.2 s; 0
             leaves their guide out. It shrinks as novelty grows, and a search of whole postures has none.
-        without: corrections of the movement to leave out: see `motionmind.realise.corrections`.
+        without: corrections of the movement to leave out: see `motionmind.footing.corrections`.
         fps: frames a second of the motion.
 
     Raises:

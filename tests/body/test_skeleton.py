@@ -13,8 +13,8 @@ from motionmind._typing import Floats
 from motionmind.body.human import human23
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import SkeletonError
+from motionmind.footing.legs import find_legs
 from motionmind.geometry import rotations as rot
-from motionmind.realise.legs import find_legs
 
 BODY = human23()
 

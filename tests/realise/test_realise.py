@@ -19,21 +19,21 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Corpus, Facing
 from motionmind.corpus.gather import gather
+from motionmind.footing.carrying import foot_heights
+from motionmind.footing.feet import find_free_feet
+from motionmind.footing.root import LEAST, root_trajectory, stand, steps_easily
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.learned.carriage import SLIDES, Carriage, learn_carriage
-from motionmind.realise.carrying import foot_heights
-from motionmind.realise.detail import GOES_OVER, LIVELIER, MISSES, detail_of, likest_moves, share_of_detail
-from motionmind.realise.expectation import Expectation
-from motionmind.realise.feet import find_free_feet
-from motionmind.realise.marginals import posterior_marginals
 from motionmind.realise.means import mean_rotations
 from motionmind.realise.realise import FIRMLY, LINGERS, realise
 from motionmind.realise.retime import HEADROOM, keep_pace
-from motionmind.realise.root import LEAST, root_trajectory, stand, steps_easily
 from motionmind.realise.timeline import Timeline, durations
-from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON, squared_distances
+from motionmind.walks.detail import GOES_OVER, LIVELIER, MISSES, detail_of, likest_moves, share_of_detail
+from motionmind.walks.expectation import Expectation
+from motionmind.walks.likelihood import ANYWHERE, STRAIGHT_ON, squared_distances
+from motionmind.walks.marginals import posterior_marginals
 
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -305,7 +305,7 @@ def test_detail_lingers_where_walks_are_hardly_trusted(monkeypatch: pytest.Monke
     a, b, carried = clip.posture(12), clip.posture(96), parts_of(human23())[2]
 
     def size(trust: float) -> float:
-        monkeypatch.setattr("motionmind.realise.mean_walk.trust", lambda *_: trust)
+        monkeypatch.setattr("motionmind.walks.mean_walk.trust", lambda *_: trust)
         found, plain = (realised(one, list(range(2, 17)), a, b) for one in (known, smooth))
         return float(np.median(rot.angle(found.rotations, plain.rotations)[3::6, carried]))
 

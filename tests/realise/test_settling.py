@@ -7,8 +7,8 @@ import numpy as np
 from motionmind.body.contact import lowest_height
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion
+from motionmind.footing.root import stand
 from motionmind.geometry import rotations as rot
-from motionmind.realise.root import stand
 from motionmind.realise.settling import FOLLOWS, _with_its_legs
 
 BODY, FRAMES, FPS = human23(), 46, 30.0

@@ -14,8 +14,8 @@ from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError
+from motionmind.footing.legs import find_legs
 from motionmind.geometry import rotations as rot
-from motionmind.realise.legs import find_legs
 from motionmind.retarget.retarget import to_human23
 from motionmind.tween.engine import Engine
 from motionmind.tween.formulate import formulate

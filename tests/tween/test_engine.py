@@ -25,10 +25,10 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store
 from motionmind.discretize import Codebook
 from motionmind.errors import CorpusError, FormatError, MotionMindError, NoPathError, SkeletonError
+from motionmind.footing.root import stand
 from motionmind.formats import read_motion, read_posture, write_motion, write_posture
 from motionmind.geometry import rotations as rot
 from motionmind.names.finding import find_posture
-from motionmind.realise.root import stand
 from motionmind.retarget.retarget import own_skeleton
 from motionmind.tween.engine import Engine
 from motionmind.tween.result import Tween

@@ -11,13 +11,13 @@ import pytest
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.geometry import rotations as rot
-from motionmind.realise.expectation import expect
-from motionmind.realise.stops import stop_at
 from motionmind.realise.timeline import usual
 from motionmind.tween.engine import Engine
 from motionmind.tween.formulate import Formulation, formulate
 from motionmind.tween.guide import MOVE, departures, make_guide
 from motionmind.tween.request import TweenRequest
+from motionmind.walks.expectation import expect
+from motionmind.walks.stops import stop_at
 
 PAIRS = {"ballet": (100, 140), "walk-hexapod": (5, 30)}
 

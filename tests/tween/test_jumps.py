@@ -13,8 +13,8 @@ from motionmind.body.contact import lowest_height
 from motionmind.body.human import human23
 from motionmind.body.plausibility import GRAVITY
 from motionmind.body.support import centre_of_mass
+from motionmind.footing.flight import PUSHES, find_falls
 from motionmind.geometry import rotations as rot
-from motionmind.realise.flight import PUSHES, find_falls
 from motionmind.realise.retime import HURRIES, jump_in_time, land_between, slow_down
 from motionmind.realise.timeline import Timeline
 

@@ -24,7 +24,6 @@ from motionmind.chaos.flows import FLOWS, flow_of
 from motionmind.errors import FormatError, MotionMindError, SkeletonError
 from motionmind.formats import lossy_fields, read_motion, write_motion
 from motionmind.geometry import rotations as rot
-from motionmind.realise.headings import SPINS
 from motionmind.search.solve import Progress
 from motionmind.tween.engine import Engine
 from motionmind.variation.piece import Piece
@@ -32,6 +31,7 @@ from motionmind.variation.review import Smooth
 from motionmind.variation.seams import BODY, Transition, judge_transitions
 from motionmind.variation.variation import Variation, vary
 from motionmind.variation.variation_json import read_variation, write_variation
+from motionmind.walks.headings import SPINS
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "variations.md"
 

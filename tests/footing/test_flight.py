@@ -10,10 +10,10 @@ import pytest
 from motionmind._typing import Bools, Floats
 from motionmind.body.human import human23
 from motionmind.body.support import centre_of_mass
+from motionmind.footing.balance import GRAVITY
+from motionmind.footing.flight import PUSHES, Flight, fall_freely, find_flights, flying_frames
+from motionmind.footing.root import stand
 from motionmind.geometry import rotations as rot
-from motionmind.realise.balance import GRAVITY
-from motionmind.realise.flight import PUSHES, Flight, fall_freely, find_flights, flying_frames
-from motionmind.realise.root import stand
 
 BODY, FPS = human23(), 30.0
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Floats, Ints
+from motionmind.footing.footfalls import Stance
+from motionmind.footing.least_squares import factorise, substitute
 from motionmind.jit import jit
-from motionmind.realise.footfalls import Stance
-from motionmind.realise.least_squares import factorise, substitute
 
 SETTLES = 0.3  # seconds in which a foot that hovers where it is given comes down to the floor
 FADES = 0.15  # seconds in which a foot that passes an end, with a velocity of its own, comes to its place

@@ -9,7 +9,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
-from motionmind.realise.minimal import departure
+from motionmind.walks.minimal import departure
 
 NEARLY = np.radians(150.0)  # of half a turn: by so much a body may as well turn the other way
 SPINS = 4.0  # radians a second from which a body goes on turning as the corpus does, even the far way

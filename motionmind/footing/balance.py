@@ -15,8 +15,8 @@ from functools import lru_cache
 import numpy as np
 
 from motionmind._typing import Bools, Floats
+from motionmind.footing.least_squares import Rows
 from motionmind.jit import jit
-from motionmind.realise.least_squares import Rows
 
 GRAVITY = 9.81  # metres a second squared
 OVER = 0.005  # metres beyond what is allowed, standard deviation

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
-from motionmind.realise.headings import RUN, correct_headings, travel_along, turn_with_walks
+from motionmind.walks.headings import RUN, correct_headings, travel_along, turn_with_walks
 
 STILL = np.zeros(40), np.full(40, 0.01)  # walks that turn to neither side
 TIMES = np.linspace(0.0, 4.0, 41)

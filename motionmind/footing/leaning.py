@@ -16,11 +16,11 @@ from motionmind.body.limbs import limb_of_points
 from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, find_bearers, size_of
+from motionmind.footing.balance import GRAVITY, balance_rows, is_beyond, walks
+from motionmind.footing.feet import QUICK, bend_legs, find_free_feet, pose
+from motionmind.footing.least_squares import difference_rows, joined, position_rows, solve
+from motionmind.footing.legs import SOFT, find_legs
 from motionmind.geometry import rotations as rot
-from motionmind.realise.balance import GRAVITY, balance_rows, is_beyond, walks
-from motionmind.realise.feet import QUICK, bend_legs, find_free_feet, pose
-from motionmind.realise.least_squares import difference_rows, joined, position_rows, solve
-from motionmind.realise.legs import SOFT, find_legs
 
 PUSH = 2.0  # metres a second squared by which the hips are accelerated beside the movement
 SHIFTS = 0.2  # metres that they shift

@@ -10,10 +10,10 @@ from motionmind.body.human import human23
 from motionmind.body.limbs import limbs_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import find_support
+from motionmind.footing.balance import ROOM, WALKS, balance_rows, falls_without, is_beyond, walks
+from motionmind.footing.leaning import shift_weight
+from motionmind.footing.root import stand
 from motionmind.geometry import rotations as rot
-from motionmind.realise.balance import ROOM, WALKS, balance_rows, falls_without, is_beyond, walks
-from motionmind.realise.leaning import shift_weight
-from motionmind.realise.root import stand
 
 FRAMES = 60
 FREE = np.zeros(23, dtype=np.bool_)

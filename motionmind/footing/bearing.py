@@ -10,10 +10,10 @@ from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.contact import contact_points
 from motionmind.body.limbs import limb_of_points, limbs_of
 from motionmind.body.skeleton import Skeleton
+from motionmind.footing.feet import Foot, foot_points, track_of
+from motionmind.footing.footfalls import Stance, find_stances, standing_costs
 from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
-from motionmind.realise.feet import Foot, foot_points, track_of
-from motionmind.realise.footfalls import Stance, find_stances, standing_costs
 
 UNDER = 0.02  # metres above the lowest limb at which a limb's share in bearing the body has fallen to 1/e
 BEARS = 4  # a limb bears the body by this power of how firmly it stands

@@ -16,9 +16,9 @@ from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.learned.carriage import Carriage
-from motionmind.realise.headings import turn_with_walks
-from motionmind.realise.mean_walk import mean_walk
-from motionmind.realise.stops import Stop, moments_rates
+from motionmind.walks.headings import turn_with_walks
+from motionmind.walks.mean_walk import mean_walk
+from motionmind.walks.stops import Stop, moments_rates
 
 
 class Expectation(NamedTuple):
@@ -33,7 +33,7 @@ class Expectation(NamedTuple):
         trust: how far each joint is trusted to the walks in each half step [2 T, J], from 0 to 1.
         of_moments: which of the corpus's moments are meant [n]; all of them where they are a slice.
         of_moves: which of its moves are meant [m]; all of them where they are a slice.
-        left_out: share of walks whose ends were not looked at (`motionmind.realise.mean_walk.MeanWalk`).
+        left_out: share of walks whose ends were not looked at (`motionmind.walks.mean_walk.MeanWalk`).
     """
 
     half_steps: Floats

@@ -1,7 +1,7 @@
 """Rows of a root's trajectory: the terms of its least-squares problem that say what bears the body, and how it moves.
 
 Rows about legs that are too short, parts in the floor and hurry hold near a trajectory, and are made again in each
-round (`motionmind.realise.carrying`). Standard deviations say what is worth what; they were chosen on cmu-05 and
+round (`motionmind.footing.carrying`). Standard deviations say what is worth what; they were chosen on cmu-05 and
 ballet.
 """
 
@@ -13,15 +13,15 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Ints
 from motionmind.body.skeleton import Skeleton
+from motionmind.footing.bearing import Bearing, Shape
+from motionmind.footing.departures import SETTLES
+from motionmind.footing.feet import Foot
+from motionmind.footing.knees import bend_of
+from motionmind.footing.least_squares import Rows, difference_rows
+from motionmind.footing.legs import SOFT
 from motionmind.geometry.single import length as length_of
 from motionmind.geometry.single import vector
 from motionmind.jit import jit
-from motionmind.realise.bearing import Bearing, Shape
-from motionmind.realise.departures import SETTLES
-from motionmind.realise.feet import Foot
-from motionmind.realise.knees import bend_of
-from motionmind.realise.least_squares import Rows, difference_rows
-from motionmind.realise.legs import SOFT
 
 HEIGHT = 0.01, 0.2  # metres that a standing leg gives or takes, and where it may bend for a jump
 RIGID = 0.004  # metres that a part which is no foot is off the floor

@@ -1,9 +1,9 @@
 """Setting a movement on the floor: who bears the body and where, the root's trajectory, and legs that reach the floor.
 
 Rotations come from the mean of walks; where the body is follows from what bears it. Each foot gets *stances*, with
-places on the floor (`motionmind.realise.footfalls`). The root is carried by what bears, smoothly, and so that its
-weight stays over the support (`motionmind.realise.root`). The legs then reach for the places
-(`motionmind.realise.feet`).
+places on the floor (`motionmind.footing.footfalls`). The root is carried by what bears, smoothly, and so that its
+weight stays over the support (`motionmind.footing.root`). The legs then reach for the places
+(`motionmind.footing.feet`).
 """
 
 from __future__ import annotations
@@ -20,12 +20,11 @@ from motionmind.body.contact import lowest_height
 from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import size_of
-from motionmind.geometry.splines import natural_spline
-from motionmind.realise.balance import GRAVITY
-from motionmind.realise.carrying import Carried, Ends, carry, foot_heights
-from motionmind.realise.corrections import Correction
-from motionmind.realise.departures import fade_at_ends
-from motionmind.realise.feet import (
+from motionmind.footing.balance import GRAVITY
+from motionmind.footing.carrying import Carried, Ends, carry, foot_heights
+from motionmind.footing.corrections import Correction
+from motionmind.footing.departures import fade_at_ends
+from motionmind.footing.feet import (
     KNEE,
     Foot,
     bend_legs,
@@ -34,10 +33,11 @@ from motionmind.realise.feet import (
     pose,
     softness,
 )
-from motionmind.realise.flight import EVER, SURELY
-from motionmind.realise.knees import cover
-from motionmind.realise.minimal import departure
-from motionmind.realise.root import root_trajectory, stand, steps_easily
+from motionmind.footing.flight import EVER, SURELY
+from motionmind.footing.knees import cover
+from motionmind.footing.root import root_trajectory, stand, steps_easily
+from motionmind.geometry.splines import natural_spline
+from motionmind.walks.minimal import departure
 
 SPREADS = 0.03, 0.04  # metres, standard deviation: how high walks are that stand at a given posture, and that are aloft
 LEAPS = 0.18  # metres above those that stand from which it is in the air, though no walk is

@@ -19,7 +19,7 @@ from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.neighbours import postures_near
-from motionmind.realise.steps import steps_at
+from motionmind.walks.steps import steps_at
 
 GOES_OVER = 0.4  # radians a joint, root mean square: how much nearer another posture must be to leave a run for it
 NEAREST = 48  # postures of a large corpus near each of a movement's whose moves are looked at

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solveh_banded
 
-from motionmind.realise.least_squares import solve_diagonals
+from motionmind.footing.least_squares import solve_diagonals
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -18,12 +18,8 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
-from motionmind.realise.marginals import posterior_marginals
 from motionmind.realise.means import COUNTS, add_rotations, mean_rotations, means
-from motionmind.realise.minimal import LASTS, departure, minimal_movement, trust
-from motionmind.realise.sparse import Chosen, all_of, choose, steps_on
-from motionmind.realise.stops import Rates, Stop
-from motionmind.realise.walks import (
+from motionmind.walks.likelihood import (
     FOLLOWS_WITHIN,
     LEAVES_WITHIN,
     SIZES,
@@ -34,6 +30,10 @@ from motionmind.realise.walks import (
     variance_at_ends,
     write_likelihood,
 )
+from motionmind.walks.marginals import posterior_marginals
+from motionmind.walks.minimal import LASTS, departure, minimal_movement, trust
+from motionmind.walks.sparse import Chosen, all_of, choose, steps_on
+from motionmind.walks.stops import Rates, Stop
 
 STRIDE = 0.5  # radians a joint that go with travelling as far as the body is tall; chosen on cmu-05 and cmu-16
 THREADS = min(4, os.cpu_count() or 1)  # in which parts of the body are worked on; results do not depend on it
@@ -73,7 +73,7 @@ def mean_walk(
     Walks of limbs count as much as those of larger parts together. The moments, by which the body travels and stands,
     are those of walks of the whole and of the part that carries it. The mean is taken as a departure from the minimal
     movement between the stops, which shrinks as the corpus's postures are farther from them
-    (`motionmind.realise.minimal`). It comes near the stops but not to them: its offsets there are subtracted along the
+    (`motionmind.walks.minimal`). It comes near the stops but not to them: its offsets there are subtracted along the
     walk in proportion to time, and those of its velocities as `departure` has it.
 
     Args:

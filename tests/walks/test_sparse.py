@@ -17,12 +17,12 @@ from motionmind.corpus.gather import gather
 from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import Carriage, learn_carriage
 from motionmind.learned.neighbours import build_neighbours
-from motionmind.realise import mean_walk, sparse
-from motionmind.realise.detail import likest_moves, moves_near
-from motionmind.realise.expectation import Expectation, expect
-from motionmind.realise.steps import follow, steps_at
-from motionmind.realise.stops import moments_rates, stop_at
 from motionmind.tween.engine import Engine
+from motionmind.walks import mean_walk, sparse
+from motionmind.walks.detail import likest_moves, moves_near
+from motionmind.walks.expectation import Expectation, expect
+from motionmind.walks.steps import follow, steps_at
+from motionmind.walks.stops import moments_rates, stop_at
 
 MOVES = 6
 

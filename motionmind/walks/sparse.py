@@ -1,6 +1,6 @@
 """Few of a corpus's moments that stand for all of them in the walks of a part of the body.
 
-The sums over all walks (`motionmind.realise.marginals`) take time in proportion to the corpus. Of a large corpus they
+The sums over all walks (`motionmind.walks.marginals`) take time in proportion to the corpus. Of a large corpus they
 are taken over a few thousand moments, which are found by the tree of the part (`motionmind.learned.neighbours`):
 
 - those nearest to the first posture, where walks begin, and those that follow on them in the clips; those nearest to
@@ -27,7 +27,7 @@ from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.neighbours import Neighbours, find_near
-from motionmind.realise.steps import follow, index_of, steps_at
+from motionmind.walks.steps import follow, index_of, steps_at
 
 SPLITS = 384  # balls that are cut in two
 ENDS = 64  # moments near each end, with those that follow on them or lead to them

@@ -17,10 +17,9 @@ from motionmind.body.limbs import limbs_of, parts_of
 from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, find_support
-from motionmind.geometry import rotations as rot
-from motionmind.realise.balance import GRAVITY, nearest_in_support
-from motionmind.realise.departures import FLICKS, LIFT, departure
-from motionmind.realise.footfalls import (
+from motionmind.footing.balance import GRAVITY, nearest_in_support
+from motionmind.footing.departures import FLICKS, LIFT, departure
+from motionmind.footing.footfalls import (
     BRIEF,
     CROSSES,
     FIRM,
@@ -33,11 +32,12 @@ from motionmind.realise.footfalls import (
     find_stances,
     standing_costs,
 )
-from motionmind.realise.footfalls import Stance as StandingFoot
-from motionmind.realise.ground import Stance, set_on_floor
-from motionmind.realise.least_squares import difference_rows, position_rows, solve
-from motionmind.realise.legs import find_legs, reach
-from motionmind.realise.root import stand
+from motionmind.footing.footfalls import Stance as StandingFoot
+from motionmind.footing.ground import Stance, set_on_floor
+from motionmind.footing.least_squares import difference_rows, position_rows, solve
+from motionmind.footing.legs import find_legs, reach
+from motionmind.footing.root import stand
+from motionmind.geometry import rotations as rot
 
 LEGS = list(range(1, 9))
 TIGHT = np.zeros(23, dtype=np.bool_)  # no joint is loose

@@ -10,9 +10,9 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.skeleton import Skeleton
+from motionmind.footing.knees import SHIFTS, bend_of, distance_of, keep_detail, slow_down, smoothed
+from motionmind.footing.legs import SOFT, find_hinge, find_legs, stretched, usual_hinge, write_bent
 from motionmind.geometry import rotations as rot
-from motionmind.realise.knees import SHIFTS, bend_of, distance_of, keep_detail, slow_down, smoothed
-from motionmind.realise.legs import SOFT, find_hinge, find_legs, stretched, usual_hinge, write_bent
 
 GRIP = 0.015  # metres above the lower end of a foot at which the other's hold on the floor has fallen to 1/e
 LOOSE = 0.15  # of a leg's length, as `legs.SOFT`, of one that swings

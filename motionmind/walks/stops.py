@@ -13,7 +13,7 @@ from motionmind.body.motion import Posture, Velocity
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import Carriage
-from motionmind.realise.steps import steps_at
+from motionmind.walks.steps import steps_at
 
 _ALL = slice(None)
 _SOON = 1e-3  # seconds over which a velocity of the body is taken apart into its chains'

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind.body.human import human23
+from motionmind.footing.bearing import MOSTLY, TOUCHES, Bearing, lowest, shape_of
+from motionmind.footing.feet import bend_legs, find_free_feet, pose
 from motionmind.geometry import rotations as rot
-from motionmind.realise.bearing import MOSTLY, TOUCHES, Bearing, lowest, shape_of
-from motionmind.realise.feet import bend_legs, find_free_feet, pose
 
 BODY = human23()
 FRAMES = 30

@@ -17,7 +17,7 @@ from motionmind.body.plausibility import GRAVITY
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, size_of
 from motionmind.body.tempo import runs_of
-from motionmind.realise.least_squares import Rows, difference_rows, position_rows
+from motionmind.footing.least_squares import Rows, difference_rows, position_rows
 
 SURELY = 0.5  # share of the corpus's walks that are in the air where a given posture is
 EVER = 0.05  # share of them from which a movement may be

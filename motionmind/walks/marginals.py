@@ -10,7 +10,7 @@ import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.jit import jit
-from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON
+from motionmind.walks.likelihood import ANYWHERE, STRAIGHT_ON
 
 
 @jit

@@ -14,8 +14,8 @@ from typing import TypeVar
 import numpy as np
 
 from motionmind._typing import Bools, Floats
+from motionmind.footing.least_squares import bending_diagonals, solve_diagonals
 from motionmind.jit import either, jit
-from motionmind.realise.least_squares import bending_diagonals, solve_diagonals
 
 _Lengths = TypeVar("_Lengths", Floats, float)
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
-from motionmind.realise.minimal import FAR, LASTS, NO_WAY, SHARPLY, UNLIKE, departure, minimal_movement, trust
+from motionmind.walks.minimal import FAR, LASTS, NO_WAY, SHARPLY, UNLIKE, departure, minimal_movement, trust
 
 SOON = 1e-6  # seconds
 

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionmind.realise.knees import SHIFTS, bend_of, distance_of, keep_detail, slow_down, smoothed
+from motionmind.footing.knees import SHIFTS, bend_of, distance_of, keep_detail, slow_down, smoothed
 
 FPS, FASTEST = 30.0, 6.0
 

@@ -11,12 +11,12 @@ import pytest
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.geometry import rotations as rot
-from motionmind.realise.expectation import Expectation, expect
-from motionmind.realise.headings import turn_with_walks
-from motionmind.realise.mean_walk import _without_ends
-from motionmind.realise.minimal import minimal_movement
-from motionmind.realise.stops import Rates, Stop, moments_rates, stop_at
 from motionmind.tween.engine import Engine
+from motionmind.walks.expectation import Expectation, expect
+from motionmind.walks.headings import turn_with_walks
+from motionmind.walks.mean_walk import _without_ends
+from motionmind.walks.minimal import minimal_movement
+from motionmind.walks.stops import Rates, Stop, moments_rates, stop_at
 
 CORPORA = ["ballet", "karate", "walk-hexapod"]  # stage and free, people and insects
 STEPS = 6

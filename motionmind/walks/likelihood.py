@@ -5,8 +5,8 @@ it goes over to another posture of the same *cluster*, one that holds the part m
 where corpora are mixed, it goes to those that weigh more. A
 walk is more likely the nearer its ends are to the two given postures, and its velocities there to those given, if they
 are. Given those ends and the number of moves,
-`motionmind.realise.marginals` computes how likely each of the corpus's postures is at each move, exactly. The mean over
-walks (`motionmind.realise.mean_walk`) is the movement from which the corpus's own differs least in the square.
+`motionmind.walks.marginals` computes how likely each of the corpus's postures is at each move, exactly. The mean over
+walks (`motionmind.walks.mean_walk`) is the movement from which the corpus's own differs least in the square.
 
 Walks of the whole body keep its joints together, but whole bodies recur seldom; limbs recur often, but do not know of
 each other. They err differently, and the mean over walks of parts of all sizes errs less than that of any one size.

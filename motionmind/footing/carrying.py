@@ -2,7 +2,7 @@
 
 It is a least-squares solution, found in a few rounds, for some of its rows depend on where the root is: legs that are
 too short, parts that would be in the floor, weight that is beyond its support. Rows are those of
-`motionmind.realise.root_rows`, `balance` and `flight`.
+`motionmind.footing.root_rows`, `balance` and `flight`.
 """
 
 from __future__ import annotations
@@ -16,16 +16,15 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.contact import contact_points
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass
-from motionmind.jit import jit
-from motionmind.realise.balance import balance_rows, falls_without, is_beyond, walks
-from motionmind.realise.bearing import Bearing, Shape, find_bearing, find_staying, lowest, points_of_feet, shape_of
-from motionmind.realise.corrections import Correction
-from motionmind.realise.departures import departure, fade_at_ends
-from motionmind.realise.feet import Foot, bend_legs, pose, softness
-from motionmind.realise.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
-from motionmind.realise.knees import cover, smoothed
-from motionmind.realise.least_squares import joined, solve
-from motionmind.realise.root_rows import (
+from motionmind.footing.balance import balance_rows, falls_without, is_beyond, walks
+from motionmind.footing.bearing import Bearing, Shape, find_bearing, find_staying, lowest, points_of_feet, shape_of
+from motionmind.footing.corrections import Correction
+from motionmind.footing.departures import departure, fade_at_ends
+from motionmind.footing.feet import Foot, bend_legs, pose, softness
+from motionmind.footing.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
+from motionmind.footing.knees import cover, smoothed
+from motionmind.footing.least_squares import joined, solve
+from motionmind.footing.root_rows import (
     hurry_rows,
     knee_rows,
     legs_of,
@@ -36,6 +35,7 @@ from motionmind.realise.root_rows import (
     standing_rows,
     sunk_rows,
 )
+from motionmind.jit import jit
 
 DETAIL = 0.2  # seconds within which the root smooths the fine detail that it carries; chosen on indian and cmu-05
 TIPTOE = 0.12  # metres above the floor: a body that is no higher at both ends, above one spot, stands there on one foot
