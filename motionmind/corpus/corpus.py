@@ -205,7 +205,10 @@ class Corpus:
 
     def _clips_at(self, corpus: str, name: str) -> list[Clip]:
         """Return the clips whose entries have these, as few others as possible being read."""
-        order, found = self.columns.order, []
+        order = self.columns.order
+        if not len(order) or key_of(self.clips[order[-1]]) < (corpus, name):  # as all are, where none comes from there
+            return []
+        found: list[Clip] = []
         at = bisect_left(order, (corpus, name), key=lambda number: key_of(self.clips[number]))
         while at < len(order) and key_of(clip := self.clips[order[at]]) == (corpus, name):
             found.append(clip)

@@ -281,14 +281,19 @@ def _search(posture: Floats, bounds: Int32s, centres: Singles, radii: Floats, le
     found, many = np.empty(leaves, np.int64), 0
     heap = [(0.0, 0)]
     while heap and many < leaves:
-        _, node = heapq.heappop(heap)
+        _, node = heap[0]
         if 2 * node + 2 >= len(bounds):
+            heapq.heappop(heap)
             found[many] = node
             many += 1
             continue
         for child in (2 * node + 1, 2 * node + 2):
             away = np.sqrt(squared_distance(centres[child], posture) / len(posture))
-            heapq.heappush(heap, (away - INSIDE * radii[child], child))
+            promise = away - INSIDE * radii[child], child
+            if child % 2:
+                heapq.heapreplace(heap, promise)  # in the node's own place
+            else:
+                heapq.heappush(heap, promise)
     return found[:many]
 
 

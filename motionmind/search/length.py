@@ -19,9 +19,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from motionmind._typing import Floats
+from motionmind._typing import Floats, Ints
 from motionmind.errors import InfeasibleError
-from motionmind.search.problem import Problem, costs_to_go
+from motionmind.search.problem import Model, Problem, costs_to_go
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,10 @@ def choose_length(problem: Problem) -> LengthChoice:
         InfeasibleError: no path satisfies the problem.
         ValueError: the tolls are not of the problem's segments and numbers of moves, or not finite.
     """
-    hastes, tolls, rules = _hastes(problem), problem.tolls, problem.rules
-    if tolls is None or tolls.shape != hastes.shape or not np.isfinite(tolls).all():
-        raise ValueError(f"there must be finite tolls of the shape {hastes.shape}")
+    tolls, rules, shape = problem.tolls, problem.rules, (len(problem.stops) - 1, problem.rules.longest + 1)
+    if tolls is None or tolls.shape != shape or not np.isfinite(tolls).all():
+        raise ValueError(f"there must be finite tolls of the shape {shape}")
+    hastes = _hastes(problem) if problem.vias else _hastes_that_matter(problem, tolls[0])
     costs = hastes + tolls
     so_far = _so_far(problem, costs)
     so_far[-1][: rules.shortest] = np.inf
@@ -107,11 +108,32 @@ def _hastes(problem: Problem) -> Floats:
     if not all(model.allowed[model.starts[:-1] + stop].all() for stop in stops[1:-1]):
         return out
     for haste, (start, goal) in zip(out, pairwise(stops), strict=True):
-        to_go = costs_to_go(model, goal, rules.longest)
-        from_start = to_go[:, model.starts[:-1] + start]
-        possible = np.isfinite(from_start).all(axis=1)
-        cheapest = np.minimum.reduceat(to_go[possible], model.starts[:-1], axis=1)
-        haste[possible] = (from_start[possible] - cheapest).sum(axis=1)
+        haste[:] = _haste(model, start, costs_to_go(model, goal, rules.longest))
     if len(out) > 1:
         out[:, 0] = np.inf
+    return out
+
+
+def _hastes_that_matter(problem: Problem, tolls: Floats) -> Floats:
+    """Return `_hastes` of a problem without vias [1, N + 1], infinite from where on tolls [N + 1] alone cost as much as
+    the second best number of moves does with its haste: no haste is below 0."""
+    model, rules = problem.model_with_waits(), problem.rules
+    out, to_go = np.full((1, len(tolls)), np.inf), None
+    last = rules.shortest + int(tolls[rules.shortest :].argmin())
+    while True:
+        to_go = costs_to_go(model, problem.goal, last, known=to_go)
+        out[0, : last + 1] = _haste(model, problem.start, to_go)
+        best = np.sort((out[0] + tolls)[rules.shortest :])[:2]
+        more = int(np.flatnonzero(tolls <= best[-1])[-1])
+        if more <= last:
+            return out
+        last = more
+
+
+def _haste(model: Model, start: Ints, to_go: Floats) -> Floats:
+    """Return the haste in each number of moves from a start [L], of which the costs to go are given [N + 1, G]."""
+    out, from_start = np.full(len(to_go), np.inf), to_go[:, model.starts[:-1] + start]
+    possible = np.isfinite(from_start).all(axis=1)
+    cheapest = np.minimum.reduceat(to_go[possible], model.starts[:-1], axis=1)
+    out[possible] = (from_start[possible] - cheapest).sum(axis=1)
     return out

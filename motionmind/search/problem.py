@@ -184,7 +184,9 @@ def places(model: Model, path: Int32s) -> Int32s:
     return np.asarray(model.place[model.starts[:-1] + path])
 
 
-def costs_to_go(model: Model, goal: Ints, moves: int, timed: Floats | None = None) -> Floats:
+def costs_to_go(
+    model: Model, goal: Ints, moves: int, timed: Floats | None = None, known: Floats | None = None
+) -> Floats:
     """Compute the least cost of each chain on its own from each state to the goal, by number of moves.
 
         V[0, s at goal] = 0
@@ -199,23 +201,26 @@ def costs_to_go(model: Model, goal: Ints, moves: int, timed: Floats | None = Non
         moves: greatest number of moves T.
         timed: further costs of being in each state after each move, of a path that arrives after move T, nats
             [T + 1, G]; None for none.
+        known: V of fewer moves, where there are no timed costs [K, G]; None for none.
 
     Returns:
         V, nats [T + 1, G]; infinite where no walk of exactly k moves exists.
     """
-    return _costs_to_go(model, goal, moves, np.zeros((0, 0)) if timed is None else timed)
+    none = np.zeros((0, model.starts[-1]))
+    return _costs_to_go(model, goal, moves, none if timed is None else timed, none if known is None else known)
 
 
 @jit
-def _costs_to_go(model: Model, goal: Ints, moves: int, timed: Floats) -> Floats:
-    """Compute as `costs_to_go` does; `timed` has no rows where it holds no costs."""
+def _costs_to_go(model: Model, goal: Ints, moves: int, timed: Floats, known: Floats) -> Floats:
+    """Compute as `costs_to_go` does; `timed` has no rows where it holds no costs, and `known` where nothing is."""
     value = np.full((moves + 1, model.starts[-1]), np.inf)
+    value[: len(known)] = known
     for chain in range(len(model.parents)):
         first, last = model.starts[chain], model.starts[chain + 1]
         for row in range(first, last):
             if model.place[row] == goal[chain]:
                 value[0, row] = 0.0
-        for k in range(1, moves + 1):
+        for k in range(max(1, len(known)), moves + 1):
             arrived = value[k - 1, first:last] + model.alone[first:last]
             if len(timed) > 0:
                 arrived += timed[moves - k + 1, first:last]

@@ -18,6 +18,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
+from motionmind.walks.means import COUNTS, add_rotations, mean_rotations, means
 from motionmind.walks.likelihood import (
     FOLLOWS_WITHIN,
     LEAVES_WITHIN,
@@ -36,7 +37,7 @@ from motionmind.walks.stops import Rates, Stop
 
 STRIDE = 0.5  # radians a joint that go with travelling as far as the body is tall; chosen on cmu-05 and cmu-16
 THREADS = min(4, os.cpu_count() or 1)  # in which parts of the body are worked on; results do not depend on it
-COUNTS = 1e-6  # the least weight that counts in a mean
+AT_ONCE = 16  # moments that are read side by side: memory is waited for as for one of them
 BUSY = 4000  # moments of a corpus that keep a thread busy: for fewer, another costs more than it saves
 
 
@@ -114,6 +115,26 @@ class _Walk(NamedTuple):
     left_out: float
 
 
+class _PartWalk(NamedTuple):
+    """The walks of one part of the body from one stop to the next in S steps.
+
+    Attributes:
+        chosen: the n moments that they are summed over.
+        shown: what these show of the part [n, p, 4]; of a corpus without trees, all chains in all moments.
+        marginals: their probabilities [S + 1, n].
+        counts: of a corpus with trees, those of them that may count in a mean.
+        trust: how far the part is trusted to the walks.
+        left_out: as in `MeanWalk`.
+    """
+
+    chosen: Chosen
+    shown: Floats
+    marginals: Floats
+    counts: Ints
+    trust: float
+    left_out: float
+
+
 def _joined(segments: Mapping[int, _Walk], count: int, moments: int) -> tuple[Floats, Ints | slice]:
     """Return the probabilities of moments at each of so many half steps, and which moments of the corpus these are.
 
@@ -181,7 +202,7 @@ def _mean_between(
         each = map if pool is None else pool.map
         distances = [*each(off, np.array_split(passed, threads))] if trees is None else []
 
-        def walk(number: int) -> tuple[Chosen, Floats, Floats, float, float]:
+        def walk(number: int) -> _PartWalk:
             part, here = parts[number], shown
             if trees is None:
                 chosen = all_of(carriage, number)
@@ -191,7 +212,9 @@ def _mean_between(
                 here = _taken(shown, np.asarray(chosen.moments), part)
                 to = np.ascontiguousarray(passed[:, part])
                 own = squared_distances(here, np.zeros((len(part), 1), dtype=np.int64), 1, to)[0]
-            return chosen, here, *_part_marginals(part, chosen, rates, ends, times, own)
+            marginals, trust_in_part, left_out = _part_marginals(part, chosen, rates, ends, times, own)
+            counts = np.flatnonzero(marginals.max(axis=0) >= COUNTS) if trees is not None else np.zeros(0, np.int64)
+            return _PartWalk(chosen, here, marginals, counts, trust_in_part, left_out)
 
         known = dict(zip(larger, each(walk, larger), strict=True))
 
@@ -203,19 +226,18 @@ def _mean_between(
                 walks = [*(known[n] for n in numbers[:-1]), mine]
                 about = np.ascontiguousarray(minimal[:, here])
                 if trees is None:
-                    weights = _mixed(*(marginals for _, _, marginals, *_ in walks))
+                    weights = _mixed(*(one.marginals for one in walks))
                     mean = mean_rotations(weights, shown, np.array(here), about)
                 else:
-                    columns = [np.array([np.flatnonzero(parts[n] == joint)[0] for joint in here]) for n in numbers]
-                    mean = _mean_of_few([one[1:3] for one in walks], columns, about)
+                    mean = _mean_of_few(walks, [parts[n] for n in numbers], here, about)
                 off = rot.log(rot.inv_mul(about, mean))
                 off = _without_ends(off, times, leaving is not None, arriving is not None)
-                trusted[here] = np.dot(SIZES, [trust_in_part for *_, trust_in_part, _ in walks])
+                trusted[here] = np.dot(SIZES, [one.trust for one in walks])
                 poses[:, here] = rot.mul(about, rot.exp(trusted[here, None] * off))
-            return mine[-1]
+            return mine.left_out
 
-        lost = [*each(move, sorted({numbers[-1] for numbers in groups})), *(one[-1] for one in known.values())]
-    moments = tuple((marginals, chosen.moments) for chosen, _, marginals, *_ in (known[0], known[1]))
+        lost = [*each(move, sorted({numbers[-1] for numbers in groups})), *(one.left_out for one in known.values())]
+    moments = tuple((one.marginals, one.chosen.moments) for one in (known[0], known[1]))
     return _Walk(poses, moments, trusted, max(lost))
 
 
@@ -288,20 +310,13 @@ def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
     return terms
 
 
-def _mean_of_few(walks: Sequence[tuple[Floats, Floats]], columns: Sequence[Ints], about: Floats) -> Floats:
-    """Return `mean_rotations` over the walks of all three sizes; of moments that hardly count nothing is read.
-
-    Args:
-        walks: of each size the orientations of the moments' parts [n, p, 4], and the marginals [S + 1, n].
-        columns: which of these joints the mean is of [m], for each size.
-        about: as for `mean_rotations`.
-    """
-    weights, shown = [], []
-    for size, (orientations, marginals), own in zip(SIZES, walks, columns, strict=True):
-        counts = np.flatnonzero(size * marginals.max(axis=0) >= COUNTS)
-        weights.append(size * marginals[:, counts])
-        shown.append(_taken(orientations, counts, own))
-    return mean_rotations(np.concatenate(weights, axis=1), np.concatenate(shown), np.arange(about.shape[1]), about)
+def _mean_of_few(walks: Sequence[_PartWalk], parts: Sequence[Ints], joints: Sequence[int], about: Floats) -> Floats:
+    """Return `mean_rotations` of some joints [m] over the walks of the parts of all three sizes that they are in."""
+    sums = np.zeros((len(joints), 4, len(about)))
+    for size, part, walk in zip(SIZES, parts, walks, strict=True):
+        columns = np.array([np.flatnonzero(part == joint)[0] for joint in joints])
+        add_rotations(sums, size, walk.marginals, walk.counts, walk.shown, columns, about)
+    return means(sums, about)
 
 
 @jit
@@ -316,75 +331,17 @@ def _mixed(whole: Floats, half: Floats, limb: Floats) -> Floats:
 
 @jit
 def _taken(shown: Floats, moments: Ints, joints: Ints) -> Floats:
-    """Return the orientations of some joints in some moments [n, m, 4], of all [N, L, 4]."""
-    out = np.empty((len(moments), len(joints), 4))
-    for i in range(len(moments)):
-        for j in range(len(joints)):
-            for c in range(4):
-                out[i, j, c] = shown[moments[i], joints[j], c]
-    return out
-
-
-@jit
-def _spread(near: Floats, middle: Floats) -> float:
-    """Return how far orientations [4, S] are from one of them [4] at most, as vectors: a cosine with that one which is
-    greater has the same sign with all."""
-    farthest = 0.0
-    for t in range(near.shape[1]):
-        far = 0.0
-        for c in range(4):
-            far += (near[c, t] - middle[c]) ** 2
-        farthest = max(farthest, far)
-    return float(np.sqrt(farthest)) + 1e-6
-
-
-@jit
-def mean_rotations(weights: Floats, orientations: Floats, joints: Ints, about: Floats) -> Floats:
-    """Return weighted means [S, m, 4] of m joints' orientations, in the hemisphere of `about`.
-
-    The mean is the normalised sum of quaternions of one sign, which is within a few thousandths of the mean rotation
-    where they lie within a right angle. Source: Gramkow, "On averaging rotations", IJCV 42 (2001).
-
-    Args:
-        weights: of the orientations in each mean [S, N].
-        orientations: of all chains [N, L, 4].
-        joints: the m of them.
-        about: orientations that choose each quaternion's sign, and stand in for a mean of length 0 [S, m, 4].
-    """
-    out, count, moments = about.copy(), len(about), weights.shape[1]
-    # Side by side for all means, which are then added to at once, four moments at a time. A weight of 0 changes no sum.
-    counted = np.zeros((moments + -moments % 4, count))
-    for i in range(moments):
-        for t in range(count):
-            counted[i, t] = weights[t, i] if weights[t, i] >= COUNTS else 0.0
-    near, sums, signed, shown = np.empty((4, count)), np.empty((4, count)), np.empty((4, count)), np.empty((4, 4))
-    for j in range(len(joints)):
-        near[:] = about[:, j].T
-        middle = about[count // 2, j]
-        alike = _spread(near, middle)
-        sums[:] = 0.0
-        for first in range(0, len(counted), 4):
-            added, mixed = counted[first : first + 4], False
-            for k in range(4):
-                x, y, z, w = orientations[min(first + k, moments - 1), joints[j]]
-                cosine = middle[0] * x + middle[1] * y + middle[2] * z + middle[3] * w
-                sign = -1.0 if cosine < -alike else 1.0
-                shown[0, k], shown[1, k], shown[2, k], shown[3, k] = sign * x, sign * y, sign * z, sign * w
-                mixed = mixed or abs(cosine) <= alike
-            if mixed:
-                for k in range(4):
-                    x, y, z, w = shown[:, k]
-                    for t in range(count):
-                        cosine = near[0, t] * x + near[1, t] * y + near[2, t] * z + near[3, t] * w
-                        signed[k, t] = -added[k, t] if cosine < 0.0 else added[k, t]
-                added = signed
-            for c in range(4):
-                a, b, d, e = shown[c]
-                for t in range(count):
-                    sums[c, t] = sums[c, t] + added[0, t] * a + added[1, t] * b + added[2, t] * d + added[3, t] * e
-        for t in range(count):
-            x, y, z, w = sums[:, t]
-            length = np.sqrt(x * x + y * y + z * z + w * w)
-            if length > 1e-6:
-                out[t, j, 0], out[t, j, 1], out[t, j, 2], out[t, j, 3] = x / length, y / length, z / length, w / length
-    return out
+    """Return the orientations of some joints in some moments [n, m, 4], of all [N, L, 4]; each joint's lie together."""
+    out = np.empty((len(joints), len(moments), 4))
+    for first in range(0, len(moments), AT_ONCE):
+        here = range(first, min(first + AT_ONCE, len(moments)))
+        for i in here:  # so that the memory of all is on its way before that of the first is waited for
+            touched = 0.0
+            for j in range(0, len(joints), 2):
+                touched += shown[moments[i], joints[j], 0]
+            out[0, i, 0] = touched
+        for i in here:
+            for j in range(len(joints)):
+                for c in range(4):
+                    out[j, i, c] = shown[moments[i], joints[j], c]
+    return out.transpose(1, 0, 2)

@@ -27,7 +27,7 @@ from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.neighbours import Neighbours, find_near
-from motionmind.walks.steps import follow, steps_at
+from motionmind.walks.steps import follow, index_of, steps_at
 
 SPLITS = 384  # balls that are cut in two
 ENDS = 64  # moments near each end, with those that follow on them or lead to them
@@ -79,17 +79,14 @@ def choose(trees: Neighbours, number: int, carriage: Carriage, ends: Floats, pat
         path: those that walks are to follow [K, J, 4], or None.
         steps: of a walk.
     """
-    near, *runs = _near_ends(carriage, number, ends.tobytes())
-    by_path, nodes = near[:, :0], _balls(trees, number)
-    if path is not None:
-        by_path = find_near(trees, number, carriage.orientations, path[::2], BY_PATH, PATH_LEAVES)
+    near, moments = _near_ends(carriage, number, ends.tobytes(), steps)
+    singles, nodes, ranks = near.ravel(), _balls(trees, number), trees.ranks[number]
     chain = carriage.begins, carriage.ends, len(carriage.orientations) - len(carriage.turn)
-    runs.append(follow(by_path.ravel(), True, 2, *chain))
-    runs += [follow(end[:NEAREST], on, steps // 2 + 1, *chain) for end, on in zip(near, (True, False), strict=True)]
-    order, ranks, bounds = trees.order[number], trees.ranks[number], trees.bounds[nodes]
-    singles = _rising(np.concatenate([near.ravel(), by_path.ravel()]))
-    moments = _rising(np.concatenate([singles, *runs, order[bounds.sum(axis=1) // 2]]))
-    starts = np.ascontiguousarray(bounds[:, 0])
+    if path is not None:
+        by_path = find_near(trees, number, carriage.orientations, path[::2], BY_PATH, PATH_LEAVES).ravel()
+        singles = np.concatenate([singles, by_path])
+        moments = _rising(np.concatenate([moments, by_path, follow(by_path, True, 2, *chain)]))
+    starts = np.ascontiguousarray(trees.bounds[nodes, 0])
     weights, stands = _shares(moments, singles, starts, trees.weights[number][nodes], ranks, carriage.weights)
     begins, leads, numbers = steps_at(moments, True, *chain)
     goals = _goals(moments, leads, starts, stands, ranks)
@@ -154,14 +151,21 @@ class _Kept(Generic[_Owner, _Asked, _Found]):
 
 
 @_Kept  # of all parts; the guide of a search and its motion ask for the same
-def _near_ends(carriage: Carriage, number: int, ends: bytes) -> tuple[Ints, Ints, Ints]:
-    """Return the moments near both ends in one part of the body [2, n], and those that follow on the first or lead to
-    the last, some steps on; `ends` are the bytes of those of `choose`."""
-    assert carriage.trees is not None
+def _near_ends(carriage: Carriage, number: int, ends: bytes, steps: int) -> tuple[Ints, Ints]:
+    """Return the moments near both ends in one part of the body [2, n], and all that are chosen without a path, rising.
+
+    Arguments are those of `choose`, but for `ends`, which are their bytes.
+    """
+    trees = carriage.trees
+    assert trees is not None
     postures = np.frombuffer(ends).reshape(2, -1, 4)
-    near = find_near(carriage.trees, number, carriage.orientations, postures, ENDS)
+    near = find_near(trees, number, carriage.orientations, postures, ENDS)
     chain = carriage.begins, carriage.ends, len(carriage.orientations) - len(carriage.turn)
-    return near, follow(near[0], True, ALONG, *chain), follow(near[1], False, ALONG, *chain)
+    found = [near.ravel(), trees.order[number][trees.bounds[_balls(trees, number)].sum(axis=1) // 2]]
+    for end, ahead in zip(near, (True, False), strict=True):
+        found.append(follow(end, ahead, ALONG, *chain))
+        found.append(follow(end[:NEAREST], ahead, steps // 2 + 1, *chain))
+    return near, _rising(np.concatenate(found))
 
 
 @_Kept
@@ -191,17 +195,16 @@ def _shares(
 
     Args:
         moments: their numbers, rising [n].
-        singles: those of them that stand for themselves, rising.
+        singles: those of them that stand for themselves.
         starts: where the balls begin in the tree's order [B], rising.
         balls: their weights [B].
         ranks: of the tree [N].
         counts: weights of all moments [N].
     """
-    ball, alone = np.empty(len(moments), np.int64), np.zeros(len(moments), np.bool_)
+    ball, alone = _balls_of(moments, starts, ranks), np.zeros(len(moments), np.bool_)
     alone[np.searchsorted(moments, singles)] = True
     shared, rest = np.zeros(len(balls)), balls.copy()
     for k in range(len(moments)):
-        ball[k] = np.searchsorted(starts, ranks[moments[k]], side="right") - 1
         if not alone[k]:
             shared[ball[k]] += counts[moments[k]]
     # Where none but what is near was chosen of a ball, that stands for what is left of it.
@@ -224,14 +227,19 @@ def _shares(
 @jit
 def _goals(moments: Ints, leads: Ints, starts: Int32s, stands: Ints, ranks: Int32s) -> Ints:
     """Return which of the chosen moments [n] each step leads to [m]: its own, or what stands for the ball of that."""
-    out = np.empty(len(leads), np.int64)
+    out, at = np.empty(len(leads), np.int64), -1
     for k in range(len(leads)):
-        at = np.searchsorted(moments, leads[k])
-        if at < len(moments) and moments[at] == leads[k]:
-            out[k] = at
-        else:
-            out[k] = stands[np.searchsorted(starts, ranks[leads[k]], side="right") - 1]
+        out[k] = index_of(moments, 0, len(moments), leads[k], at)
+        at = max(at, out[k])
+    others = np.flatnonzero(out < 0)
+    out[others] = stands[_balls_of(leads[others], starts, ranks)]
     return out
+
+
+@jit
+def _balls_of(moments: Ints, starts: Int32s, ranks: Int32s) -> Ints:
+    """Return the ball that each moment is in [n], of those that begin at some places in the tree's order [B]."""
+    return np.asarray(np.searchsorted(starts, ranks[moments], side="right") - 1)
 
 
 @jit

@@ -14,7 +14,7 @@ from motionmind.jit import jit
 
 
 @jit
-def _edges(numbers: Ints, first: int, last: int, wanted: int, beside: int) -> int:
+def index_of(numbers: Ints, first: int, last: int, wanted: int, beside: int) -> int:
     """Return which of rising numbers, from the first up to the last, is the wanted one; -1 for none.
 
     Those on both sides of one that was found last are tried first: steps follow one another.
@@ -63,7 +63,7 @@ def follow(moments: Ints, ahead: bool, steps: int, begins: Ints, ends: Ints, pos
                     continue
                 numbers = begins[:moves] if ahead else ends[moves:]
                 for way, (first, last) in enumerate(((0, turns), (turns, moves))):
-                    move = _edges(numbers, first, last, one, found[way])
+                    move = index_of(numbers, first, last, one, found[way])
                     if move >= 0:
                         found[way] = move
                         on.append(postures + move)
@@ -88,7 +88,7 @@ def steps_at(moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int
             count += 1
             continue
         for way, (first, last) in enumerate(((0, turns), (turns, moves))):
-            move = _edges(begins[:moves] if ahead else ends[moves:], first, last, one, found[way])
+            move = index_of(begins[:moves] if ahead else ends[moves:], first, last, one, found[way])
             if move >= 0:
                 found[way] = move
                 at[count], other[count], steps[count] = k, postures + move, move + (0 if ahead else moves)

@@ -34,7 +34,7 @@ from motionmind.walks.detail import GOES_OVER, LIVELIER, MISSES, detail_of, like
 from motionmind.walks.expectation import Expectation
 from motionmind.walks.likelihood import ANYWHERE, STRAIGHT_ON, squared_distances
 from motionmind.walks.marginals import posterior_marginals
-from motionmind.walks.mean_walk import mean_rotations
+from motionmind.walks.means import mean_rotations
 
 Z = np.array([0.0, 0.0, 1.0])
 

@@ -202,9 +202,9 @@ def test_look_ups_are_kept_as_long_as_the_corpus_and_no_longer(engine: Engine, c
     assert own.trees is not None
     own = replace(own, trees=replace(own.trees))
     ends = own.orientations[:2][:, own.trees.parts[0]].tobytes()
-    first = sparse._near_ends(own, 0, ends)
-    assert sparse._near_ends(own, 0, ends) is first
-    assert sparse._near_ends(carriage, 0, ends) is not first
+    first = sparse._near_ends(own, 0, ends, 12)
+    assert sparse._near_ends(own, 0, ends, 12) is first
+    assert sparse._near_ends(carriage, 0, ends, 12) is not first
     assert sparse._balls(own.trees, 0) is sparse._balls(own.trees, 0)
     alive, trees = weakref.ref(own), weakref.ref(own.trees)
     del own

@@ -1,0 +1,97 @@
+"""Means of rotations, each of many orientations by weights of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from motionmind._typing import Floats, Ints
+from motionmind.jit import jit
+
+COUNTS = 1e-6  # the least weight that counts in a mean
+
+
+@jit
+def mean_rotations(weights: Floats, orientations: Floats, joints: Ints, about: Floats) -> Floats:
+    """Return weighted means [S, m, 4] of m joints' orientations, in the hemisphere of `about`.
+
+    The mean is the normalised sum of quaternions of one sign, which is within a few thousandths of the mean rotation
+    where they lie within a right angle. Source: Gramkow, "On averaging rotations", IJCV 42 (2001).
+
+    Args:
+        weights: of the orientations in each mean [S, N].
+        orientations: of all chains [N, L, 4].
+        joints: the m of them.
+        about: orientations that choose each quaternion's sign, and stand in for a mean of length 0 [S, m, 4].
+    """
+    sums = np.zeros((len(joints), 4, len(about)))
+    add_rotations(sums, 1.0, weights, np.arange(weights.shape[1]), orientations, joints, about)
+    return means(sums, about)
+
+
+@jit
+def add_rotations(
+    sums: Floats, size: float, weights: Floats, counts: Ints, orientations: Floats, joints: Ints, about: Floats
+) -> None:
+    """Add some orientations, those of one sign with `about`, to the sums of all means [m, 4, S].
+
+    Arguments are those of `mean_rotations`, but for `size`, a factor of the weights, and `counts`, which orientations
+    to add [n].
+    """
+    count, moments = len(about), len(counts)
+    # Side by side for all means, which are then added to at once, four moments at a time. A weight of 0 changes no sum.
+    counted = np.zeros((moments + -moments % 4, count))
+    for i in range(moments):
+        for t in range(count):
+            weight = size * weights[t, counts[i]]
+            counted[i, t] = weight if weight >= COUNTS else 0.0
+    near, signed, shown = np.empty((4, count)), np.empty((4, count)), np.empty((4, 4))
+    for j in range(len(joints)):
+        near[:] = about[:, j].T
+        middle, added_up = about[count // 2, j], sums[j]
+        alike = _spread(near, middle)
+        for first in range(0, len(counted), 4):
+            added, mixed = counted[first : first + 4], False
+            for k in range(4):
+                x, y, z, w = orientations[counts[min(first + k, moments - 1)], joints[j]]
+                cosine = middle[0] * x + middle[1] * y + middle[2] * z + middle[3] * w
+                sign = -1.0 if cosine < -alike else 1.0
+                shown[0, k], shown[1, k], shown[2, k], shown[3, k] = sign * x, sign * y, sign * z, sign * w
+                mixed = mixed or abs(cosine) <= alike
+            if mixed:
+                for k in range(4):
+                    x, y, z, w = shown[:, k]
+                    for t in range(count):
+                        cosine = near[0, t] * x + near[1, t] * y + near[2, t] * z + near[3, t] * w
+                        signed[k, t] = -added[k, t] if cosine < 0.0 else added[k, t]
+                added = signed
+            for c in range(4):
+                a, b, d, e = shown[c]
+                own = added_up[c]
+                for t in range(count):
+                    own[t] = own[t] + added[0, t] * a + added[1, t] * b + added[2, t] * d + added[3, t] * e
+
+
+@jit
+def means(sums: Floats, about: Floats) -> Floats:
+    """Return normalised sums of m joints' orientations [m, 4, S] as means [S, m, 4]; `about` where one is 0."""
+    out = about.copy()
+    for j in range(len(sums)):
+        for t in range(len(about)):
+            x, y, z, w = sums[j, :, t]
+            length = np.sqrt(x * x + y * y + z * z + w * w)
+            if length > 1e-6:
+                out[t, j, 0], out[t, j, 1], out[t, j, 2], out[t, j, 3] = x / length, y / length, z / length, w / length
+    return out
+
+
+@jit
+def _spread(near: Floats, middle: Floats) -> float:
+    """Return how far orientations [4, S] are from one of them [4] at most, as vectors: a cosine with that one which is
+    greater has the same sign with all."""
+    farthest = 0.0
+    for t in range(near.shape[1]):
+        far = 0.0
+        for c in range(4):
+            far += (near[c, t] - middle[c]) ** 2
+        farthest = max(farthest, far)
+    return float(np.sqrt(farthest)) + 1e-6
