@@ -18,7 +18,6 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
-from motionmind.walks.means import COUNTS, add_rotations, mean_rotations, means
 from motionmind.walks.likelihood import (
     FOLLOWS_WITHIN,
     LEAVES_WITHIN,
@@ -31,6 +30,7 @@ from motionmind.walks.likelihood import (
     write_likelihood,
 )
 from motionmind.walks.marginals import posterior_marginals
+from motionmind.walks.means import COUNTS, add_rotations, mean_rotations, means
 from motionmind.walks.minimal import LASTS, departure, minimal_movement, trust
 from motionmind.walks.sparse import Chosen, all_of, choose, steps_on
 from motionmind.walks.stops import Rates, Stop
