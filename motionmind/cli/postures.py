@@ -5,17 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
 from motionmind.errors import MotionMindError
-from motionmind.names.finding import find_motion, find_posture, select_frame, select_frames
+from motionmind.names.ends import find_end
+from motionmind.names.finding import find_motion, select_frame, select_frames
 from motionmind.names.spelling import FramesName, PostureName
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion, Posture
-
-_AROUND = 0.2  # seconds of a clip before or after a moving posture; a velocity takes the nearest of them
-_ROUNDING = 1e-6  # seconds
 
 
 def read_end(
@@ -32,22 +28,10 @@ def read_end(
     Raises:
         MotionMindError: there is no such posture; or it is to be moving and there is no movement on that side.
     """
-    if not named.is_moving:
-        return find_posture(named, home), _read_frames(given, home) if given else None
-    if given:
+    if given and named.is_moving:
         raise MotionMindError(f"{named.word}: ~ takes the movement around the frame, and so does --{side}; give one")
-    word = named.source.word
-    motion = find_motion(named.source, home)
-    if len(motion) == 1:
-        raise MotionMindError(f"{named.word}: {word} holds one posture, no movement around it; leave out ~")
-    if named.moment is None:
-        raise MotionMindError(f"{named.word}: say which frame, from 0 to {len(motion) - 1}, as {word}@0~")
-    frame, times = select_frame(word, motion, named.moment), motion.times
-    near = np.flatnonzero(np.abs(times - times[frame]) <= _AROUND + _ROUNDING)
-    first, last = (min(near[0], frame - 1), frame) if side == "before" else (frame, max(near[-1], frame + 1))
-    if not (first >= 0 and last < len(motion)):
-        raise MotionMindError(f"{named.word}: nothing comes {side} frame {frame} of {word}; leave out ~")
-    return motion.posture(frame), motion.slice(int(first), int(last) + 1)
+    posture, around = find_end(named, side, home)
+    return posture, _read_frames(given, home) if given else around
 
 
 def _read_frames(named: FramesName, home: Path | None) -> Motion:

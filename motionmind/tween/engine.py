@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.corpus.corpus import FACING
 from motionmind.credits.credit import Credit
 from motionmind.display import displayed
-from motionmind.errors import InfeasibleError, MotionMindWarning, NoPathError
+from motionmind.errors import InfeasibleError, MotionMindError, MotionMindWarning, NoPathError
 from motionmind.geometry.splines import rotation_spline
 from motionmind.learned import graphs, summary
 from motionmind.learned.model import LearnedCorpus
@@ -77,7 +77,8 @@ class Engine(LearnedCorpus):
         """Find the best movement from posture `a` to posture `b` in the style of the corpus.
 
         Args:
-            a: where the motion starts, exactly; a posture, or its name, such as "ballet/arabesque" and "clip.bvh@240".
+            a: where the motion starts, exactly; a posture, or its name, such as "ballet/arabesque" and "clip.bvh@240",
+                or "clip.bvh@240~" for one that moves as the clip does there.
             b: where the motion ends, exactly, in the same way.
             request: what is asked beside the two postures; None asks for nothing more.
             before: frames that lead up to `a`, which shows how the body moves as it leaves: the last of them is `a`,
@@ -96,9 +97,10 @@ class Engine(LearnedCorpus):
             WrongTypeError: an argument is of another type, or there is no such option.
         """
         request = TweenRequest.of(request, **options)
-        start, end = _posture("a", a), _posture("b", b)
         check_type("before", before, Motion, or_none=True)
         check_type("after", after, Motion, or_none=True)
+        start, before = _end("a", a, "before", before)
+        end, after = _end("b", b, "after", after)
         check_function("watch", watch, or_none=True)
         began = perf_counter()
         formulation = formulate(self, start, end, request, before, after)
@@ -334,15 +336,20 @@ class Engine(LearnedCorpus):
         return summary.to_plain(summary.check_corpus(self.corpus, self.grammar, self.states, pairs, seed))
 
 
-def _posture(argument: str, posture: Posture | str) -> Posture:
-    """Return a posture, or the one of a name."""
-    check_type(argument, posture, Posture, str, wanted="a Posture or the name of one")
-    if isinstance(posture, Posture):
-        return posture
+def _end(
+    argument: str, end: Posture | str, side: Literal["before", "after"], around: Motion | None
+) -> tuple[Posture, Motion | None]:
+    """Return the posture at an end, which may be given by a name, and the movement on its other side, if known."""
+    check_type(argument, end, Posture, str, wanted="a Posture or the name of one")
+    if isinstance(end, Posture):
+        return end, around
     # Imported here, for scores are slow to import, and most postures are no names.
-    from motionmind.names.finding import find_posture
+    from motionmind.names.ends import find_end
 
-    return find_posture(posture)
+    posture, own = find_end(end, side)
+    if own is not None and around is not None:
+        raise MotionMindError(f"{displayed(end)}: ~ takes the movement around the frame, and so does {side}; give one")
+    return posture, around if own is None else own
 
 
 def _no_other_path(request: TweenRequest, most: float) -> NoPathError:

@@ -430,6 +430,14 @@ def test_given_movement_keeps_its_name_under_another(run: Run, tmp_path: Path) -
     assert "100%  walk, which was given" in run("credits", tmp_path / "other.glb").out
 
 
+def test_a_format_without_credits_is_told(run: Run, tmp_path: Path) -> None:
+    write_motion(tmp_path / "walk.json", replace(ballet_clip("plies"), name="walk", recorded=()))
+    assert run("convert", tmp_path / "walk.json", tmp_path / "walk.bvh").code == 0
+    ran = run("credits", tmp_path / "walk.bvh")
+    assert "walk.bvh: .bvh holds no credits; if the engine made it, name its .json, its .glb or its report" in ran.err
+    assert "credits;" not in run("credits", tmp_path / "walk.json").err
+
+
 def test_bad_input_is_one_line(run: Run, tmp_path: Path) -> None:
     (tmp_path / "old.json").write_text("{}")
     (tmp_path / "bad.json").write_text('{"credits": 3}')

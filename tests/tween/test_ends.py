@@ -250,3 +250,19 @@ def test_a_body_that_runs_on_goes_on_for_a_while(ballet: Engine) -> None:
         gone.append(rot.log(rot.inv_mul(motion.rotations[0], motion.rotations[8]))[joint] @ way)
     assert gone[0] > 0.5 * 8 / 120.0 * np.linalg.norm(velocity.rotations[joint])
     assert gone[0] > gone[1]
+
+
+def test_names_of_moving_postures_move(ballet: Engine) -> None:
+    """A ~ counts in Python as on the command line."""
+    still = ballet.tween("ballet/adagio@23", "ballet/adagio@40")
+    assert (still.before, still.after) == (None, None)
+    named = ballet.tween("ballet/adagio@23~", "ballet/adagio@40~")
+    adagio = ballet_clip("adagio")
+    near = np.flatnonzero(np.abs(adagio.times - adagio.times[23]) <= 0.2 + 1e-6)[0]
+    given = ballet.tween(
+        adagio.posture(23), adagio.posture(40), before=adagio.slice(min(near, 22), 24), after=adagio.slice(40, 42)
+    )
+    np.testing.assert_array_equal(named.motion.rotations, given.motion.rotations)
+    assert not np.array_equal(named.motion.rotations[1], still.motion.rotations[1])
+    with pytest.raises(MotionMindError, match=r"adagio@23~: ~ takes the movement around the frame, and so does before"):
+        ballet.tween("ballet/adagio@23~", "ballet/fifth", before=BEFORE)
