@@ -34,7 +34,7 @@ PRIOR = 0.3  # metres off the trajectory that feet have the root on by themselve
 TRAVEL = 0.3, 0.03  # metres a second off that, where feet alone bear, and where other parts do
 PUSH = 2.0  # metres a second squared: accelerations of the centre of mass
 HURRY = 0.02  # metres a second by which a body travels faster than it may; chosen on cmu-05
-JERKS = 0.2  # metres a second squared by which it is accelerated more than it may; chosen on cmu-16
+JERKS = 0.2  # metres a second squared by which it is accelerated level more than it may; chosen on cmu-16
 NEARLY = 0.9  # of that speed, or acceleration: from here on it is held to it
 
 
@@ -79,7 +79,7 @@ def _hurry_rows(
 
 
 def jerk_rows(root: Floats, pushes: float, freedom: Floats, fps: float) -> Rows:
-    """Return rows that spread out the accelerations of a root [N, 3] that are about to be greater than they may,
+    """Return rows that spread out the level accelerations of a root [N, 3] that are about to be greater than they may,
     metres a second squared.
 
     What bears a body, and its balance, may be had for one great jolt, as of who runs and is to stand: smooth rows weigh
@@ -94,10 +94,10 @@ def _jerk_rows(root: Floats, pushes: float, freedom: Floats, fps: float) -> tupl
     coefficients, weights = np.zeros((len(root) - 2, 9)), np.zeros(len(root) - 2)
     for t in range(len(weights)):
         bend = fps**2 * (root[t] - 2.0 * root[t + 1] + root[t + 2])
-        size = length_of((bend[0], bend[1], bend[2]))
+        size = length_of((bend[0], 0.0, bend[2]))
         if size > NEARLY * pushes:
             weights[t] = (1.0 - max(freedom[t], freedom[t + 1], freedom[t + 2])) * JERKS**-2.0
-            for k in range(3):
+            for k in (0, 2):
                 for frame, factor in enumerate((1.0, -2.0, 1.0)):
                     coefficients[t, 3 * frame + k] = fps**2 * factor * bend[k] / size
     return coefficients, np.full(len(weights), min(pushes, 1e3)), weights
