@@ -28,7 +28,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.errors import SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.joint_mapping import describe_unknown_rig, in_a_row, joint_mapping, known_rig
-from motionmind.retarget.rigs import Rig
+from motionmind.retarget.rig import Rig
 from motionmind.retarget.standing import align_by_movement, standing_pose, stands
 
 _LIMBS = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist", "wrist": "fingers"}

@@ -13,7 +13,8 @@ from motionmind.body.human import BODIES, human23
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, SkeletonError, enumerated
 from motionmind.files import parse_toml, read_bytes
-from motionmind.retarget.rigs import RIGS, Rig, plain_names, spine_shares, without_endings
+from motionmind.retarget.rig import Rig, plain_names, spine_shares, without_endings
+from motionmind.retarget.rigs import RIGS
 
 # A skeleton must have one joint of each tuple; any other joint of human23 moves with its parent.
 _ESSENTIAL = (

@@ -30,7 +30,7 @@ from motionmind.retarget.joint_mapping import (
     joint_mapping,
     read_joint_mapping,
 )
-from motionmind.retarget.rigs import plain_names
+from motionmind.retarget.rig import plain_names
 from motionmind.retarget.vertical import Z_UP, Vertical, check_up, find_vertical
 
 __all__ = ["filled_joints", "joint_mapping", "read_joint_mapping", "to_human23"]

@@ -30,7 +30,8 @@ from motionmind.retarget.retarget import (
     read_joint_mapping,
     to_human23,
 )
-from motionmind.retarget.rigs import RIGS, plain_names, spine_shares, without_endings
+from motionmind.retarget.rig import plain_names, spine_shares, without_endings
+from motionmind.retarget.rigs import RIGS
 from motionmind.retarget.vertical import stood_up
 
 BODY = human23()

@@ -92,6 +92,7 @@ def test_a_reader_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_a_reader_that_takes_too_much_memory_is_found_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fuzz, "MOST_MEMORY", 5 * 10**7)
+    monkeypatch.setattr(fuzz, "LONGEST", 300.0)  # so much memory may take its time beside other tests
     more = fuzz.largest() // 8 + 10**7  # numbers of 8 bytes, which this process never had
     reader = fuzz.Reader("large", "a.txt", [b""], lambda path: np.ones(more).sum())
     was_read, fault = fuzz.attempt(reader, reader.lay_out(tmp_path / "a"), b"")
