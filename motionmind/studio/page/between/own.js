@@ -13,6 +13,7 @@ export function Own({ studio, close }) {
   const { store, api } = studio;
   const dialog = useRef(/** @type {any} */ (null));
   const restore = useRef(/** @type {any} */ (null));
+  const brought = useRef(0); // whoever brings a posture back may delete it at once again
   /** @type {Saved[]} */
   const postures = useChange(store, () => store.state.postures);
   const [wrong, setWrong] = useState("");
@@ -31,14 +32,14 @@ export function Own({ studio, close }) {
     studio.once(`rename ${one.name}`, () => api.edit({ edit: "several", words: "rename a posture", edits }));
   };
   const remove = (/** @type {Saved} */ one) =>
-    studio.once(`delete ${one.name}`, async () => {
+    studio.once(`delete ${one.name} ${brought.current}`, async () => {
       await api.edit({ edit: "posture", name: one.name, posture: null });
       setWrong("");
       setGone(one);
     });
   const bring = (/** @type {Saved} */ { name, key }) => {
     setGone(null);
-    studio.once(`restore ${name}`, () => api.edit({ edit: "posture", name, posture: key }));
+    studio.once(`restore ${name} ${brought.current++}`, () => api.edit({ edit: "posture", name, posture: key }));
   };
   return html`<dialog ref=${dialog} class="sheet own-postures" data-testid="own-postures" aria-label="Your own postures" onClose=${close}>
     <form method="dialog" class="row">
