@@ -59,9 +59,10 @@ def turn_with_walks(
         missing -= 2.0 * np.pi * np.round(missing / (2.0 * np.pi))
         if near:  # no more than the one turn that a spin, or having as far to either side, is worth
             either = abs(way) >= NEARLY
-            fewest, most = either or any(rate < 0.0 for rate in spins), either or any(rate > 0.0 for rate in spins)
+            fewest = -int(either or any(rate < 0.0 for rate in spins))
+            most = int(either or any(rate > 0.0 for rate in spins))
             turns = np.round((out[end] + missing - out[start] - way) / (2.0 * np.pi))
-            missing += 2.0 * np.pi * (np.clip(turns, -int(fewest), int(most)) - turns)
+            missing += 2.0 * np.pi * (np.clip(turns, fewest, most) - turns)
         share = np.cumsum(varies[start:end]) / varies[start:end].sum()
         out[start + 1 : end + 1] += missing * share
         out[end + 1 :] += missing
