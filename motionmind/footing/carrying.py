@@ -61,6 +61,28 @@ class Ends(NamedTuple):
     rates: tuple[float | None, float | None]
 
 
+class Allowed(NamedTuple):
+    """The changes and speeds that a body is allowed.
+
+    Attributes:
+        fixed: joints that must not change for the feet's sake [J].
+        loose: joints without limits [J].
+        fastest: speeds of the joints in the corpus [J], rad/s.
+        travels: how fast the body travels at most, metres a second; infinite for any speed.
+        pushes: how much its root is accelerated at most, metres a second squared; infinite for any.
+    """
+
+    fixed: Bools
+    loose: Bools
+    fastest: Floats
+    travels: float
+    pushes: float
+
+    def scaled(self, by: float) -> Allowed:
+        """Return the same of a body of another size."""
+        return self._replace(travels=by * self.travels, pushes=by * self.pushes)
+
+
 class Carried(NamedTuple):
     """A body carried.
 
@@ -91,9 +113,7 @@ def carry(
     feet: list[Foot],
     known: Ends,
     overhang: float,
-    travels: float,
-    pushes: float,
-    fastest: Floats,
+    allowed: Allowed,
     gravity: float,
     fps: float,
     without: Collection[Correction],
@@ -110,9 +130,7 @@ def carry(
         feet: those that may be placed.
         known: what is known of its ends, and of its flights.
         overhang: how far beyond its support the centre of mass may be, metres.
-        travels: how fast the body travels at most, metres a second; infinite for any speed.
-        pushes: how much its root is accelerated at most, metres a second squared; infinite for any.
-        fastest: speeds of the joints in the corpus [J], rad/s.
+        allowed: how fast it may be.
         gravity: metres a second squared.
         fps: frames a second.
         without: corrections to leave out.
@@ -145,7 +163,7 @@ def carry(
     fixed[[0, -1]] = True
     fixed[[1, -2]] |= known.moving
     own, bones = pose(skeleton, plain), np.array([foot.bones(skeleton) for foot in feet]).reshape(-1, 2)
-    legs, knees = legs_of(skeleton, own.places, feet), [float(fastest[foot.leg[foot.knee]]) for foot in feet]
+    legs, knees = legs_of(skeleton, own.places, feet), [float(allowed.fastest[foot.leg[foot.knee]]) for foot in feet]
     start, off, posed = root, np.zeros((count, len(feet), 3)), plain
     touches = bearing.touching(shape)
     balances = "balance" not in without and bool(mass.any())
@@ -165,8 +183,8 @@ def carry(
             rows = [
                 *steady,
                 sunk_rows(shape, floor, start),
-                hurry_rows(start, travels, freedom, fps),
-                jerk_rows(start, pushes, freedom, fps),
+                hurry_rows(start, allowed.travels, freedom, fps),
+                jerk_rows(start, allowed.pushes, freedom, fps),
             ]
             reaching = legs_to_places(legs, shape, bearing, floor, start)
             rows += [

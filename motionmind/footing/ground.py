@@ -21,11 +21,10 @@ from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import size_of
 from motionmind.footing.balance import GRAVITY
-from motionmind.footing.carrying import Carried, Ends, carry, foot_heights
+from motionmind.footing.carrying import Allowed, Carried, Ends, carry, foot_heights
 from motionmind.footing.corrections import Correction
 from motionmind.footing.departures import fade_at_ends
 from motionmind.footing.feet import (
-    KNEE,
     Foot,
     bend_legs,
     ease_knees,
@@ -74,12 +73,36 @@ class Stance(NamedTuple):
         return self._replace(**{name: by * getattr(self, name) for name in lengths})
 
 
+class Given(NamedTuple):
+    """The given postures of a movement, by their heights, and its two ends.
+
+    Attributes:
+        low: height of the lowest point above 0 of the given postures, metres, by the number of moves that lead there;
+            with the first and the last.
+        ends: the first and the last position of the root [3], metres.
+        rates: its first and its last velocity [3], metres a second; None where unknown.
+    """
+
+    low: Mapping[int, float]
+    ends: tuple[Floats, Floats]
+    rates: tuple[Floats | None, Floats | None]
+
+    def scaled(self, by: float) -> Given:
+        """Return the same of a body of another size."""
+        first, last = self.rates
+        return Given(
+            {move: by * height for move, height in self.low.items()},
+            (by * self.ends[0], by * self.ends[1]),
+            (None if first is None else by * first, None if last is None else by * last),
+        )
+
+
 def ends_in_air(stance: Stance, low: Mapping[int, float], size: float) -> tuple[Bools, Floats]:
     """Return whether the first and the last posture of a body are in the air [2], and how high they are [2], metres.
 
     Args:
         stance: how the corpus's bodies hold themselves along its movement; no matter in how much time.
-        low: height of the lowest point above 0 of the given postures, metres, as of `set_on_floor`.
+        low: height of the lowest point above 0 of the given postures, metres, as of `Given`.
         size: of the body (`motionmind.body.support.size_of`).
     """
     small, ends = stance.scaled(1.0 / size), _of_ends(low) / size
@@ -100,14 +123,8 @@ def set_on_floor(
     plain: Floats,
     times: Floats,
     stance: Stance,
-    loose: Bools,
-    fixed: Bools,
-    low: Mapping[int, float],
-    ends: tuple[Floats, Floats],
-    rates: tuple[Floats | None, Floats | None],
-    fastest: Floats | None = None,
-    travels: float = np.inf,
-    pushes: float = np.inf,
+    given: Given,
+    allowed: Allowed,
     without: Collection[Correction] = (),
 ) -> tuple[Floats, Floats]:
     """Return a movement that its feet carry: local rotations [N, J, 4] and positions of the root [N, 3], metres.
@@ -120,46 +137,27 @@ def set_on_floor(
         plain: the same without fine detail, by which feet find their places.
         times: of the frames [N], seconds.
         stance: how the corpus's bodies hold themselves and travel along it.
-        loose: joints without limits [J].
-        fixed: joints that must not change for the feet's sake [J].
-        low: height of the lowest point above 0 of the given postures, metres, by the number of moves that lead there;
-            with the first and the last.
-        ends: the first and the last position of the root [3], metres.
-        rates: its first and its last velocity [3], metres a second; None where unknown.
-        fastest: speeds of the joints in the corpus [J], rad/s; None where there is no telling.
-        travels: how fast the body travels at most, metres a second.
-        pushes: how much its root is accelerated at most, metres a second squared.
+        given: its ends, and how high the given postures are.
+        allowed: what it may change, and how fast it may be.
         without: corrections to leave out.
     """
     size = size_of(skeleton)
     small = replace(skeleton, offsets=skeleton.offsets / size, tips=skeleton.tips / size)
-    lows = {move: height / size for move, height in low.items()}
-    near = (ends[0] / size, ends[1] / size)
-    slow = (None if rates[0] is None else rates[0] / size, None if rates[1] is None else rates[1] / size)
-    gravity = GRAVITY / size
-    if fastest is None:
-        fastest = np.full(len(skeleton), KNEE)
-    stance = stance.scaled(1.0 / size)
-    placed = _set_down(
+    by = 1.0 / size
+    turned, root = _set_down(
         small,
         rotations,
         plain,
         times,
-        stance,
-        loose,
-        fixed,
-        lows,
-        near,
-        slow,
-        fastest,
-        travels / size,
-        pushes / size,
-        gravity,
+        stance.scaled(by),
+        given.scaled(by),
+        allowed.scaled(by),
+        GRAVITY / size,
         without,
     )
-    root = size * placed[1]
-    root[0], root[-1] = ends
-    return placed[0], root
+    root *= size
+    root[0], root[-1] = given.ends
+    return turned, root
 
 
 def _set_down(
@@ -168,39 +166,33 @@ def _set_down(
     plain: Floats,
     times: Floats,
     stance: Stance,
-    loose: Bools,
-    fixed: Bools,
-    low: Mapping[int, float],
-    ends: tuple[Floats, Floats],
-    rates: tuple[Floats | None, Floats | None],
-    fastest: Floats,
-    travels: float,
-    pushes: float,
+    given: Given,
+    allowed: Allowed,
     gravity: float,
     without: Collection[Correction],
 ) -> tuple[Floats, Floats]:
     """Return what `set_on_floor` does, of a body as large as a person, where gravity is as given."""
-    half_steps, given = stance.half_steps, 2 * np.array(list(low))
-    lows = _of_ends(low)
+    half_steps, through, rates = stance.half_steps, 2 * np.array(list(given.low)), given.rates
+    lows = _of_ends(given.low)
     hovering = _hovering(stance, lows)
     aloft = stance.aloft.copy()
     aloft[[0, -1]] = np.where(hovering, 1.0, aloft[[0, -1]])
     under = _floor_under(half_steps, stance.clearance, lows, hovering)
     at_half_steps = stance.clearance + under
-    evenly = np.interp(half_steps, half_steps[given], list(low.values()))
+    evenly = np.interp(half_steps, half_steps[through], list(given.low.values()))
     at_half_steps = evenly + stance.trust * (at_half_steps - evenly)
-    at_half_steps[given] = evenly[given]
+    at_half_steps[through] = evenly[through]
     heights, floor = _eased(half_steps, at_half_steps, times), np.interp(times, half_steps, under)
     places = np.concatenate([np.zeros((1, 3)), np.cumsum(stance.drift, axis=0)])
     middles = 0.5 * (times[1:] + times[:-1])
     held = np.stack([np.interp(middles, half_steps, limb) for limb in stance.stands.T], axis=1)
     drifts = np.diff(natural_spline(half_steps, places, times), axis=0)
     clear = np.maximum(heights - floor, 0.0)
-    fps, feet = 1.0 / (times[1] - times[0]), find_free_feet(skeleton, fixed)
+    fps, feet = 1.0 / (times[1] - times[0]), find_free_feet(skeleton, allowed.fixed)
     easily = steps_easily(foot_heights(skeleton, rotations, np.zeros((len(times), 3)), feet), fps)
-    root = root_trajectory(skeleton, rotations, clear, held, drifts, *ends, times[-1], easily)
+    root = root_trajectory(skeleton, rotations, clear, held, drifts, *given.ends, times[-1], easily)
     root = stand(skeleton, rotations, _with_rates(root, times, rates), heights)
-    root[0], root[-1] = ends
+    root[0], root[-1] = given.ends
     first, last = rates  # what is in the air goes on as it goes; elsewhere what stands says how high it is
     fallen = 0.5 * gravity / fps**2
     if hovering[0] and first is not None:
@@ -209,7 +201,7 @@ def _set_down(
         root[-2, 1] = root[-1, 1] - last[1] / fps - fallen
     firm = np.stack([np.interp(times, half_steps, limb) for limb in stance.stands.T], axis=1)
     aloft, leaps = (np.interp(times, half_steps, one) for one in (aloft, stance.leaps))
-    frames, fine, rotations = fps * half_steps[given], not np.array_equal(plain, rotations), rotations.copy()
+    frames, fine, rotations = fps * half_steps[through], not np.array_equal(plain, rotations), rotations.copy()
     for number, (start, end) in enumerate(pairwise(frames)):
         # Rounded: a posture that falls on a frame but for rounding errors keeps that frame.
         part = slice(int(np.ceil(start - 1e-6)), int(end + 1e-6) + 1)
@@ -233,15 +225,13 @@ def _set_down(
             feet,
             known,
             stance.overhang,
-            travels,
-            pushes,
-            fastest,
+            allowed,
             gravity,
             fps,
             without,
         )
         rotations[part], root[part] = _reach_floor(
-            skeleton, rotations[part], carried, floor[part], feet, loose, fine, known.moving, fastest, fps
+            skeleton, rotations[part], carried, floor[part], feet, allowed, fine, known.moving, fps
         )
         sunk = np.maximum(floor[part] - lowest_height(skeleton, rotations[part], root[part]) - SINKS, 0.0)
         root[part, 1] += cover(sunk, fps) * fade_at_ends(len(sunk), (True, True), fps)
@@ -254,10 +244,9 @@ def _reach_floor(
     carried: Carried,
     floor: Floats,
     feet: list[Foot],
-    loose: Bools,
+    allowed: Allowed,
     fine: bool,
     moving: tuple[bool, bool],
-    fastest: Floats,
     fps: float,
 ) -> tuple[Floats, Floats]:
     """Return rotations whose legs are where they should be, within their limits, and the root.
@@ -271,7 +260,7 @@ def _reach_floor(
         return out, root
     posed, soft = pose(skeleton, rotations), softness(carried.holds)
     planted = bend_legs(skeleton, posed, feet, carried.off, soft)
-    out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
+    out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], allowed.loose, joints)[1:-1, joints]
     missing = carried.heights - foot_heights(skeleton, out, root, feet)
     off = carried.off + missing[..., None] * np.array([0.0, 1.0, 0.0]) * fades[:, None, None]
     room = carried.heights - floor[:, None] + SINKS
@@ -286,11 +275,11 @@ def _reach_floor(
         fine,
         carried.staying,
         moving,
-        fastest,
+        allowed.fastest,
         fps,
     )
     planted = bend_legs(skeleton, posed, feet, eased, np.zeros(soft.shape))
-    out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
+    out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], allowed.loose, joints)[1:-1, joints]
     return out, root + shift
 
 

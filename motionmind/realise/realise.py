@@ -18,8 +18,10 @@ from motionmind.body.plausibility import GRAVITY
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import size_of
 from motionmind.corpus.corpus import Corpus, subdivide_times
+from motionmind.footing.carrying import Allowed
 from motionmind.footing.corrections import Correction
-from motionmind.footing.ground import Stance, ends_in_air, set_on_floor
+from motionmind.footing.feet import KNEE
+from motionmind.footing.ground import Given, Stance, ends_in_air, set_on_floor
 from motionmind.footing.legs import find_legs
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
@@ -176,14 +178,8 @@ def realise(
         rot.mul(rotations, rot.exp(-detail)) if len(detailed) else rotations,
         clock.frames,
         stance,
-        carriage.loose,
-        fixed[: len(a.skeleton)],
-        low,
-        (a.root, b.root),
-        (None if leaving is None else leaving.root, None if arriving is None else arriving.root),
-        None if fastest is None else pace * fastest[: len(a.skeleton)],
-        np.inf if fastest is None else float(HEADROOM * pace * fastest[-1] * a.skeleton.height),
-        np.inf if most is None else float(most[-1]) * a.skeleton.height,
+        Given(low, (a.root, b.root), (_rate(leaving), _rate(arriving))),
+        _allowed(a.skeleton, fixed, carriage, quick, most),
         without,
     )
     settle = partial(
@@ -195,7 +191,7 @@ def realise(
         wished=wished,
         carriage=carriage,
         overhang=stance.overhang,
-        fastest=None if fastest is None else pace * fastest[: len(a.skeleton)],
+        fastest=None if quick is None else quick[: len(a.skeleton)],
         without=without,
     )
     motion = settle(Motion(a.skeleton, rotations, root, clock.frames), clock)
@@ -205,6 +201,31 @@ def realise(
             most = _quickest(most, speeds, pace, len(a.skeleton))
         motion, clock = slow_down(motion, clock, most, moving, pace * slides, settle, lasts=length is not None)
     return Realised(replace(motion, name="tween", insertions=(Insertion(clock.moves),)), detailed, walk.left_out)
+
+
+def _allowed(body: Skeleton, fixed: Bools, carriage: Carriage, quick: Floats | None, most: Floats | None) -> Allowed:
+    """Return what a body may change for its feet, and how fast it may be.
+
+    Args:
+        body: the body.
+        fixed: chains that do not move for the feet's sake [L].
+        carriage: how the corpus's bodies hold themselves.
+        quick: speeds of the joints, of turning and of travel [J + 2]; None for any.
+        most: the greatest of movement as long, as of `realise`'s `peaks` [J + 4]; None for any.
+    """
+    joints = len(body)
+    return Allowed(
+        fixed[:joints],
+        carriage.loose,
+        np.full(joints, KNEE) if quick is None else quick[:joints],
+        np.inf if quick is None else float(HEADROOM * quick[-1] * body.height),
+        np.inf if most is None else float(most[-1]) * body.height,
+    )
+
+
+def _rate(velocity: Velocity | None) -> Floats | None:
+    """Return the velocity of the root [3], metres a second; None for none."""
+    return None if velocity is None else velocity.root
 
 
 def _times(factor: float, velocity: Velocity | None) -> Velocity | None:

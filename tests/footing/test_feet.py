@@ -17,9 +17,11 @@ from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, find_support
 from motionmind.footing.balance import GRAVITY, nearest_in_support
+from motionmind.footing.carrying import Allowed
 from motionmind.footing.departures import FLICKS, LIFT, departure
+from motionmind.footing.feet import KNEE
 from motionmind.footing.footfalls import Stance as StandingFoot
-from motionmind.footing.ground import Stance, set_on_floor
+from motionmind.footing.ground import Given, Stance, set_on_floor
 from motionmind.footing.least_squares import difference_rows, position_rows, solve
 from motionmind.footing.legs import find_legs, reach
 from motionmind.footing.root import stand
@@ -55,6 +57,10 @@ def grounded(
     aloft: Floats | None = None,
     leap: float = 0.0,
     plain: Floats | None = None,
+    rates: tuple[Floats | None, Floats | None] = (None, None),
+    fastest: Floats | None = None,
+    travels: float = np.inf,
+    pushes: float = np.inf,
     **options: Any,
 ) -> tuple[Floats, Floats]:
     """The movement on the floor, between the root's ends; walks stand on all limbs, but where they are `aloft`."""
@@ -69,11 +75,12 @@ def grounded(
     clearance, leaps = flies * leap, np.where(flies > 0.0, leap, 0.0)
     stance = Stance(half_steps, clearance, none + 1.0, stands, flies, leaps, np.zeros((2 * moves, 3)), 0.08)
     loose = np.zeros(len(skeleton), dtype=np.bool_)
-    rates = options.pop("rates", (None, None))
-    ends = root[0], root[-1]
+    ends = Given(low, (root[0], root[-1]), rates)
+    fastest = np.full(len(skeleton), KNEE) if fastest is None else fastest
+    allowed = Allowed(fixed, loose, fastest, travels, pushes)
     times = np.arange(len(q)) / fps
     plain = q if plain is None else plain
-    return set_on_floor(skeleton, q, plain, times, stance, loose, fixed, low, ends, rates, **options)
+    return set_on_floor(skeleton, q, plain, times, stance, ends, allowed, **options)
 
 
 def posed(degrees: dict[str, tuple[float, float, float]], frames: int) -> Floats:
