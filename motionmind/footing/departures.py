@@ -12,7 +12,7 @@ from motionmind.jit import jit
 SETTLES = 0.3  # seconds in which a foot that hovers where it is given comes down to the floor
 FADES = 0.15  # seconds in which a foot that passes an end, with a velocity of its own, comes to its place
 BENDS = 0.25  # seconds in which a departure of a swinging foot from the movement's own track begins and ends
-SLIDES = 1.4  # seconds: how much a foot that is low in a step is kept from sliding, beside its smoothness
+SLIDES = 1.85  # seconds: how much a foot that is low in a step is kept from sliding, beside its smoothness
 RISES = 0.33  # share of a step in which it lifts the foot, and in which it lowers it
 LIFT = 0.105  # metres to which a step lifts a foot that the movement does not lift; chosen on cmu-05 and cmu-16
 FLICKS = 1.7, 12.0  # times as fast as the corpus's knees, and radians a second, at which a step bends a knee at most
