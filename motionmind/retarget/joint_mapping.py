@@ -13,6 +13,7 @@ from motionmind.body.human import BODIES, human23
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, SkeletonError, enumerated
 from motionmind.files import parse_toml, read_bytes
+from motionmind.retarget.limb_names import map_by_limbs
 from motionmind.retarget.rig import Rig, plain_names, spine_shares, without_endings
 from motionmind.retarget.rigs import RIGS
 
@@ -27,6 +28,7 @@ _ESSENTIAL = (
     ("lumbar", "thorax"),
     ("cervical", "atlantal"),
 )
+BY_LIMBS = Rig("names of limbs", {}, ())  # of `limb_names`
 _TREES = 64  # that are known again
 
 
@@ -125,7 +127,8 @@ def _known_tree(names: tuple[str, ...], parents: tuple[int, ...]) -> tuple[Rig, 
             mapping = _map_by_names(rig, plain, parents)
             if rig.marks <= set(plain) and not _missing(mapping.values()):
                 return rig, {names[i]: mapping[i] for i in sorted(mapping)}
-    return None
+    limbs = map_by_limbs(names, parents)
+    return (BY_LIMBS, {names[i]: limbs[i] for i in sorted(limbs)}) if limbs else None
 
 
 def _map_by_names(rig: Rig, plain: Sequence[str], parents: Sequence[int]) -> dict[int, str]:
