@@ -157,6 +157,19 @@ def describe_unknown_rig(skeleton: Skeleton) -> str:
     return f"the joints of {skeleton.name} do not map to human23: named as in {name}, they lack {enumerated(missing)}"
 
 
+def describe_limbs(skeleton: Skeleton) -> str:
+    """Say which joints are taken for pelvis, left leg and left arm, where names of limbs tell; "" for any other rig."""
+    known = known_rig(skeleton)
+    if known is None or known[0] is not BY_LIMBS:
+        return ""
+    of = {joint: name for name, joint in reversed(known[1].items())}
+    leg, arm = (
+        ", ".join(of[f"left_{joint}"] for joint in row)
+        for row in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
+    )
+    return f"joints are known by names of limbs: {of['pelvis']} is the pelvis, {leg} a leg, {arm} an arm"
+
+
 def _resolve(skeleton: Skeleton, joints: Mapping[str, str]) -> dict[str, str]:
     """Resolve and check the user's mapping; return it by the skeleton's own names, in their order."""
     plain = plain_names(skeleton.names)
