@@ -13,7 +13,7 @@ from motionmind.body.human import BODIES, human23
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, SkeletonError, enumerated
 from motionmind.files import parse_toml, read_bytes
-from motionmind.retarget.limb_names import map_by_limbs
+from motionmind.retarget.limb_names import find_unclear, map_by_limbs
 from motionmind.retarget.rig import Rig, plain_names, spine_shares, without_endings
 from motionmind.retarget.rigs import RIGS
 
@@ -29,6 +29,7 @@ _ESSENTIAL = (
     ("cervical", "atlantal"),
 )
 BY_LIMBS = Rig("names of limbs", {}, ())  # of `limb_names`
+_FEW = 2  # limbs that names do not tell, where the others' are names of limbs
 _TREES = 64  # that are known again
 
 
@@ -152,6 +153,10 @@ def describe_unknown_rig(skeleton: Skeleton) -> str:
         missing = _missing(_map_by_names(rig, plain, skeleton.parents).values())
         lacking.append((missing + [f"a joint called {mark}" for mark in sorted(rig.marks - set(plain))], rig.name))
     missing, name = min(lacking, key=lambda one: len(one[0]))
+    unclear = find_unclear(skeleton.names, skeleton.parents)
+    if len(unclear) < len(missing) and len(unclear) <= _FEW:
+        fault = f"names of limbs do not tell {enumerated([f'the {part}' for part in unclear])}"
+        return f"the joints of {skeleton.name} do not map to human23: {fault}"
     if len(missing) > len(_ESSENTIAL) // 2:
         return f"the joints of {skeleton.name} do not map to human23: they have the names of no known rig"
     return f"the joints of {skeleton.name} do not map to human23: named as in {name}, they lack {enumerated(missing)}"

@@ -62,6 +62,9 @@ _MOST = 8  # words of a limb that are looked at
 _SIDES = {"left": ("left", "l", "lf", "lt", "左"), "right": ("right", "r", "rt", "右")}
 
 
+_PARTS = {f"{side} {name}": (side, limb) for side in _SIDES for name, limb in (("leg", _LEG), ("arm", _ARM))}
+
+
 class _Named(NamedTuple):
     """A joint by its name: the side that it is on, "" for none, and the word for it."""
 
@@ -89,6 +92,16 @@ def map_by_limbs(names: Sequence[str], parents: Sequence[int]) -> dict[int, str]
         if found is not None:
             return found
     return None
+
+
+def find_unclear(names: Sequence[str], parents: Sequence[int]) -> list[str]:
+    """Name what `map_by_limbs` does not find of a person's parts, as few as an affix of names leaves; all if none."""
+    plain, least = [_plain(name) for name in names], list(_PARTS)
+    for affix in _AFFIXES:
+        named = [_read(_without(name, affix)) for name in plain]
+        unclear = [part for part, (side, limb) in _PARTS.items() if not _find_limb(side, limb, named, parents)]
+        least = min(least, unclear, key=len)
+    return least or ["pelvis, spine or head"]
 
 
 def _plain(name: str) -> str:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from motionmind.body.skeleton import Skeleton
+from motionmind.retarget.joint_mapping import describe_unknown_rig
 from motionmind.retarget.limb_names import map_by_limbs
 
 TRUNK = "Hips Spine<Hips Chest<Spine Neck<Chest Head<Neck"
@@ -129,6 +132,25 @@ def test_sides_are_said_before_and_after(left: str, right: str, middle: str) -> 
 )
 def test_what_is_not_clear_is_no_rig(text: str) -> None:
     assert mapped(text) == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "unclear"),
+    [
+        (f"{TRUNK} {LEG.replace('Shin', 'Middle').replace('Foot', 'End')} {ARM}", "the left leg, the right leg"),
+        (f"{TRUNK} {LEG} {ARM.replace('Hand_{S}<Forearm_{S}', 'Hand_L<Forearm_L')}", "the right arm"),
+        (
+            f"Root Hips<Root Spine<Hips Chest<Spine Head<Chest {ARM} {LEG.replace('<Hips', '<Root')}",
+            "the pelvis, spine or",
+        ),
+        (f"{TRUNK} Wing_{{S}}<Chest", ""),
+    ],
+)
+def test_what_is_not_clear_is_named(text: str, unclear: str) -> None:
+    names, parents = read_tree(text)
+    said = describe_unknown_rig(Skeleton("file", tuple(names), tuple(parents), np.zeros((len(names), 3))))
+    fault = f"names of limbs do not tell {unclear}"
+    assert (fault in said) if unclear else ("names of limbs" not in said)
 
 
 def test_which_of_five_toes_is_meant_is_not_said() -> None:
