@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from motionmind.errors import MotionMindError
+from motionmind.formats import read_motion
 from motionmind.names.ends import find_end
 from motionmind.names.finding import find_motion, select_frame, select_frames
 from motionmind.names.spelling import FramesName, PostureName
@@ -19,8 +20,8 @@ def read_end(
     named: PostureName,
     given: FramesName | None,
     side: Literal["before", "after"],
-    home: Path | None,
-    read: Callable[[Path], Motion],
+    home: Path | None = None,
+    read: Callable[[Path], Motion] = read_motion,
 ) -> tuple[Posture, Motion | None]:
     """Read the posture at one end of a tween, and the movement on its other side.
 

@@ -24,7 +24,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Sequence
-from itertools import pairwise, product
+from itertools import groupby, pairwise, product
 from typing import NamedTuple
 
 from motionmind.retarget.rig import spine_shares
@@ -60,8 +60,6 @@ _MIDDLES = ("", "x", "m", "c")  # "root.x" of Auto-Rig Pro, "Root_M" of Advanced
 _AFFIXES = ("", "def", "org", "joint", "jnt", "bone", "bn", "bind", "b", "j", "c")
 _MOST = 8  # words of a limb that are looked at
 _SIDES = {"left": ("left", "l", "lf", "lt", "左"), "right": ("right", "r", "rt", "右")}
-
-
 _PARTS = {f"{side} {name}": (side, limb) for side in _SIDES for name, limb in (("leg", _LEG), ("arm", _ARM))}
 
 
@@ -180,9 +178,14 @@ def _word(rest: str) -> str:
 
 def _find_limb(side: str, limb: Sequence[str], named: Sequence[_Named], parents: Sequence[int]) -> dict[int, str]:
     """Return the joints of a limb, downwards: {joint's index: human23's, sideless}; empty if they are not clear."""
-    own = [i for i, one in enumerate(named) if one.side == side and {*_WORDS[one.word]} & {*limb}]
-    above = {i for end in own for i in _way(parents[end], parents)}
-    chains = [[i for i in reversed(_way(end, parents)) if i in own] for end in own if end not in above]
+    own = {i for i, one in enumerate(named) if one.side == side and {*_WORDS[one.word]} & {*limb}}
+    above: set[int] = set()
+    for end in own:
+        up = parents[end]
+        while up >= 0 and up not in above:
+            above.add(up)
+            up = parents[up]
+    chains = [[i for i in reversed(_way(end, parents)) if i in own] for end in sorted(own - above)]
     found = [placed for placed in (_place(chain, limb, named) for chain in chains) if placed]
     joined = {i: joint for one in found for i, joint in one.items()}
     for joint in limb:
@@ -196,8 +199,8 @@ def _find_limb(side: str, limb: Sequence[str], named: Sequence[_Named], parents:
 
 def _place(chain: Sequence[int], limb: Sequence[str], named: Sequence[_Named]) -> dict[int, str]:
     """Place the joints of a chain in a limb, downwards, as this module's docstring says; empty if that is not clear."""
-    words = list(dict.fromkeys(named[i].word for i in chain))
-    if len(words) > _MOST:
+    words = [word for word, _ in groupby(named[i].word for i in chain)]
+    if len(words) > _MOST or len({*words}) < len(words):
         return {}
     ways = [way for way in product(*(_WORDS[word] for word in words)) if _is_in_order(way, limb)]
     most = max((_count(way) for way in ways), default=0)

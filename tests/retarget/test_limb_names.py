@@ -123,6 +123,8 @@ def test_sides_are_said_before_and_after(left: str, right: str, middle: str) -> 
         f"{TRUNK} {ARM} Shin_{{S}}<Hips Thigh_{{S}}<Shin_{{S}} Foot_{{S}}<Thigh_{{S}}",  # another order
         f"{TRUNK} {ARM} Thigh_{{S}}<Hips Shin_{{S}}<Hips Foot_{{S}}<Hips",  # not in a row
         f"{TRUNK} {ARM} {LEG} Femur_{{S}}<Hips Tibia_{{S}}<Femur_{{S}} Ankle_{{S}}<Tibia_{{S}}",  # four legs
+        f"{TRUNK} {ARM} {LEG.replace('Foot_{S}<Shin', 'ThighTwist_{S}<Shin_{S} Foot_{S}<ThighTwist')}",  # again
+        f"{TRUNK} {ARM} Leg_{{S}}<Hips Knee_{{S}}<Leg_{{S}} Leg2_{{S}}<Knee_{{S}} Foot_{{S}}<Leg2_{{S}}",
         f"{TRUNK} {LEG} Arm_{{S}}<Hips Elbow_{{S}}<Arm_{{S}} Hand_{{S}}<Elbow_{{S}}",  # no spine
         f"{TRUNK.replace(' Head<Neck', '')} {LEG} {ARM}",  # no head
         f"{TRUNK.replace('Head<Neck', 'Head<Hips')} {LEG} {ARM}",  # a head that is not over the chest
