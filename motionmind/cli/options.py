@@ -266,7 +266,7 @@ def reading(function: _Function) -> _Function:
             section=Section.INPUT,
             metavar="UNIT",
             help="Set BVH's unit of length: m, cm, mm, dm, in, ft, cmu, or metres per unit  "
-            "[default: guessed from the body's height; metres for glTF]",
+            "[default: guessed from the body's height; metres for glTF and .npz]",
         ),
         option(
             "--joints",

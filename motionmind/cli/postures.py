@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from motionmind.errors import MotionMindError
+from motionmind.formats import read_motion
 from motionmind.names.ends import find_end
 from motionmind.names.finding import find_motion, select_frame, select_frames
 from motionmind.names.spelling import FramesName, PostureName
@@ -15,7 +17,11 @@ if TYPE_CHECKING:
 
 
 def read_end(
-    named: PostureName, given: FramesName | None, side: Literal["before", "after"], home: Path | None = None
+    named: PostureName,
+    given: FramesName | None,
+    side: Literal["before", "after"],
+    home: Path | None = None,
+    read: Callable[[Path], Motion] = read_motion,
 ) -> tuple[Posture, Motion | None]:
     """Read the posture at one end of a tween, and the movement on its other side.
 
@@ -24,19 +30,20 @@ def read_end(
         given: the frames before or after it, if they are named.
         side: the side of the posture on which movement is taken: before A, after B.
         home: the folder of the user's corpora; None for the usual one.
+        read: reads a file of movement.
 
     Raises:
         MotionMindError: there is no such posture; or it is to be moving and there is no movement on that side.
     """
     if given and named.is_moving:
         raise MotionMindError(f"{named.word}: ~ takes the movement around the frame, and so does --{side}; give one")
-    posture, around = find_end(named, side, home)
-    return posture, _read_frames(given, home) if given else around
+    posture, around = find_end(named, side, home, read=read)
+    return posture, _read_frames(given, home, read) if given else around
 
 
-def _read_frames(named: FramesName, home: Path | None) -> Motion:
+def _read_frames(named: FramesName, home: Path | None, read: Callable[[Path], Motion]) -> Motion:
     word = named.source.word
-    motion = find_motion(named.source, home)
+    motion = find_motion(named.source, home, read=read)
     first, last = (select_frame(word, motion, moment) for moment in (named.first, named.last))
     frames = select_frames(word, len(motion), first, last)
     return motion.slice(frames.start, frames.stop)

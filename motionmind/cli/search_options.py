@@ -23,8 +23,8 @@ from motionmind.grammar.schemes import Scheme, Weights
 from motionmind.tween.request import PACES, TweenRequest
 
 if TYPE_CHECKING:
-    from motionmind.body.motion import Posture
-    from motionmind.names.spelling import PostureName
+    from motionmind.body.motion import Motion, Posture
+    from motionmind.names.spelling import PostureName, Source
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -243,12 +243,15 @@ def searching(function: _Function) -> _Function:
     return function
 
 
-def request_options(options: Mapping[str, Any], home: Path | None) -> dict[str, Any]:
+def request_options(
+    options: Mapping[str, Any], home: Path | None, read: Callable[[Path], Motion] | None = None
+) -> dict[str, Any]:
     """Turn the values of the search options into fields of `TweenRequest`, reading the postures to pass through.
 
     Args:
         options: a value for each field in `SEARCH_OPTIONS`, as the running command got them.
         home: the folder of the user's corpora; None for the usual one.
+        read: reads a file of movement; None reads it as it is.
 
     Raises:
         MotionMindError: a value cannot be used, or a posture cannot be read.
@@ -256,7 +259,7 @@ def request_options(options: Mapping[str, Any], home: Path | None) -> dict[str, 
     context = click.get_current_context()
     if given_option(context, ["memory"]) and given_option(context, ["node_budget"]):
         raise MotionMindError("--memory and --node-budget both limit the number of nodes; give one of them")
-    stops = [(_find_via(posture, move, home), move) for posture, move in parse_vias(options["via"], home)]
+    stops = [(_find_via(posture, move, home, read), move) for posture, move in parse_vias(options["via"], home)]
     return {
         **options,
         "pin": parse_pins(options["pin"]),
@@ -266,18 +269,20 @@ def request_options(options: Mapping[str, Any], home: Path | None) -> dict[str, 
     }
 
 
-def via_files(options: Mapping[str, Any], home: Path | None) -> list[Path]:
-    """Return the files of the postures to pass through."""
-    return [path for posture, _ in parse_vias(options["via"], home) for path in posture.source.paths]
+def via_sources(options: Mapping[str, Any], home: Path | None) -> list[Source]:
+    """Return where the postures to pass through are."""
+    return [posture.source for posture, _ in parse_vias(options["via"], home)]
 
 
-def _find_via(name: PostureName, move: int | None, home: Path | None) -> Posture:
+def _find_via(name: PostureName, move: int | None, home: Path | None, read: Callable[[Path], Motion] | None) -> Posture:
+    from motionmind.formats import read_motion
     from motionmind.names.finding import find_motion, find_posture
 
-    word = name.word
-    if name.moment is None and move is not None and (count := len(find_motion(name.source, home, as_clip=False))) > 1:
+    word, read = name.word, read or read_motion
+    is_clear = name.moment is not None or move is None
+    if not is_clear and (count := len(find_motion(name.source, home, as_clip=False, read=read))) > 1:
         raise MotionMindError(
             f"--via {word}@{move}: the last @ is a move, and {word} has {count} frames; write {word}@{move}@ for frame "
             f"{move} at any move, or {word}@FRAME@{move}"
         )
-    return find_posture(name, home)
+    return find_posture(name, home, read=read)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Callable, Sequence
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -98,6 +98,45 @@ def select_part(named: PostureName, motion: Motion, start: int, end: int) -> ran
         raise MotionMindError(f"{named.word}: names a frame, and so do --from and --to; give one of them")
     frame = select_frame(word, motion, named.moment)
     return range(frame, frame + 1)
+
+
+def ends_reader(sources: Sequence[Source], corpus: str, home: Path | None, **options: Any) -> Callable[[Path], Motion]:
+    """Return a reader of files that postures of a tween are in; each file is read, and questioned, once.
+
+    Movement comes as a whole to the joints that a corpus of people has: it shows more than a posture does of which axis
+    is up, and of how a rig's joints are turned.
+
+    Args:
+        sources: where the postures are.
+        corpus: the corpus that moves them.
+        home: the folder of the user's corpora; None for the usual one.
+        options: values of the options that `options.reading` adds.
+
+    Raises:
+        MotionMindError: an option is given, and no source is a file of movement; or the corpus's manifest is damaged.
+    """
+    for name, value in options.items():
+        if value is not None and all(source.kind != "file" for source in sources):
+            raise MotionMindError(f"--{name.replace('_', '-')} is for files of movement, and no posture here is in one")
+    stays = _has_own_joints(corpus, home) and not options["joints"]
+
+    @cache
+    def read_once(path: Path) -> Motion:
+        if not stays:
+            return _read_file(path, **options)
+        return read(path, **{name: value for name, value in options.items() if name != "joints"})
+
+    return read_once
+
+
+def _has_own_joints(corpus: str, home: Path | None) -> bool:
+    """Return whether a corpus was built on other joints than human23's."""
+    from motionmind.body.human import human23
+    from motionmind.corpus import store
+
+    manifest = store.read_manifest(store.locate(corpus, home))
+    body = manifest.get("skeleton")
+    return isinstance(body, dict) and body.get("names") != list(human23().names)
 
 
 def _read_file(path: Path, joints: Path | None, **source: Any) -> Motion:

@@ -15,9 +15,10 @@ import click
 
 from motionmind.cli import completion
 from motionmind.cli.files import MOVEMENT, check_outputs, numbered, write
-from motionmind.cli.options import HOME, OUTPUTS, Section, command, option, outputs
+from motionmind.cli.options import HOME, OUTPUTS, Section, command, option, outputs, reading
 from motionmind.cli.printing import Interruption, note, print_alternatives, print_tween
-from motionmind.cli.search_options import request_options, searching, via_files
+from motionmind.cli.search_options import request_options, searching, via_sources
+from motionmind.cli.sources import ends_reader
 from motionmind.cli.types import FILE, Whole
 from motionmind.cli.warming import announce_first_search, help_first_search
 from motionmind.display import displayed
@@ -80,6 +81,7 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
     help="Arrive at B with the velocity of these frames, of which the first is B, given as for --before.",
 )
 @searching
+@reading
 @HOME
 def tween(
     a: str,
@@ -94,13 +96,19 @@ def tween(
     what_if: bool,
     before: str | None,
     after: str | None,
+    joints: Path | None,
+    unit: str | None,
+    asf: Path | None,
+    source_fps: float | None,
+    up: str | None,
     **options: Any,
 ) -> None:
     """Find the best movement from A to B, and prove how good it is.
 
     A and B are postures of corpora, as ballet/arabesque or ballet/adagio@23 (postures lists them), files of one
     posture, or frames of clips, as clip.bvh@240, counted from 0, and clip.bvh@2.0s. The body may have any velocity
-    there, unless --before and --after give it, or a ~: at clip.bvh@240~ it has the clip's.
+    there, unless --before and --after give it, or a ~: at clip.bvh@240~ it has the clip's. What is said of input files
+    is said of all files of movement that are named.
 
     Ctrl-C ends the search: the best movement found so far is written, with what is proven of it, and the exit code is
     130. Exit code 3 means that nothing joins A and B under the given rules; --report then holds the diagnosis.
@@ -119,15 +127,18 @@ def tween(
     around = tuple(parse_frames(word, home) if word else None for word in (before, after))
     files = _Files(outputs, report, problem, alternatives)
     sources = [one.source for one in (*named, *around) if one]
-    files.check([*(path for source in sources for path in source.paths), *via_files(options, home)])
-    request = request_options(options, home) | {"what_if": what_if}
+    vias = via_sources(options, home)
+    files.check([path for source in (*sources, *vias) for path in source.paths])
     corpus = corpus or _corpus_of(named, home)
     locate(corpus, home)
+    given = {"joints": joints, "unit": unit, "asf": asf, "source_fps": source_fps, "up": up}
+    read = ends_reader([*sources, *vias], corpus, home, **given)
+    request = request_options(options, home, read) | {"what_if": what_if}
     for source in sources:
         check_named(source, home)
     announce_first_search()  # before a bundled corpus is learned
-    start, request["before"] = read_end(named[0], around[0], "before", home)
-    end, request["after"] = read_end(named[1], around[1], "after", home)
+    start, request["before"] = read_end(named[0], around[0], "before", home, read)
+    end, request["after"] = read_end(named[1], around[1], "after", home, read)
     engine = Engine.load(corpus, home)
     help_first_search()
     with _diagnosing(files), Interruption() as interruption:

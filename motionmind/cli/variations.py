@@ -15,7 +15,7 @@ from motionmind.cli.files import EVEN, MOVEMENT, check_outputs, note_licences, w
 from motionmind.cli.options import HOME, OUTPUTS, Section, command, given_option, option, output, outputs, reading
 from motionmind.cli.printing import Interruption, note, print_written
 from motionmind.cli.review_tables import print_advice, print_review
-from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searching, via_files
+from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searching, via_sources
 from motionmind.cli.sources import parse_movement, read_movement, select_part
 from motionmind.cli.tweens import INTERRUPTED
 from motionmind.cli.types import COUNT, FILE, FRAME, NATURAL, POSITIVE, RATE, Number, Point
@@ -203,7 +203,8 @@ def vary(
     files: list[tuple[Path, tuple[str, ...]]] = [(path, MOVEMENT + PICTURES) for path in outputs]
     files += [(report, ())] if report else []
     named = parse_movement(source, home)
-    check_outputs(files, [*named.source.paths, *via_files(options, home)])
+    sources = (named.source, *via_sources(options, home))
+    check_outputs(files, [path for source in sources for path in source.paths])
     flow = flow_of(attractor, **parse_parameters(parameter))
     request = request_options({row.field: options.pop(row.field) for row in SEARCH_OPTIONS}, home)
     names = ("depart", "start", "skip", "step", "transient", "length", "inserted", "stretch", "alternatives")

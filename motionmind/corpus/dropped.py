@@ -32,7 +32,7 @@ _MOVES = 0.1  # radians a second on average, and metres: slower bodies are still
 _MANY = 0.1  # share of a recording's frames that are repeated where this is its clock's doing
 _FAST, _TURNS = 12.0, np.radians(750.0)  # metres, and radians a second of all joints on average: no body is as fast
 _ONE = np.radians(45.0)  # of a turn in a frame that count: joints that flip are no whole body
-_FAR = np.radians(20.0)  # on average, and metres: less is noise of a fast camera
+_FAR, _FAR_TURNED = 0.35, np.radians(20.0)  # metres, and radians on average: less is noise of a fast camera
 _SHORT = 0.25  # seconds that are filled
 _LONG = 1.0  # seconds for which a body is elsewhere, at most
 
@@ -76,7 +76,7 @@ def find_gaps(motion: Motion) -> list[Gap]:
     turned = np.minimum(rot.angle(motion.rotations[:-1], motion.rotations[1:]), _ONE).mean(axis=1)
     went = rot.norm(np.diff(motion.root, axis=0))
     seconds = np.diff(motion.times)
-    quick = (went > _FAST * seconds) & (went > _FAR) | (turned > _TURNS * seconds) & (turned > _FAR)
+    quick = (went > _FAST * seconds) & (went > _FAR) | (turned > _TURNS * seconds) & (turned > _FAR_TURNED)
     leaps = [*_elsewhere(motion, quick)]
     held = [
         gap

@@ -83,6 +83,7 @@ class Recording(NamedTuple):
         images: their mirror images, if they are wanted.
         added: frames of one posture before the movement, as of `added_frames`, after those that are skipped.
         floor: height of the floor that its feet stand on (`find_floor`), metres; 0 of keyframes.
+        is_made: whether the engine made some of it.
     """
 
     name: str
@@ -94,6 +95,7 @@ class Recording(NamedTuple):
     images: tuple[Piece, ...]
     added: int = 0
     floor: float = 0.0
+    is_made: bool = False
 
 
 class Source(NamedTuple):
@@ -117,7 +119,7 @@ def take(recording: Motion, taking: Taking) -> Recording:
     if skip >= len(recording):
         raise CorpusError(f"{recording.name} has {len(recording)} frames; skipping {skip} leaves none")
     motion = replace(recording.slice(skip, len(recording)), name=recording.name or "clip")
-    added = added_frames(motion)
+    added, is_made = added_frames(motion), bool(recording.insertions)
     repairs: tuple[JointRepair, ...] = ()
     left: tuple[Gap, ...] = ()
     if taking.flips == "repair":
@@ -134,7 +136,7 @@ def take(recording: Motion, taking: Taking) -> Recording:
     cuts = sorted({*cuts, *ends[1:-1]})
     faults = tuple(replace(flip, frame=flip.frame + skip) for flip in found)
     if found and taking.flips == "drop":
-        return Recording(motion.name, motion.skeleton, None, doubt, faults, (), (), added)
+        return Recording(motion.name, motion.skeleton, None, doubt, faults, (), (), added, is_made=is_made)
     rate = posture_rate(motion) if taking.rate == "auto" else taking.rate
     whole = Clip(motion.name, 0, 0, repairs=_later(repairs, skip))
     parts = _cut(motion, cuts, rate, whole, {gap.start for gap in left if gap.stop > gap.start})
@@ -142,7 +144,7 @@ def take(recording: Motion, taking: Taking) -> Recording:
     pieces = tuple(as_piece(part, between) for part in parts)
     images = tuple(mirror_image(part, between) for part in parts) if taking.mirror else ()
     floor = floor_of(motion) if rate is not None else 0.0
-    return Recording(motion.name, motion.skeleton, rate, doubt, faults, pieces, images, added, floor)
+    return Recording(motion.name, motion.skeleton, rate, doubt, faults, pieces, images, added, floor, is_made)
 
 
 def floor_of(motion: Motion) -> float:

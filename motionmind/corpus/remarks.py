@@ -36,6 +36,9 @@ def remark(name: str, own: Sequence[Recording], *, is_rate_given: bool, skip: in
             "corpus %s: most recordings begin with %s of another posture (a T-pose?): built with --skip %d (or skip=) "
         )
         _log.info(text + "it is without", name, frames, skip + added)
+    if made := [one.name for one in own if one.is_made]:
+        text = "corpus %s: %d of %d recordings hold movement that the engine made, learned as if it were recorded: %s"
+        _log.info(text, name, len(made), len(own), enumerated(made, 6))
     off = sorted((one for one in recorded if abs(one.floor) > FLOOR_OFF), key=lambda one: -abs(one.floor))
     if off and is_known:
         where = [

@@ -110,6 +110,7 @@ class _RecordingEntry(msgspec.Struct, frozen=True):
     images: tuple[Clip, ...]
     added: int
     floor: float
+    is_made: bool
 
 
 class _Entry(msgspec.Struct, frozen=True):
@@ -311,7 +312,9 @@ def take_file(job: Job) -> Taken:
 
 def _read(job: Job) -> Iterator[Motion]:
     """Read the movement of a file, on human23 where its joints map to it."""
+    from motionmind.body.motion import Insertion
     from motionmind.formats import read_motion
+    from motionmind.formats.bvh import holds_made
     from motionmind.notation.compose import motions
     from motionmind.notation.read import read_score
     from motionmind.retarget.retarget import own_skeleton
@@ -326,6 +329,8 @@ def _read(job: Job) -> Iterator[Motion]:
         if options.taking.skip:  # which would drop it
             raise CorpusError(doubt)
         warnings.warn(doubt, MotionMindWarning, stacklevel=2)
+    if job.file.suffix.lower() == ".bvh" and holds_made(job.file):
+        motion = replace(motion, insertions=(Insertion(motion.times),))
     yield own_skeleton(replace(motion, name=job.name), options.joints, up="y" if options.up else None)
 
 
@@ -362,7 +367,7 @@ def _encode(recordings: Sequence[Recording], said: tuple[str, ...], read: dict[s
         body = one.body
         entry = BodyEntry(body.name, body.names, body.parents, body.offsets.tolist(), body.tips.tolist())
         split = len(one.pieces)
-        kept = one.rate, one.doubt, one.faults, clips[:split], clips[split:], one.added, one.floor
+        kept = one.rate, one.doubt, one.faults, clips[:split], clips[split:], one.added, one.floor, one.is_made
         entries.append(_RecordingEntry(one.name, entry, *kept))
     about = msgspec.json.encode(_Entry(tuple(entries), said, read))
     out = io.BytesIO()
@@ -397,4 +402,5 @@ def _decode(entry: _RecordingEntry, number: int, arrays: Mapping[str, NDArray[An
         )
 
     both = pieces(entry.pieces), pieces(entry.images)
-    return Recording(entry.name, skeleton, entry.rate, entry.doubt, entry.faults, *both, entry.added, entry.floor)
+    found = Recording(entry.name, skeleton, entry.rate, entry.doubt, entry.faults, *both, entry.added, entry.floor)
+    return found._replace(is_made=entry.is_made)

@@ -59,7 +59,8 @@ def read_motion(
 
     Args:
         path: the file; its suffix determines the format.
-        unit: BVH's unit of length (`read_bvh`); None guesses it from the skeleton. Also glTF's, if it is not the metre.
+        unit: BVH's unit of length (`read_bvh`); None guesses it from the skeleton. Also glTF's, and that of the body's
+            place in `.npz`, if it is not the metre.
             Other formats define their own.
         asf: AMC's skeleton (`read_amc`); None finds it beside the file.
         fps: frames per second: of AMC (default 120), which does not record them, of AIST++ and FineDance (default 60
@@ -107,7 +108,7 @@ def read_motion(
 
             motion = read_papers(path, skeleton=skeleton, rate=fps)
         case ".npz" | ".pkl" | ".npy" as suffix:
-            motion = _read_smpl(path, suffix, fps, up)
+            motion = _read_smpl(path, suffix, fps, up, unit)
         case ".json":
             motion = _read_json(path)
         case ".glb" | ".gltf" | ".vrm" | ".vrma":
@@ -133,13 +134,13 @@ def _question_height(path: FilePath, skeleton: Skeleton) -> None:
         warnings.warn(message, MotionMindWarning, stacklevel=3)
 
 
-def _read_smpl(path: FilePath, suffix: str, fps: float | None, up: str | None) -> Motion:
+def _read_smpl(path: FilePath, suffix: str, fps: float | None, up: str | None, unit: str | float | None) -> Motion:
     """Read a motion on SMPL's joints, by the format of the suffix."""
     from motionmind.formats.npz import read_npz
     from motionmind.formats.smpl_data import read_aist, read_finedance
 
     if suffix == ".npz":
-        return read_npz(path, fps=fps, up=up)
+        return read_npz(path, fps=fps, up=up, unit=unit)
     return {".pkl": read_aist, ".npy": read_finedance}[suffix](path, fps=fps)
 
 

@@ -235,6 +235,7 @@ def _assemble(joints: list[BvhJoint], values: Floats, name: str) -> Placed:
 # The commonest order (MotionBuilder's, Bandai-Namco's), which most readers have met. Euler angles lock where the middle
 # rotation is 90 degrees; about x that is rarer in arms, which a T-pose stretches along x.
 _ORDER = "ZXY"
+_MADE = " "  # ends the line of a frame that the engine made
 
 
 def write_bvh(path: FilePath, motion: Motion, unit: str | float = "cm") -> None:
@@ -242,7 +243,8 @@ def write_bvh(path: FilePath, motion: Motion, unit: str | float = "cm") -> None:
 
     Read back with the same unit, rotations agree to 1e-6 rad and positions to 1e-6 m. Joints come in depth-first
     order, as the format requires. Each leaf has an End Site at its tip (0 0 0 for none). The first time becomes 0.
-    Angles are unwrapped: a reader that blends neighbouring frames sees no jump of 360 degrees.
+    Angles are unwrapped: a reader that blends neighbouring frames sees no jump of 360 degrees. The line of a frame that
+    the engine made ends in a blank, which readers pass over, and by which `holds_made` knows it.
 
     Args:
         path: the file to write.
@@ -267,8 +269,20 @@ def write_bvh(path: FilePath, motion: Motion, unit: str | float = "cm") -> None:
     root = np.round(motion.root * scale, digits) + 0.0
     values = np.concatenate([root, np.round(degrees, 6).reshape(len(motion), -1) + 0.0], axis=1)
     row = " ".join([f"%.{digits}f"] * 3 + ["%.6f"] * (3 * len(skeleton)))
-    lines += [row % tuple(frame.tolist()) for frame in values]
+    ends = [_MADE if made else "" for made in motion.inserted()]
+    lines += [row % tuple(frame.tolist()) + end for frame, end in zip(values, ends, strict=True)]
     write_atomically(path, ("\n".join(lines) + "\n").encode())
+
+
+def holds_made(path: FilePath) -> bool:
+    """Return whether lines of a file say that the engine made some of its frames.
+
+    The first frame, which it never made, ends in no blank then; some exporters end all lines so.
+    """
+    lines = read_lines(path)
+    start = next((n for n, line in enumerate(lines, 1) if line.startswith("Frame Time:")), len(lines))
+    frames = [line.endswith(_MADE) for line in lines[start:] if line.strip()]
+    return any(frames) and not frames[0]
 
 
 def _check_names(skeleton: Skeleton) -> None:

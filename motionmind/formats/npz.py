@@ -8,6 +8,8 @@ holds numpy arrays; those of movement are
     trans            [T, 3]    the body's place, metres
     mocap_framerate  []        frames per second; mocap_frame_rate in SMPL-X files
 
+Other programs keep the poses in parts (`motionmind.formats._smpl_parts`), and the rate as fps. Those are read, too.
+
 The world is z up; y in files of some programs, which people who stand along y show. At rest SMPL stands in a T-pose, y
 up, facing +z, and all its joints' axes are the world's, like human23's. So rotations are copied unchanged, and only the
 root's is turned upright.
@@ -38,11 +40,13 @@ from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.files import FilePath, name_of, read_bytes, write_atomically
 from motionmind.formats._clock import even_step
 from motionmind.formats._smpl import smpl_bodies, to_smpl
+from motionmind.formats._smpl_parts import NAMES, gather_poses
 from motionmind.formats.text import LARGEST
+from motionmind.formats.units import metres_per_unit
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.vertical import find_vertical
 
-_RATES = ("mocap_framerate", "mocap_frame_rate")
+_RATES = ("mocap_framerate", "mocap_frame_rate", "fps", "frame_rate", "framerate")
 
 # Bytes of an array as it is read: as many as the largest motion has that is made, or twice as many as its file, but no
 # more than two hours take at 120 frames per second. A compressed array that claims more is meant to exhaust memory.
@@ -52,12 +56,15 @@ _LARGEST_ARRAY = 2**30
 # From a world with z up, where a body faces -y, to ours, where it faces +z.
 _UPRIGHT = rot.from_axis_angle([1.0, 0.0, 0.0], -np.pi / 2)
 
+_HIGH = 20.0  # metres above or below 0, in the median frame, at which nobody is
 _TURNS = 20.0  # radians, in the median frame, by which no joint is turned
 
 _log = logging.getLogger(__name__)
 
 
-def read_npz(path: FilePath, *, fps: float | None = None, up: str | None = None) -> Motion:
+def read_npz(
+    path: FilePath, *, fps: float | None = None, up: str | None = None, unit: str | float | None = None
+) -> Motion:
     """Read a motion from an AMASS file, on SMPL's joints, placed as in human44.
 
     `to_human23` knows these joints; `write_npz` writes the same orientations and places again. A log entry says that
@@ -67,6 +74,7 @@ def read_npz(path: FilePath, *, fps: float | None = None, up: str | None = None)
         path: the file; its stem becomes the motion's name.
         fps: frames per second in place of the file's.
         up: "y" or "z", the vertical in the file; None takes z, unless the movement stands along y.
+        unit: of the body's place, a name in `UNITS`, or metres in one unit; None takes metres.
 
     Returns:
         The motion, in metres and seconds, y up.
@@ -75,19 +83,12 @@ def read_npz(path: FilePath, *, fps: float | None = None, up: str | None = None)
         FormatError: the file does not exist, or is not an AMASS file; the message names the array.
 
     Warns:
-        MotionMindWarning: it is doubtful which axis is up.
+        MotionMindWarning: it is doubtful which axis is up, or the body is far above or below 0.
     """
     arrays = _read_arrays(path)
-    for needed in ("poses", "trans"):
-        if needed not in arrays:
-            raise FormatError(f"no array {needed!r}: not movement as AMASS writes it", path=path)
-    poses, trans = arrays["poses"], arrays["trans"]
-    skeleton = next((body for body in smpl_bodies().values() if poses.shape[1:] == (3 * len(body),)), None)
-    if skeleton is None or not len(poses):
-        sizes = ", ".join(str(3 * len(body)) for body in smpl_bodies().values())
-        raise FormatError(f"'poses' has the shape {list(poses.shape)}, not frames by one of {sizes}", path=path)
-    if trans.shape != (len(poses), 3):
-        raise FormatError(f"'trans' has the shape {list(trans.shape)}, not [{len(poses)}, 3] as 'poses' has", path=path)
+    poses, trans = gather_poses(arrays, path)
+    skeleton = next(body for body in smpl_bodies().values() if poses.shape[1:] == (3 * len(body),))
+    trans = trans * (1.0 if unit is None else metres_per_unit(unit))
     rate = _rate(arrays, fps, path)
     _log.info("%s: joints stand where human44's do; the file's body shape (betas) is not read", path)
     vectors = poses.reshape(len(poses), -1, 3)
@@ -97,6 +98,9 @@ def read_npz(path: FilePath, *, fps: float | None = None, up: str | None = None)
     if (up or _vertical(skeleton, rotations, trans, path)) == "z":
         rotations[:, 0] = rot.mul(_UPRIGHT, rotations[:, 0])
         trans = rot.mul_vec(_UPRIGHT, trans)
+    if (height := float(np.median(np.abs(trans[:, 1])))) > _HIGH:
+        message = f"{path}: the body is {height:.0f} m off 0; is its place in centimetres (--unit cm)?"
+        warnings.warn(message, MotionMindWarning, stacklevel=2)
     times = np.arange(len(poses), dtype=np.float64) / rate
     return Motion(skeleton, rot.normalise(rotations), trans, times, name=name_of(path))
 
@@ -147,7 +151,8 @@ def _read_arrays(path: FilePath) -> dict[str, Floats]:
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
             members = file.zip.NameToInfo
-            for name in ("poses", "trans", *_RATES):
+            whole = "poses" in file  # AMASS's SMPL-X has its parts, too
+            for name in (*(("poses", "trans") if whole else NAMES), *_RATES):
                 if name in file:
                     _check_claim(file.zip, members.get(name) or members[f"{name}.npy"], name, len(data), path)
                     found[name] = checked_numbers(file[name], repr(name), path)

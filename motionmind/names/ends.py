@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from motionmind.errors import MotionMindError
+from motionmind.formats import read_motion
 from motionmind.names.finding import find_motion, find_posture, select_frame
 from motionmind.names.spelling import PostureName, parse_posture
 
@@ -19,7 +21,11 @@ _ROUNDING = 1e-6  # seconds
 
 
 def find_end(
-    name: PostureName | str, side: Literal["before", "after"], home: Path | None = None
+    name: PostureName | str,
+    side: Literal["before", "after"],
+    home: Path | None = None,
+    *,
+    read: Callable[[Path], Motion] = read_motion,
 ) -> tuple[Posture, Motion | None]:
     """Find the posture of a name, and, if that ends in ~, the movement on one side of it.
 
@@ -27,6 +33,7 @@ def find_end(
         name: the name, or its spelling.
         side: the side of the posture on which movement is taken: before A, after B.
         home: the folder of the user's corpora; None for the usual one.
+        read: reads a file.
 
     Raises:
         MotionMindError: there is no such posture; or it is to be moving and there is no movement on that side.
@@ -37,9 +44,9 @@ def find_end(
     """
     named = parse_posture(name, home) if isinstance(name, str) else name
     if not named.is_moving:
-        return find_posture(named, home), None
+        return find_posture(named, home, read=read), None
     word = named.source.word
-    motion = find_motion(named.source, home)
+    motion = find_motion(named.source, home, read=read)
     if len(motion) == 1:
         raise MotionMindError(f"{named.word}: {word} holds one posture, no movement around it; leave out ~")
     if named.moment is None:

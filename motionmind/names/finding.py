@@ -288,18 +288,21 @@ def find_motion(
     return collection.choose()[0]
 
 
-def find_posture(name: PostureName | str, home: Path | None = None) -> Posture:
+def find_posture(
+    name: PostureName | str, home: Path | None = None, *, read: Callable[[Path], Motion] = read_motion
+) -> Posture:
     """Find the posture of a name, such as "ballet/arabesque".
 
     Args:
         name: the name, or its spelling.
         home: the folder of the user's corpora; None for the usual one.
+        read: reads a file.
 
     Raises:
         MotionMindError: there is no such posture; the message says what there is.
     """
     named = parse_posture(name, home) if isinstance(name, str) else name
-    motion = find_motion(named.source, home, as_clip=named.moment is not None)
+    motion = find_motion(named.source, home, as_clip=named.moment is not None, read=read)
     return motion.posture(frame_of(named, motion))
 
 

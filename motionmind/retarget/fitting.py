@@ -15,6 +15,7 @@ Rigs whose zero pose does not stand have their alignments in a table (`rigs.Rig.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -27,10 +28,17 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import SkeletonError
 from motionmind.geometry import rotations as rot
-from motionmind.retarget.joint_mapping import describe_unknown_rig, in_a_row, joint_mapping, known_rig
+from motionmind.retarget.joint_mapping import (
+    describe_limbs,
+    describe_unknown_rig,
+    in_a_row,
+    joint_mapping,
+    known_rig,
+)
 from motionmind.retarget.rig import Rig
 from motionmind.retarget.standing import align_by_movement, standing_pose, stands
 
+_log = logging.getLogger(__name__)
 _LIMBS = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist", "wrist": "fingers"}
 _SHAPES = 64  # bodies whose fit is known again: a collection's files are of a few
 _SAME_PLACE = 1e-6  # metres below which two joints coincide
@@ -150,6 +158,8 @@ def _align_shape(shape: _Shape, given: tuple[tuple[str, str], ...] | None) -> tu
         if known is None:
             raise SkeletonError(f"{describe_unknown_rig(skeleton)}; give a mapping (--joints)")
         rig, mapping = known
+        if limbs := describe_limbs(skeleton):
+            _log.info("%s: %s (--joints maps them otherwise)", skeleton.name, limbs)
     sources = _find_sources(skeleton, mapping)
     if rig is not None and rig.frames and _zero_pose_matches(sources, rig.frames):
         frames = {name: rig.frames[name] for name in rig.frames if name in mapping.values()}

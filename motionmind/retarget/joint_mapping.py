@@ -13,6 +13,7 @@ from motionmind.body.human import BODIES, human23
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, SkeletonError, enumerated
 from motionmind.files import parse_toml, read_bytes
+from motionmind.retarget.limb_names import find_unclear, map_by_limbs
 from motionmind.retarget.rig import Rig, plain_names, spine_shares, without_endings
 from motionmind.retarget.rigs import RIGS
 
@@ -27,6 +28,8 @@ _ESSENTIAL = (
     ("lumbar", "thorax"),
     ("cervical", "atlantal"),
 )
+BY_LIMBS = Rig("names of limbs", {}, ())  # of `limb_names`
+_FEW = 2  # limbs that names do not tell, where the others' are names of limbs
 _TREES = 64  # that are known again
 
 
@@ -125,7 +128,8 @@ def _known_tree(names: tuple[str, ...], parents: tuple[int, ...]) -> tuple[Rig, 
             mapping = _map_by_names(rig, plain, parents)
             if rig.marks <= set(plain) and not _missing(mapping.values()):
                 return rig, {names[i]: mapping[i] for i in sorted(mapping)}
-    return None
+    limbs = map_by_limbs(names, parents)
+    return (BY_LIMBS, {names[i]: limbs[i] for i in sorted(limbs)}) if limbs else None
 
 
 def _map_by_names(rig: Rig, plain: Sequence[str], parents: Sequence[int]) -> dict[int, str]:
@@ -149,9 +153,26 @@ def describe_unknown_rig(skeleton: Skeleton) -> str:
         missing = _missing(_map_by_names(rig, plain, skeleton.parents).values())
         lacking.append((missing + [f"a joint called {mark}" for mark in sorted(rig.marks - set(plain))], rig.name))
     missing, name = min(lacking, key=lambda one: len(one[0]))
+    unclear = find_unclear(skeleton.names, skeleton.parents)
+    if len(unclear) < len(missing) and len(unclear) <= _FEW:
+        fault = f"names of limbs do not tell {enumerated([f'the {part}' for part in unclear])}"
+        return f"the joints of {skeleton.name} do not map to human23: {fault}"
     if len(missing) > len(_ESSENTIAL) // 2:
         return f"the joints of {skeleton.name} do not map to human23: they have the names of no known rig"
     return f"the joints of {skeleton.name} do not map to human23: named as in {name}, they lack {enumerated(missing)}"
+
+
+def describe_limbs(skeleton: Skeleton) -> str:
+    """Say which joints are taken for pelvis, left leg and left arm, where names of limbs tell; "" for any other rig."""
+    known = known_rig(skeleton)
+    if known is None or known[0] is not BY_LIMBS:
+        return ""
+    of = {joint: name for name, joint in reversed(known[1].items())}
+    leg, arm = (
+        ", ".join(of[f"left_{joint}"] for joint in row)
+        for row in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
+    )
+    return f"joints are known by names of limbs: {of['pelvis']} is the pelvis, {leg} a leg, {arm} an arm"
 
 
 def _resolve(skeleton: Skeleton, joints: Mapping[str, str]) -> dict[str, str]:

@@ -114,7 +114,8 @@ def from_human23(motion: Motion, like: Posture, joints: Mapping[str, str] | None
 
     Args:
         motion: the motion, on human23.
-        like: a posture on the rig to move. Joints of its that have no counterpart stay as they are in it.
+        like: a posture on the rig to move. Joints of its that have no counterpart stay as they are in it, and of
+            several in a row for one joint all turn as one.
         joints: {rig's joint: human23's joint} as for `joint_mapping`; None recognises the rig by its names.
 
     Returns:
@@ -127,16 +128,27 @@ def from_human23(motion: Motion, like: Posture, joints: Mapping[str, str] | None
     fit = fit_human23(like, joints)
     source = dict(zip(reversed(fit.turns.tolist()), reversed(range(len(fit.turns))), strict=True))  # parents win
     turned = rot.mul_inv(motion.skeleton.global_rotations(motion.rotations), fit.alignment)
+    at_first = rig.global_rotations(like.rotations)
     placed = np.empty((len(motion), len(rig), 4))
+    rows = _rows(rig, joint_mapping(rig, joints) or {}, fit)
     for joint, parent in enumerate(rig.parents):
         if joint in source:
             placed[:, joint] = turned[:, source[joint]]
+        elif joint in rows:
+            within = rot.inv_mul(at_first[rows[joint]], at_first[joint])
+            placed[:, joint] = rot.mul(turned[:, source[rows[joint]]], within)
         else:
             own = like.rotations[joint]
             placed[:, joint] = own if parent < 0 else rot.mul(placed[:, parent], own)
     rotations = rot.normalise(rig.local_rotations(placed))
     root = motion.root - rig.positions(rotations, np.zeros(3))[:, fit.pelvis]
     return replace(motion, skeleton=rig, rotations=rotations, root=root, insertions=())
+
+
+def _rows(rig: Skeleton, mapping: Mapping[str, str], fit: Fit) -> dict[int, int]:
+    """Return for each joint of a rig that is mapped the one that turns its row, the last: {index: index}."""
+    body = human23()
+    return {rig.index(name): int(fit.turns[body.index(joint)]) for name, joint in mapping.items()}
 
 
 def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None, *, up: str | None = None) -> Movement:

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,15 +14,19 @@ import numpy as np
 
 from motionmind._typing import Bools
 from motionmind.arguments import check_function, check_integer, check_type
+from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture
+from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import FACING
 from motionmind.credits.credit import Credit
 from motionmind.display import displayed
 from motionmind.errors import InfeasibleError, MotionMindError, MotionMindWarning, NoPathError
+from motionmind.formats import read_motion
 from motionmind.geometry.splines import rotation_spline
 from motionmind.learned import graphs, summary
 from motionmind.learned.model import LearnedCorpus
 from motionmind.realise.realise import Realised, realise
+from motionmind.retarget.retarget import own_skeleton
 from motionmind.search.apart import TooAlikeError, difference, solve_apart
 from motionmind.search.problem import places
 from motionmind.search.sample import sample_path
@@ -99,8 +104,8 @@ class Engine(LearnedCorpus):
         request = TweenRequest.of(request, **options)
         check_type("before", before, Motion, or_none=True)
         check_type("after", after, Motion, or_none=True)
-        start, before = _end("a", a, "before", before)
-        end, after = _end("b", b, "after", after)
+        start, before = _end("a", a, "before", before, self.corpus.skeleton)
+        end, after = _end("b", b, "after", after, self.corpus.skeleton)
         check_function("watch", watch, or_none=True)
         began = perf_counter()
         formulation = formulate(self, start, end, request, before, after)
@@ -337,19 +342,32 @@ class Engine(LearnedCorpus):
 
 
 def _end(
-    argument: str, end: Posture | str, side: Literal["before", "after"], around: Motion | None
+    argument: str,
+    end: Posture | str,
+    side: Literal["before", "after"],
+    around: Motion | None,
+    body: Skeleton,
 ) -> tuple[Posture, Motion | None]:
-    """Return the posture at an end, which may be given by a name, and the movement on its other side, if known."""
+    """Return the posture at an end, which may be given by a name, and the movement on its other side, if known.
+
+    Movement in a file comes as a whole to the `body` of a corpus of people: it shows more than a posture does of which
+    axis is up, and of how a rig's joints are turned.
+    """
     check_type(argument, end, Posture, str, wanted="a Posture or the name of one")
     if isinstance(end, Posture):
         return end, around
     # Imported here, for scores are slow to import, and most postures are no names.
     from motionmind.names.ends import find_end
 
-    posture, own = find_end(end, side)
+    is_human = human23().difference(body) is None
+    posture, own = find_end(end, side, read=_read_person if is_human else read_motion)
     if own is not None and around is not None:
         raise MotionMindError(f"{displayed(end)}: ~ takes the movement around the frame, and so does {side}; give one")
     return posture, around if own is None else own
+
+
+def _read_person(path: Path) -> Motion:
+    return own_skeleton(read_motion(path))
 
 
 def _no_other_path(request: TweenRequest, most: float) -> NoPathError:

@@ -37,6 +37,10 @@ BAD = [
     # corpora
     ("tween A.json B.json --corpus nobody", r"no corpus 'nobody'; there are ballet"),
     ("corpus info balet", r"no corpus 'balet'; did you mean ballet\?"),
+    ("tween ballet/arabesque ballet/fifth --unit m", r"--unit is for files of movement, and no posture here is in one"),
+    ("tween clip.bvh@0 clip.bvh@1 --corpus ballet --unit parsec", r"unit 'parsec' is unknown; give one of cm, m"),
+    ("tween clip.bvh@0 clip.bvh@1 --corpus ballet --joints broken.toml", r"broken\.toml: not a joint mapping"),
+    (f"{TWEEN} --up x", r"'--up': 'x' is not one of 'y', 'z'"),
     (f"{TWEEN} --pin left_hop", r"no joint 'left_hop' among the states; did you mean left_hip\?"),
     (f"{TWEEN} --avoid lft_hip=3", r"no joint 'lft_hip' among the states; did you mean left_hip\?"),
     ("vary ballet/jump --attractor rosler -o t.json", r"no flow 'rosler'; did you mean rossler\?"),

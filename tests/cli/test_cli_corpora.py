@@ -184,6 +184,16 @@ def test_a_mapping_of_joints_brings_a_stranger_to_human23(run: Run) -> None:
     assert read_posture("A.json").skeleton.name == "human23"
 
 
+@pytest.mark.parametrize("suffix", [".json", ".bvh", ".glb"])
+def test_a_tween_among_recordings_is_told(run: Run, suffix: str) -> None:
+    write_motion("walk.bvh", clip())
+    assert run("tween", "ballet/arabesque", "ballet/fifth", "-o", f"tween{suffix}").code == 0
+    told = "hold movement that the engine made"
+    ran = run("corpus", "build", "mine", "walk.bvh", f"tween{suffix}")
+    assert f"1 of 2 recordings {told}, learned as if it were recorded: tween" in ran.err
+    assert told not in run("corpus", "build", "mine", "walk.bvh").err
+
+
 def test_a_corpus_of_the_same_name_is_replaced(run: Run) -> None:
     write_motion("walk.bvh", clip())
     write_motion("step.bvh", clip("plies"))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bundled_clips import ballet_clip
 
-from motionmind.body.motion import Motion
+from motionmind.body.motion import Insertion, Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.clip import Clip
 from motionmind.corpus.corpus import Corpus
@@ -116,6 +116,17 @@ def test_a_posture_that_skipping_leaves_is_noticed(caplog: pytest.LogCaptureFixt
     with caplog.at_level("INFO", "motionmind"):
         gather("arms", [added], skip=1)
     assert "begin with 29 frames of another posture (a T-pose?): built with --skip 30" in caplog.text
+
+
+def test_what_the_engine_made_is_told(caplog: pytest.LogCaptureFixture) -> None:
+    plain = swing("plain", 121, fps=60.0)
+    made = replace(plain, name="made", insertions=(Insertion(plain.times[[20, 100]]),))
+    for clips, said in (([plain], False), ([plain, made], True)):
+        caplog.clear()
+        with caplog.at_level("INFO", "motionmind"):
+            gather("arms", clips)
+        told = "1 of 2 recordings hold movement that the engine made, learned as if it were recorded: made"
+        assert (told in caplog.text) is said
 
 
 def test_a_floor_that_is_off_is_told(caplog: pytest.LogCaptureFixture) -> None:

@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from motionmind.body.human import human23
-from motionmind.body.motion import Motion
+from motionmind.body.motion import Insertion, Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.formats import read_motion, write_motion
-from motionmind.formats.bvh import bvh_unit, read_bvh, write_bvh
+from motionmind.formats.bvh import bvh_unit, holds_made, read_bvh, write_bvh
 from motionmind.formats.units import UNITS, guess_unit
 from motionmind.geometry import rotations as rot
 
@@ -594,6 +594,24 @@ def test_angles_are_written_without_jumps(tmp_path: Path) -> None:
     write_bvh(tmp_path / "a.bvh", motion)
     rows = [line.split() for line in (tmp_path / "a.bvh").read_text().splitlines()[-60:]]
     assert np.abs(np.diff([float(row[-1]) for row in rows])).max() < 30.0
+
+
+def test_frames_that_the_engine_made_are_known_by_the_ends_of_their_lines(tmp_path: Path) -> None:
+    path = tmp_path / "a.bvh"
+    path.write_text(SMALL, "utf-8")
+    motion = read_bvh(path)
+    write_bvh(path, motion)
+    assert not holds_made(path)
+    made = Motion(motion.skeleton, motion.rotations, motion.root, motion.times, insertions=(Insertion(motion.times),))
+    write_bvh(path, made)
+    assert [line[-1] == " " for line in path.read_text("utf-8").split("\n")[-4:-1]] == [False, True, False]
+    assert holds_made(path)
+    np.testing.assert_allclose(read_bvh(path).rotations, motion.rotations, atol=1e-6)
+    # As Blender writes it, and others but for the last line.
+    for end in (" ", ""):
+        lines = SMALL.strip().split("\n")
+        path.write_text("\n".join([*(f"{line} " for line in lines[:-1]), lines[-1] + end]), "utf-8")
+        assert not holds_made(path)
 
 
 def test_a_leaf_without_tip_has_an_end_site(tmp_path: Path) -> None:

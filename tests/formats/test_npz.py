@@ -20,7 +20,7 @@ from motionmind._typing import Floats
 from motionmind.body.human import BODIES, human23, human44
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import FormatError, MotionMindError, SkeletonError
+from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, SkeletonError
 from motionmind.formats import npz, read_motion, write_motion, write_posture
 from motionmind.formats._smpl import joints_without_place, smpl_bodies
 from motionmind.formats.npz import read_npz, write_npz
@@ -144,6 +144,77 @@ def test_other_names_and_types_that_files_have(tmp_path: Path) -> None:
     np.testing.assert_array_equal(motion.rotations, expected.rotations)
     np.testing.assert_allclose(motion.root, expected.root, atol=1e-6)
     assert motion.fps == pytest.approx(120.0)
+
+
+@pytest.mark.parametrize("names", [("global_orient", "body_pose", "transl"), ("root_orient", "pose_body", "trans")])
+@pytest.mark.parametrize("joints", [22, 24, 52])
+@pytest.mark.parametrize("is_flat", [False, True])
+def test_poses_in_parts_are_put_together(
+    tmp_path: Path, names: tuple[str, str, str], joints: int, is_flat: bool
+) -> None:
+    found = arrays(joints)
+    expected = read_npz(saved(tmp_path / "a.npz", found))
+    body = 23 if joints == 24 else 21
+    rows = found.pop("poses").reshape(5, joints, 3)
+    parts = {names[0]: rows[:, :1], names[1]: rows[:, 1 : 1 + body], names[2]: found.pop("trans")}
+    if joints == 52 and names[0] == "root_orient":
+        parts["pose_hand"] = rows[:, 22:]
+    elif joints == 52:
+        parts |= {"left_hand_pose": rows[:, 22:37], "right_hand_pose": rows[:, 37:]}
+    if is_flat:
+        parts = {name: part.reshape(5, -1) for name, part in parts.items()}
+    parts["fps"] = found["mocap_framerate"]
+    motion = read_npz(saved(tmp_path / "a.npz", parts))
+    assert motion.skeleton.names == expected.skeleton.names
+    np.testing.assert_array_equal(motion.rotations, expected.rotations)
+    np.testing.assert_array_equal(motion.root, expected.root)
+    assert motion.fps == pytest.approx(120.0)
+
+
+def test_a_full_pose(tmp_path: Path) -> None:
+    found = arrays(55)
+    expected = read_npz(saved(tmp_path / "a.npz", found))
+    found |= {"fullpose": found.pop("poses").reshape(5, 55, 3), "transl": found.pop("trans")}
+    np.testing.assert_array_equal(read_npz(saved(tmp_path / "a.npz", found)).rotations, expected.rotations)
+
+
+def test_hands_of_another_form_are_left_out(tmp_path: Path) -> None:
+    found = arrays(22)
+    rows = found.pop("poses")
+    found |= {"global_orient": rows[:, :3], "body_pose": rows[:, 3:], "transl": found.pop("trans")}
+    found |= {"left_hand_pose": np.zeros((5, 6)), "right_hand_pose": np.zeros((5, 6))}  # as principal components
+    assert len(read_npz(saved(tmp_path / "a.npz", found)).skeleton) == 22
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "message"),
+    [
+        ("global_orient", (5, 4), r"'global_orient' has the shape [5, 4], not frames by 3 numbers"),
+        ("global_orient", (0, 3), r"'global_orient' has the shape [0, 3], not frames by 3 numbers"),
+        ("global_orient", (5, 3, 3), r"'global_orient' has the shape [5, 3, 3], not frames by 3 numbers"),
+        ("body_pose", (5, 60), r"'body_pose' has the shape [5, 60], not [5, 63 or 69] as 'global_orient' has"),
+        ("body_pose", (4, 63), r"'body_pose' has the shape [4, 63], not [5, 63 or 69] as 'global_orient' has"),
+        ("transl", (4, 3), r"'transl' has the shape [4, 3], not [5, 3] as 'global_orient' and 'body_pose' has"),
+        ("transl", None, "no array 'trans': not movement as AMASS writes it"),
+        ("body_pose", None, "no array 'poses': not movement as AMASS writes it"),
+    ],
+)
+def test_a_fault_in_a_part_is_named(tmp_path: Path, name: str, shape: tuple[int, ...] | None, message: str) -> None:
+    found = {"global_orient": np.zeros((5, 3)), "body_pose": np.zeros((5, 63)), "transl": np.zeros((5, 3))}
+    found["fps"] = np.array(30.0)
+    read_npz(saved(tmp_path / "a.npz", found))
+    del found[name]
+    if shape is not None:
+        found[name] = np.zeros(shape)
+    assert fails(saved(tmp_path / "a.npz", found)) == message
+
+
+def test_places_in_centimetres_are_told_and_can_be_said(tmp_path: Path) -> None:
+    found = arrays(22, frames=9) | {"poses": np.zeros((9, 66)), "trans": np.tile([0.0, 0.0, 92.0], (9, 1))}
+    path = saved(tmp_path / "a.npz", found)
+    with pytest.warns(MotionMindWarning, match=r"the body is 92 m off 0; is its place in centimetres \(--unit cm\)\?"):
+        read_motion(path, up="z")
+    np.testing.assert_allclose(read_motion(path, up="z", unit="cm").root[:, 1], 0.92)
 
 
 def test_degrees_are_refused(tmp_path: Path) -> None:
