@@ -37,7 +37,7 @@ from motionmind.errors import CorpusError, MotionMindError, MotionMindWarning
 from motionmind.executors.team import Team, UnfinishedError
 from motionmind.files import make_folder, read_bytes, reads_recorded, replace_file
 
-_KEPT_AGAIN = 6.0  # bytes on disk for each of the shards': themselves, arrays to learn from, and what is learned
+_KEPT_AGAIN = 7.0  # bytes on disk for each of the shards': themselves, arrays to learn from, and what is learned
 _MOVEMENT = ("rotations", "root", "times", "detail")
 _ONE_AT_A_TIME = threading.Lock()  # in a process: Python's list of warnings is one for all its threads
 
