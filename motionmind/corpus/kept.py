@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind._typing import Ints
+from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.changing import of_clips
 from motionmind.corpus.clip import Clip
 from motionmind.corpus.corpus import Corpus
@@ -57,13 +58,16 @@ class Kept:
     def find(cls, corpus: Corpus, before: Corpus, workshop: Workshop | None = None) -> Kept:
         """Find the clips of an earlier corpus in one of another, on the same joints.
 
-        A clip is kept if it is the same in name, repairs and movement, to the last bit, whatever its weight.
+        A clip is kept if it is the same in name, repairs and movement, to the last bit, whatever its weight; none is
+        where the body is of another size, or its facing is treated in another way.
 
         Args:
             corpus: the corpus.
             before: the earlier one.
             workshop: room for the movement of the new clips; None for memory.
         """
+        if corpus.facing != before.facing or not _is_same_body(corpus.skeleton, before.skeleton):
+            return cls.none(corpus)
         known = {_key(clip): number for number, clip in enumerate(before.clips)}
         numbers = np.full(len(corpus.clips), -1)
         new = []
@@ -125,6 +129,12 @@ class Kept:
 
 def _key(clip: Clip) -> tuple[str, str, bool]:
     return clip.corpus, clip.name, clip.mirrored
+
+
+def _is_same_body(one: Skeleton, other: Skeleton) -> bool:
+    return one.difference(other) is None and all(
+        np.array_equal(getattr(one, name), getattr(other, name)) for name in ("offsets", "tips")
+    )
 
 
 def _is_same(one: Corpus, clip: Clip, other: Corpus, known: Clip) -> bool:

@@ -117,7 +117,7 @@ _OF_MOVES = "turn", "travel"  # what is known of moves alone, and not of posture
 
 
 class _Moments(NamedTuple):
-    """What clips show moment by moment, each of itself alone; as the arrays of Carriage."""
+    """Arrays of Carriage that say of each clip what it shows by itself."""
 
     orientations: Floats
     clearance: Floats

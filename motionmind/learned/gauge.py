@@ -20,7 +20,7 @@ from motionmind.executors.workshop import Workshop
 
 @dataclass(frozen=True, eq=False)
 class Gauge:
-    """What C clips show of their pace, each by itself, at FPS frames a second; percentiles are refitted from it.
+    """The pace that each of C clips shows by itself, at FPS frames a second; that of the corpus is refitted from it.
 
     Attributes:
         starts: where the steps, still moments and windows of each clip begin, and how many there are [C + 1, 3].
@@ -43,7 +43,7 @@ class Gauge:
 
     @property
     def counts(self) -> Ints:
-        """How many steps, still moments and windows each clip has [C, 3]."""
+        """Numbers of steps, still moments and windows of each clip [C, 3]."""
         return np.diff(self.starts, axis=0)
 
 

@@ -102,7 +102,8 @@ def learn_changed(before: Learned, kept: Kept, workshop: Workshop | None = None)
         kept: the clips that the corpus has in common with it (`motionmind.corpus.kept`).
         workshop: as of `learn`.
     """
-    if before.gauge is None or before.code != code_name():  # it may have found something else in the same clips
+    # Other code may have found something else in the same clips.
+    if before.gauge is None or before.code != code_name() or kept.before is None:
         return learn_in(kept.corpus, before.space, workshop)
     return _learn(kept, lambda joint, _: before.space.alone(joint), workshop, before)
 

@@ -152,15 +152,18 @@ def test_a_clip_is_kept_if_it_is_the_same_to_the_last_bit(built: Callable[[str],
     corpus = built("on stage").corpus
     first, second = corpus.clips
     for name in ("rotations", "root", "times", "detail"):
-        other = getattr(corpus, name).copy()
-        last = other[second.stop - 2 : second.stop - 1].reshape(-1)
+        array = getattr(corpus, name).copy()
+        last = array[second.stop - 2 : second.stop - 1].reshape(-1)
         last[-1:] = np.nextafter(last[-1:], last.dtype.type(9.0))
-        kept = Kept.find(replace(corpus, **{name: other}), corpus)
+        kept = Kept.find(replace(corpus, **{name: array}), corpus)
         assert (kept.numbers.tolist(), kept.places.tolist()) == ([0, -1], [0, 0]), name
         assert kept.new is not None
         assert [clip.name for clip in kept.new.clips] == [second.name]
     lighter = replace(corpus, clips=(replace(first, weight=0.5), second))
     assert Kept.find(lighter, corpus).new is None
+    taller = replace(corpus.skeleton, offsets=1.1 * corpus.skeleton.offsets)
+    for other in (replace(corpus, skeleton=taller), replace(corpus, facing="free")):
+        assert Kept.find(other, corpus).numbers.tolist() == [-1, -1]
     turned = replace(corpus, clips=(first, replace(second, reverse=1.0)))
     assert Kept.find(turned, corpus).numbers.tolist() == [0, -1]
 
