@@ -172,17 +172,20 @@ def _own(name: str, home: Path | None) -> tuple[Learned, Path]:
 
 
 def _learn_again(learned: Learned, corpus: Corpus, workshop: Workshop) -> Learned:
-    """Learn from changed movement in the same states, and note how much of it is outside of them."""
-    from motionmind.learned.learning import learn_in, outside
+    """Learn from changed movement in the same states, and note how much of what is new is outside of them."""
+    from motionmind.corpus.kept import Kept
+    from motionmind.learned.learning import learn_changed, outside
 
     progress("learning")
-    share, joint, degrees = outside(corpus, learned.space)
-    if share > _FEW:
-        note(
-            f"{100.0 * share:.1f}% of all joints' orientations are in no state ({joint} by {degrees:.0f} degrees): "
-            "to learn states anew, build the corpus from all files"
-        )
-    return learn_in(corpus, learned.space, workshop)
+    kept = Kept.find(corpus, learned.corpus, workshop)
+    if kept.new:
+        share, joint, degrees = outside(kept.new, learned.space)
+        if share > _FEW:
+            note(
+                f"{100.0 * share:.1f}% of all joints' orientations in what is new are in no state ({joint} by "
+                f"{degrees:.0f} degrees): to learn states anew, build the corpus from all files"
+            )
+    return learn_changed(learned, kept, workshop)
 
 
 def _tell(learned: Learned, done: str, *, details: bool) -> None:

@@ -18,7 +18,7 @@ from motionmind.corpus.recordings import Flips, Recording
 from motionmind.errors import CorpusError, suggestion
 from motionmind.executors.workshop import Workshop
 
-_Taken = tuple[Corpus, Clip]
+Taken = tuple[Corpus, Clip]  # a clip, and the corpus that its movement is in
 
 
 def add_recordings(
@@ -75,12 +75,12 @@ def add_recordings(
         max((i for i, c in enumerate(corpus.clips) if not c.corpus and c.mirrored == m), default=-1) + 1
         for m in (False, True)
     )
-    kept: list[_Taken] = [(corpus, clip) for clip in corpus.clips]
-    plain: list[_Taken] = [(more, clip) for clip in new if not clip.mirrored]
-    images: list[_Taken] = [(more, clip) for clip in new if clip.mirrored]
+    kept: list[Taken] = [(corpus, clip) for clip in corpus.clips]
+    plain: list[Taken] = [(more, clip) for clip in new if not clip.mirrored]
+    images: list[Taken] = [(more, clip) for clip in new if clip.mirrored]
     last_image = max(last, last_image)
     parts = [*kept[:last], *plain, *kept[last:last_image], *images, *kept[last_image:]]
-    return replace(_of_clips(corpus, parts, workshop), faults=(*corpus.faults, *more.faults))
+    return replace(of_clips(corpus, parts, workshop), faults=(*corpus.faults, *more.faults))
 
 
 def remove_clips(corpus: Corpus, names: Sequence[str], workshop: Workshop | None = None) -> Corpus:
@@ -105,11 +105,17 @@ def remove_clips(corpus: Corpus, names: Sequence[str], workshop: Workshop | None
     kept = {clip.name for _, clip in parts if not clip.corpus}
     recordings = {whole[name] for name in kept} | kept
     faults = tuple(fault for fault in corpus.faults if fault.clip in recordings)
-    return replace(_of_clips(corpus, parts, workshop), faults=faults)
+    return replace(of_clips(corpus, parts, workshop), faults=faults)
 
 
-def _of_clips(corpus: Corpus, parts: Sequence[_Taken], workshop: Workshop | None) -> Corpus:
-    """Return a corpus of clips of this one and of others on the same joints, the heaviest clip having weight 1."""
+def of_clips(corpus: Corpus, parts: Sequence[Taken], workshop: Workshop | None) -> Corpus:
+    """Return a corpus of clips of this one and of others on the same joints, the heaviest clip having weight 1.
+
+    Args:
+        corpus: says all but the clips and their movement.
+        parts: the clips in their order, one at least.
+        workshop: room for their movement; None for memory.
+    """
     stops = np.cumsum([len(clip) for _, clip in parts])
     heaviest = max(clip.weight for _, clip in parts)
     clips = tuple(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 from motionmind.files import read_bytes
@@ -36,3 +37,9 @@ def fingerprint(files: Iterable[Path], package: Path = Path(__file__).parents[1]
         data = read_bytes(path)
         digest.update(f"{path.name}\0{len(data)}\0".encode() + data)
     return digest.hexdigest()[:16]
+
+
+@cache
+def code_name() -> str:
+    """Return the name of this process's code by which a corpus is read and learned (`fingerprint`)."""
+    return fingerprint([])

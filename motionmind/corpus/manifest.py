@@ -80,6 +80,12 @@ class BuiltManifest(Provenance, frozen=True, kw_only=True):
     flip_degrees: float = FLIP_DEGREES
 
 
+class NamedManifest(BuiltManifest, frozen=True, kw_only=True):
+    """A built corpus that says which code learned it (`motionmind.corpus.fingerprint`)."""
+
+    code: str
+
+
 class ListingManifest(BuiltManifest, frozen=True, kw_only=True):
     """A corpus that an earlier version built, whose manifest lists its clips and faults."""
 

@@ -23,7 +23,7 @@ class Moves:
         self._columns, self._times, self._chosen = columns, times, chosen
 
     def __len__(self) -> int:
-        return int(self._firsts[-1]) if self._chosen is None else len(self._chosen)
+        return int(self.firsts[-1]) if self._chosen is None else len(self._chosen)
 
     def take(self, numbers: Ints) -> Moves:
         """Return some of these moves, by their numbers."""
@@ -54,8 +54,8 @@ class Moves:
         return len(self._columns.weights)
 
     @cached_property
-    def _firsts(self) -> Ints:
-        """The number of the first move of each clip, then of each clip backwards [2 C + 1], and the number of moves."""
+    def firsts(self) -> Ints:
+        """Number of the first of all moves of each clip, then of each clip backwards [2 C + 1], and of all moves."""
         lengths = np.maximum(np.diff(self._columns.starts) - 1, 0)
         return np.concatenate([[0], np.cumsum([lengths, lengths * (self._columns.weights[:, 1] > 0.0)])])
 
@@ -63,12 +63,12 @@ class Moves:
     def _runs(self) -> Ints:
         """The clip that each is in [M]: from C on, the clip C before, backwards."""
         if self._chosen is None:
-            return np.repeat(np.arange(2 * self._clips), np.diff(self._firsts))
-        return np.searchsorted(self._firsts, self._chosen, side="right") - 1
+            return np.repeat(np.arange(2 * self._clips), np.diff(self.firsts))
+        return np.searchsorted(self.firsts, self._chosen, side="right") - 1
 
     @property
     def _lower(self) -> Ints:
         """The former of the two postures that each joins [M]."""
         runs = self._runs
         numbers = np.arange(len(self)) if self._chosen is None else self._chosen
-        return numbers + (np.tile(self._columns.starts[:-1], 2) - self._firsts[:-1])[runs]
+        return numbers + (np.tile(self._columns.starts[:-1], 2) - self.firsts[:-1])[runs]

@@ -19,7 +19,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -31,14 +30,14 @@ from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store, versions
 from motionmind.corpus.clip import Clip, JointFlip
-from motionmind.corpus.fingerprint import fingerprint
+from motionmind.corpus.fingerprint import code_name
 from motionmind.corpus.manifest import BodyEntry
 from motionmind.corpus.recordings import Piece, Recording, Taking, take
 from motionmind.errors import CorpusError, MotionMindError, MotionMindWarning
 from motionmind.executors.team import Team, UnfinishedError
 from motionmind.files import make_folder, read_bytes, reads_recorded, replace_file
 
-_KEPT_AGAIN = 6.0  # bytes on disk for each of the shards': themselves, arrays to learn from, and what is learned
+_KEPT_AGAIN = 7.0  # bytes on disk for each of the shards': themselves, arrays to learn from, and what is learned
 _MOVEMENT = ("rotations", "root", "times", "detail")
 _ONE_AT_A_TIME = threading.Lock()  # in a process: Python's list of warnings is one for all its threads
 
@@ -69,7 +68,7 @@ class Job(NamedTuple):
         name: its clip's name; a score names its own.
         reading: the options.
         folder: of the shards.
-        code: names the package's code (`fingerprint`).
+        code: names the package's code (`code_name`).
     """
 
     file: Path
@@ -191,7 +190,7 @@ def take_files(
         CorpusError: no file can be read, the disk lacks space, or workers do not share it.
         UnfinishedError: workers die of a file again and again, or are out of reach.
     """
-    code = fingerprint([])
+    code = code_name()
     jobs = [Job(file, name, reading, folder, code) for file, name in names.items()]
     done: dict[Path, Taken] = {}
 
@@ -269,11 +268,6 @@ def _shard(job: Job, taken: Taken) -> tuple[list[Recording], tuple[str, ...]]:
 # --- a worker ---------------------------------------------------------------------------------------------------------
 
 
-@cache
-def _code() -> str:
-    return fingerprint([])
-
-
 def take_file(job: Job) -> Taken:
     """Take a file, unless its shard is there; return the shard's name, or why it cannot be taken.
 
@@ -281,7 +275,7 @@ def take_file(job: Job) -> Taken:
         UnfinishedError: the shard cannot be written.
         CorpusError: this worker runs another version of the package.
     """
-    if job.code != _code():
+    if job.code != code_name():
         raise CorpusError(
             "a worker of the cluster has another version of MotionMind; all must be as this one for the same result"
         )

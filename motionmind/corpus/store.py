@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FORMAT, BUILT = "motionmind-corpus", "motionmind-built-corpus"
-VERSIONS = {FORMAT: (1,), BUILT: (1, 2, 3, 4, 5, 6, 7, 8)}  # that can be read; the last is written
+VERSIONS = {FORMAT: (1,), BUILT: (1, 2, 3, 4, 5, 6, 7, 8, 9)}  # that can be read; the last is written
+_CLIPS = 9  # the first that keeps what each clip shows of its pace, and the code that learned
 _FEET = 8  # the first that keeps how fast feet are near the floor
 _COMPLETE = 6  # the first that keeps all that is learned, and the last whose manifest lists clips and faults
 MANIFEST = "manifest.json"
@@ -292,6 +293,11 @@ class Stored(NamedTuple):
     def measures_feet(self) -> bool:
         """Whether it keeps how fast feet are near the floor; movement from one that does not keeps to no such speed."""
         return self.version >= _FEET
+
+    @property
+    def measures_clips(self) -> bool:
+        """Whether it keeps what each clip shows of its pace, and says which code learned it."""
+        return self.version >= _CLIPS
 
     @property
     def lists_clips(self) -> bool:

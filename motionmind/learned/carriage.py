@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from motionmind.body.limbs import limb_of_points, limbs_of
 from motionmind.body.limits import find_loose
 from motionmind.body.support import NEAR, STILL, centre_of_mass, overhang, size_of
 from motionmind.corpus.corpus import Corpus
+from motionmind.corpus.kept import Kept
 from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot
 from motionmind.learned.clusters import clusters_of
@@ -74,32 +76,24 @@ class Carriage:
     trees: Neighbours | None = None
 
 
-def learn_carriage(corpus: Corpus, workshop: Workshop | None = None) -> Carriage:
+def learn_carriage(
+    corpus: Corpus, workshop: Workshop | None = None, kept: Kept | None = None, before: Carriage | None = None
+) -> Carriage:
     """Learn how the bodies of a corpus hold themselves, travel and stand.
 
     Args:
         corpus: the movement.
         workshop: threads, and room for large arrays; None for this thread and memory.
+        kept: the clips that an earlier corpus has, too; None for no such corpus.
+        before: the carriage of that corpus, whose moments in these clips are taken as they are.
     """
     workshop = workshop or Workshop()
-
-    def low_in(here: slice) -> Floats:
-        return lowest_height(corpus.skeleton, corpus.rotations[here], corpus.root[here])
-
-    low = np.concatenate(list(workshop.map(low_in, _blocks(len(corpus)))))
-    floor = [floor_height(low[clip.start : clip.stop]) for clip in corpus.clips]
-    clearance = np.maximum(low - np.repeat(floor, [clip.stop - clip.start for clip in corpus.clips]), 0.0)
+    moments = _join_moments(kept, before, workshop) if kept and before else _measure_moments(corpus, workshop)
     begins, ends, weights = corpus.moves.begins, corpus.moves.ends, corpus.moves.weights
     shares = weights / np.bincount(begins, weights, len(corpus))[begins]
-    heading = rot.heading(corpus.rotations[:, 0])
-    turned = np.angle(np.exp(1j * (heading[ends] - heading[begins])))
-    moved = rot.mul_vec(rot.about_vertical(-heading[begins] - 0.5 * turned), corpus.root[ends] - corpus.root[begins])
-    orientations = _orientations(corpus, workshop)
     middles = len(corpus) + np.arange(len(begins))
-    stands = _standing(corpus, workshop)
-    clear = np.concatenate([clearance, 0.5 * (clearance[begins] + clearance[ends])])
-    aloft = _aloft(corpus, clear, workshop)
     counts = np.concatenate([corpus.weights, weights])
+    orientations, stands, aloft = moments.orientations, moments.stands, moments.aloft
     return Carriage(
         orientations,
         counts,
@@ -107,9 +101,9 @@ def learn_carriage(corpus: Corpus, workshop: Workshop | None = None) -> Carriage
         np.concatenate([middles, ends]),
         np.concatenate([shares, np.ones(len(begins))]),
         clusters_of(corpus.skeleton, orientations, workshop),
-        0.5 * turned,
-        0.5 * moved,
-        clear,
+        moments.turn,
+        moments.travel,
+        moments.clearance,
         stands,
         aloft,
         _overhang(corpus, stands[: len(corpus)], aloft[: len(corpus)], workshop),
@@ -117,6 +111,62 @@ def learn_carriage(corpus: Corpus, workshop: Workshop | None = None) -> Carriage
         _touching(corpus, workshop),
         build_neighbours(corpus.skeleton, orientations, counts, workshop) if len(counts) > MANY else None,
     )
+
+
+_OF_MOVES = "turn", "travel"  # what is known of moves alone, and not of postures
+
+
+class _Moments(NamedTuple):
+    """Arrays of Carriage that say of each clip what it shows by itself."""
+
+    orientations: Floats
+    clearance: Floats
+    stands: Floats
+    aloft: Floats
+    turn: Floats
+    travel: Floats
+
+
+def _measure_moments(corpus: Corpus, workshop: Workshop) -> _Moments:
+    """Measure the moments of all clips."""
+
+    def low_in(here: slice) -> Floats:
+        return lowest_height(corpus.skeleton, corpus.rotations[here], corpus.root[here])
+
+    low = np.concatenate(list(workshop.map(low_in, _blocks(len(corpus)))))
+    floor = [floor_height(low[clip.start : clip.stop]) for clip in corpus.clips]
+    clearance = np.maximum(low - np.repeat(floor, [clip.stop - clip.start for clip in corpus.clips]), 0.0)
+    begins, ends = corpus.moves.begins, corpus.moves.ends
+    heading = rot.heading(corpus.rotations[:, 0])
+    turned = np.angle(np.exp(1j * (heading[ends] - heading[begins])))
+    moved = rot.mul_vec(rot.about_vertical(-heading[begins] - 0.5 * turned), corpus.root[ends] - corpus.root[begins])
+    clear = np.concatenate([clearance, 0.5 * (clearance[begins] + clearance[ends])])
+    return _Moments(
+        _orientations(corpus, workshop),
+        clear,
+        _standing(corpus, workshop),
+        _aloft(corpus, clear, workshop),
+        0.5 * turned,
+        0.5 * moved,
+    )
+
+
+def _join_moments(kept: Kept, before: Carriage, workshop: Workshop) -> _Moments:
+    """Join the moments of clips that are kept with those of new clips, which are measured."""
+    new = None if kept.new is None else _measure_moments(kept.new, workshop)
+    moves = len(before.turn)
+
+    def join(name: str) -> Floats:
+        old, fresh = getattr(before, name), getattr(new, name, None)
+        whole = 0 if name in _OF_MOVES else len(kept.corpus)
+        out = workshop.empty((whole + len(kept.corpus.moves), *old.shape[1:]))
+        if whole:
+            kept.join(old, fresh, kept.postures, out)
+        middles = None if fresh is None or new is None else fresh[len(fresh) - len(new.turn) :]
+        kept.join(old[len(old) - moves :], middles, kept.moves, out[whole:])
+        return out
+
+    return _Moments(*map(join, _Moments._fields))
 
 
 def _blocks(count: int) -> Iterator[slice]:

@@ -10,6 +10,8 @@ import numpy as np
 
 from motionmind._typing import Floats, States
 from motionmind.corpus.corpus import FACING, Corpus
+from motionmind.corpus.fingerprint import code_name
+from motionmind.corpus.kept import Kept
 from motionmind.discretize import Discretization, StateSpace
 from motionmind.discretize.protocol import ByJoint
 from motionmind.discretize.states import nearest
@@ -19,7 +21,8 @@ from motionmind.geometry import rotations as rot
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.grammar import learn as learn_grammar
 from motionmind.learned.carriage import Carriage, learn_carriage
-from motionmind.learned.pace import Pace, learn_pace
+from motionmind.learned.gauge import Gauge
+from motionmind.learned.pace import Pace, measure_pace, refit_pace
 from motionmind.learned.plausibility import Plausibility, learn_plausibility
 
 MOST_STATES_LEARNED = 50_000  # of a joint: a search among them takes some 6 GB
@@ -38,6 +41,8 @@ class Learned:
         carriage: how the corpus's bodies hold themselves, travel and stand.
         pace: how long they take for how far a way.
         plausibility: what their movement shows a viewer at most.
+        gauge: what each clip shows of its pace; None if an earlier version learned.
+        code: names the code that learned (`motionmind.corpus.fingerprint`); "" if an earlier version did.
     """
 
     corpus: Corpus
@@ -47,6 +52,8 @@ class Learned:
     carriage: Carriage
     pace: Pace
     plausibility: Plausibility
+    gauge: Gauge | None = None
+    code: str = ""
 
 
 def learn(corpus: Corpus, discretization: Discretization, workshop: Workshop | None = None) -> Learned:
@@ -67,9 +74,9 @@ def learn(corpus: Corpus, discretization: Discretization, workshop: Workshop | N
     if corpus.facing == "free":
         _check_facing(corpus, float(tolerances[0]))
     if isinstance(discretization, ByJoint):
-        return _learn(corpus, partial(discretization.fit_joint, joints), workshop)
+        return _learn(Kept.none(corpus), partial(discretization.fit_joint, joints), workshop)
     whole = discretization.fit(joints, corpus.to_chains(corpus.rotations)[:, : len(joints)])
-    return _learn(corpus, lambda joint, _: whole.alone(joint), workshop)
+    return _learn(Kept.none(corpus), lambda joint, _: whole.alone(joint), workshop)
 
 
 def learn_in(corpus: Corpus, space: StateSpace, workshop: Workshop | None = None) -> Learned:
@@ -80,24 +87,50 @@ def learn_in(corpus: Corpus, space: StateSpace, workshop: Workshop | None = None
         space: the states of each chain, as they were learned from a corpus on the same joints, facing alike.
         workshop: as of `learn`.
     """
-    return _learn(corpus, lambda joint, _: space.alone(joint), workshop)
+    return _learn(Kept.none(corpus), lambda joint, _: space.alone(joint), workshop)
 
 
-def _learn(corpus: Corpus, fit: Callable[[int, Floats], StateSpace], workshop: Workshop | None) -> Learned:
-    """Learn from a corpus; `fit` gives the states of a joint, of its index and its orientations [N, 4]."""
-    workshop = workshop or Workshop()
+def learn_changed(before: Learned, kept: Kept, workshop: Workshop | None = None) -> Learned:
+    """Learn from a corpus in the states of an earlier one: the same as `learn_in`, to the last bit.
+
+    Of clips that it had, what was found is taken as it is: the states that they are in, and how they are held and move.
+    So new clips alone are compared with states and measured, and what is learned of all clips together is refitted.
+    Where other code learned the earlier one, all is learned anew.
+
+    Args:
+        before: what was learned from the earlier corpus.
+        kept: the clips that the corpus has in common with it (`motionmind.corpus.kept`).
+        workshop: as of `learn`.
+    """
+    # Other code may have found something else in the same clips.
+    if before.gauge is None or before.code != code_name() or kept.before is None:
+        return learn_in(kept.corpus, before.space, workshop)
+    return _learn(kept, lambda joint, _: before.space.alone(joint), workshop, before)
+
+
+def _learn(
+    kept: Kept, fit: Callable[[int, Floats], StateSpace], workshop: Workshop | None, before: Learned | None = None
+) -> Learned:
+    """Learn from a corpus; `fit` gives the states of a joint, of its index and its orientations in new clips [n, 4].
+
+    What was learned `before` of clips that are kept stays.
+    """
+    workshop, corpus = workshop or Workshop(), kept.corpus
     states = workshop.empty((len(corpus), len(corpus.chains)), np.int32)
 
     def visit(joint: int) -> StateSpace:
-        orientations = corpus.chain(joint)
-        smaller, states[:, joint] = _keep_visited(fit(joint, orientations), orientations)
+        orientations = kept.new.chain(joint) if kept.new else np.zeros((0, 4))
+        whole, found = fit(joint, orientations), np.empty(len(corpus), dtype=np.int32)
+        old = before.states[:, joint] if before else None
+        kept.join(old, whole.assign(orientations[:, None])[:, 0], kept.postures, found)
+        smaller, states[:, joint] = _keep_visited(whole, found)
         return smaller
 
     space = StateSpace.joined(list(workshop.map(visit, range(len(corpus.skeleton)))))
     _check_size(corpus, space)
     if corpus.facing == "free":
         space, states[:, -1] = _with_facing(space, corpus.chain(len(corpus.skeleton)))
-    return learn_from_states(corpus, space, states, workshop)
+    return _learn_all(kept, space, states, workshop, before)
 
 
 def outside(corpus: Corpus, space: StateSpace) -> tuple[float, str, float]:
@@ -128,7 +161,14 @@ def learn_from_states(corpus: Corpus, space: StateSpace, states: States, worksho
         states: states of the corpus's postures [N, L].
         workshop: as of `learn`.
     """
-    workshop = workshop or Workshop()
+    return _learn_all(Kept.none(corpus), space, states, workshop or Workshop())
+
+
+def _learn_all(
+    kept: Kept, space: StateSpace, states: States, workshop: Workshop, before: Learned | None = None
+) -> Learned:
+    """Learn from a corpus whose postures have states; what was learned `before` of clips that are kept stays."""
+    corpus = kept.corpus
     moves = corpus.moves
     grammar = learn_grammar(
         corpus.chains,
@@ -143,18 +183,23 @@ def learn_from_states(corpus: Corpus, space: StateSpace, states: States, worksho
         posture_weights=corpus.weights,
         team=workshop.team,
     )
+    carriage_before, gauge_before = (before.carriage, before.gauge) if before else (None, None)
+
+    def pace_of() -> tuple[Gauge, Pace]:
+        gauge = measure_pace(kept, gauge_before, workshop)
+        return gauge, refit_pace(corpus, gauge)
+
     # One calls NumPy for little at a time, and the other compiled loops for long, which leave the interpreter free.
-    pace, carriage = workshop.both(partial(learn_pace, corpus), partial(learn_carriage, corpus, workshop))
-    return Learned(corpus, space, states, grammar, carriage, pace, learn_plausibility(corpus, pace.fastest))
+    (gauge, pace), carriage = workshop.both(pace_of, partial(learn_carriage, corpus, workshop, kept, carriage_before))
+    plausibility = learn_plausibility(corpus, pace.fastest)
+    return Learned(corpus, space, states, grammar, carriage, pace, plausibility, gauge, code_name())
 
 
-def _keep_visited(space: StateSpace, orientations: Floats) -> tuple[StateSpace, States]:
-    """Return the state space of one joint without states that no posture is in, and the states [N] in it of its
-    orientations [N, 4].
+def _keep_visited(space: StateSpace, states: States) -> tuple[StateSpace, States]:
+    """Return the state space of one joint without states that no posture is in, and its states [N] in that.
 
     Nothing is known of a state without postures.
     """
-    states = space.assign(orientations[:, None])[:, 0]
     seen = np.unique(states)
     labels = [[space.labels[0][s] for s in seen] if space.labels[0] else []]
     smaller = StateSpace.of_joints(

@@ -118,5 +118,7 @@ class LearnedCorpus(Learned):
             learned.carriage,
             learned.pace,
             learned.plausibility,
+            learned.gauge,
+            learned.code,
             load_seconds=load_seconds,
         )

@@ -30,16 +30,20 @@ none is less than the fastest speeds, or everyday movement.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from motionmind._typing import Floats, Ints
+from motionmind._typing import Floats, Ints, Singles
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.clip import Clip
 from motionmind.corpus.corpus import Corpus
+from motionmind.corpus.kept import Kept
+from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot
+from motionmind.learned.gauge import Gauge, join_gauges
 from motionmind.learned.peaks import LENGTHS, RARE, Peaks, accelerations
 from motionmind.learned.percentiles import Percentile
 from motionmind.learned.sampled import BLOCK, FPS, Sampled
@@ -161,99 +165,85 @@ class Pace:
 
 def learn_pace(corpus: Corpus) -> Pace:
     """Learn the pace of a corpus."""
-    gauge = _Gauge(corpus)
-    for clip in gauge.clips:
-        gauge.add(_show(corpus, clip))
-    return gauge.pace()
+    return refit_pace(corpus, measure_pace(Kept.none(corpus)))
 
 
-class _Shown(NamedTuple):
-    """The pace that a clip of T frames at FPS shows.
+def measure_pace(kept: Kept, before: Gauge | None = None, workshop: Workshop | None = None) -> Gauge:
+    """Return what the clips of a corpus show of their pace.
 
-    Attributes:
-        steps: as of `steps_of` [T - 1, J + 3].
-        moved: displacements of the root in them [T - 1, 3], heights.
-        stretches: those of which nothing was reconstructed, from and to a step [n, 2].
-        times: of the still moments [S], seconds in the recording.
-        speeds: of the mean joint in them [S], rad/s.
-        windows: the ways between each two that are as far apart as a window: angles of the mean joint and of the
-            body's turning, radians, and its travel, heights; both speeds; seconds [W, 6].
+    Args:
+        kept: the corpus, and which of its clips are new: these alone are measured.
+        before: what the clips of the earlier corpus show; None if there is none.
+        workshop: room for large arrays; None for memory.
     """
-
-    steps: Floats
-    moved: Floats
-    stretches: Ints
-    times: Floats
-    speeds: Floats
-    windows: Floats
+    workshop = workshop or Workshop()
+    if before is None:
+        return _measure(kept.corpus, workshop)
+    return join_gauges(kept, before, _measure(kept.new, workshop) if kept.new else None, workshop)
 
 
-def _show(corpus: Corpus, clip: Clip) -> _Shown:
-    """Return what a clip of two frames or more shows of its pace."""
+def _measure(corpus: Corpus, workshop: Workshop) -> Gauge:
+    """Measure the pace of all clips."""
+    piles, counts = [workshop.pile() for _ in range(3)], [[0, 0, 0]]
+    for clip in corpus.clips:
+        shown: tuple[NDArray[Any], ...] = _show(corpus, clip)
+        counts.append([len(rows) for rows in shown])
+        for pile, rows in zip(piles, shown, strict=True):
+            pile.add(rows)
+    return Gauge(np.cumsum(counts, axis=0), *(pile.array() for pile in piles))
+
+
+def _show(corpus: Corpus, clip: Clip) -> tuple[Singles, Floats, Floats]:
+    """Return what a clip shows of its pace: steps, still moments and windows, as in Gauge; a single frame, none."""
     recording = Sampled(corpus, clip, FPS)
-    blocks = [(steps_of(block), moved_in(block)) for block in recording.blocks(BLOCK, overlap=1)]
-    steps, moved = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+    if len(recording) < 2:
+        return np.zeros((0, len(corpus.skeleton) + 6), np.float32), np.zeros((0, 2)), np.zeros((0, 6))
+    blocks = [np.column_stack([steps_of(block), moved_in(block)]) for block in recording.blocks(BLOCK, overlap=1)]
+    steps = np.concatenate(blocks)
     still, speeds = _lulls(steps[:, : len(corpus.skeleton)].mean(axis=1))
-    windows = _windows(recording, still, speeds)
-    return _Shown(steps, moved, _danced(recording), recording.times[still], speeds, windows)
+    stills = np.column_stack([recording.times[still], speeds])
+    return steps.astype(np.float32), stills, _windows(recording, still, speeds)
 
 
-class _Gauge:
-    """The pace of a corpus, from what its clips show, one after the other; their frames are not kept.
-
-    Attributes:
-        clips: the clips that show any.
-    """
-
-    def __init__(self, corpus: Corpus) -> None:
-        recordings = (Sampled(corpus, clip, FPS) for clip in corpus.clips if len(clip) > 1)
-        found = [(one.clip, len(one) - 1, _danced(one)) for one in recordings if len(one) > 1]
-        counts = np.array([count for _, count, _ in found], dtype=np.int64)
-        lengths = np.array([stop - start for _, _, stretches in found for start, stop in stretches], dtype=np.int64)
-        self.clips = [clip for clip, _, _ in found]
-        self._corpus, self._joints, self._count = corpus, len(corpus.skeleton), int(counts.sum())
-        self._rare = Percentile(RARE, self._count)
-        self._seconds = Percentile(100.0 - RARE, int((counts - np.minimum(counts, round(FPS)) + 1).sum()))
-        self._peaks = Peaks(lengths)
-        self._usual = np.zeros((0, 3))
-        self._most = np.zeros(self._joints + 4)
-        self._stills: list[tuple[Floats, Floats]] = []
-        self._windows = [np.zeros((0, 6))]
-
-    def add(self, shown: _Shown) -> None:
-        """Add the pace of the next clip."""
-        speeds = FPS * shown.steps
+def refit_pace(corpus: Corpus, gauge: Gauge) -> Pace:
+    """Return the pace of a corpus, given what its clips show."""
+    joints = len(corpus.skeleton)
+    counts = np.diff(gauge.starts[:, 0])
+    shown = [(number, clip) for number, clip in enumerate(corpus.clips) if counts[number]]
+    stretches = [_danced(Sampled(corpus, clip, FPS)) for _, clip in shown]
+    lengths = np.array([stop - start for some in stretches for start, stop in some], dtype=np.int64)
+    moving = counts[counts > 0]
+    rare = Percentile(RARE, int(counts.sum()))
+    seconds = Percentile(100.0 - RARE, int((moving - np.minimum(moving, round(FPS)) + 1).sum()))
+    peaks = Peaks(lengths)
+    total, most = np.zeros((0, 3)), np.zeros(joints + 4)
+    for (number, _), some in zip(shown, stretches, strict=True):
+        steps = gauge.steps[gauge.starts[number, 0] : gauge.starts[number + 1, 0]].astype(np.float64)
+        speeds, moved = FPS * steps[:, :-3], steps[:, -3:]
         # Row after row, so that it does not matter how many clips there are.
-        self._usual = np.concatenate([self._usual, _usual_parts(speeds, self._joints)]).sum(axis=0, keepdims=True)
-        changed = accelerations(shown.moved, FPS).max(initial=0.0)
-        self._most = np.maximum(self._most, np.append(speeds.max(axis=0), changed))
-        self._rare.add(speeds[:, :-1])
-        self._seconds.add(over_seconds(FPS * shown.steps[:, : self._joints].mean(axis=1), FPS)[:, None])
-        self._stills.append((shown.times, shown.speeds))
-        self._windows.append(shown.windows)
-        for start, stop in shown.stretches:
-            self._peaks.add(speeds[start:stop], shown.moved[start:stop])
-
-    def pace(self) -> Pace:
-        """Return the pace of all clips."""
-        joints = self._joints
-        usual, fastest = np.array(SLOWEST_USUAL), np.concatenate([np.full(joints, EVERYDAY[0]), EVERYDAY[1:]])
-        greatest, slowest = np.append(fastest, [EVERYDAY[2], STARTS]), np.zeros(1)
-        if self.clips:
-            usual = np.maximum(self._usual[0] / self._count, usual)
-            rare = self._rare.value()
-            median = float(np.median(rare[:joints]))
-            least = OF_MEDIAN * median if median > SLOWEST_USUAL[0] else EVERYDAY[0]  # at rest there is noise
-            fastest = np.maximum(rare, [*[least] * joints, *EVERYDAY[1:]])
-            greatest = np.maximum(self._most, np.append(fastest, [EVERYDAY[2], STARTS]))
-            slowest = self._seconds.value()
-        lulls = np.ones(len(self._corpus))
-        for clip, (times, speeds) in zip(self.clips, self._stills, strict=True):
-            here = slice(clip.start, clip.stop)
-            lulls[here] = np.interp(self._corpus.times[here], times, speeds / usual[0])
-        peaks = self._peaks.values(greatest, np.append(fastest, [EVERYDAY[2], STARTS]))
-        law = _fit_windows(np.concatenate(self._windows), usual)
-        return Pace(usual, fastest, greatest[:-2], slowest, peaks, lulls, law)
+        total = np.concatenate([total, _usual_parts(speeds, joints)]).sum(axis=0, keepdims=True)
+        most = np.maximum(most, np.append(speeds.max(axis=0), accelerations(moved, FPS).max(initial=0.0)))
+        rare.add(speeds[:, :-1])
+        seconds.add(over_seconds(FPS * steps[:, :joints].mean(axis=1), FPS)[:, None])
+        for start, stop in some:
+            peaks.add(speeds[start:stop], moved[start:stop])
+    usual, fastest = np.array(SLOWEST_USUAL), np.concatenate([np.full(joints, EVERYDAY[0]), EVERYDAY[1:]])
+    greatest, slowest = np.append(fastest, [EVERYDAY[2], STARTS]), np.zeros(1)
+    if shown:
+        usual = np.maximum(total[0] / counts.sum(), usual)
+        of_joints = rare.value()
+        median = float(np.median(of_joints[:joints]))
+        least = OF_MEDIAN * median if median > SLOWEST_USUAL[0] else EVERYDAY[0]  # at rest there is noise
+        fastest = np.maximum(of_joints, [*[least] * joints, *EVERYDAY[1:]])
+        greatest = np.maximum(most, np.append(fastest, [EVERYDAY[2], STARTS]))
+        slowest = seconds.value()
+    lulls = np.ones(len(corpus))
+    for number, clip in shown:
+        here = slice(clip.start, clip.stop)
+        times, speed = gauge.stills[gauge.starts[number, 1] : gauge.starts[number + 1, 1]].T
+        lulls[here] = np.interp(corpus.times[here], times, speed / usual[0])
+    peak = peaks.values(greatest, np.append(fastest, [EVERYDAY[2], STARTS]))
+    return Pace(usual, fastest, greatest[:-2], slowest, peak, lulls, _fit_windows(gauge.windows, usual))
 
 
 def _usual_parts(speeds: Floats, joints: int) -> Floats:

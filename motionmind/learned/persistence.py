@@ -25,7 +25,14 @@ from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.entries import Columns, Entries, Packed, StoredClips
 from motionmind.corpus.fingerprint import fingerprint
 from motionmind.corpus.gather import gather
-from motionmind.corpus.manifest import BuiltManifest, ListingManifest, SourceManifest, parse_manifest
+from motionmind.corpus.kept import Kept
+from motionmind.corpus.manifest import (
+    BuiltManifest,
+    ListingManifest,
+    NamedManifest,
+    SourceManifest,
+    parse_manifest,
+)
 from motionmind.discretize import Discretization, StateSpace, from_spec
 from motionmind.discretize.library import library_path
 from motionmind.errors import FormatError, MotionMindError
@@ -35,15 +42,16 @@ from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.transitions import Transitions
 from motionmind.learned.carriage import Carriage
+from motionmind.learned.gauge import Gauge
 from motionmind.learned.learning import Learned, learn, learn_from_states
 from motionmind.learned.neighbours import Neighbours
-from motionmind.learned.pace import Pace
+from motionmind.learned.pace import Pace, measure_pace
 from motionmind.learned.plausibility import Plausibility
-from motionmind.learned.validity import ENTRIES, FORMS, MOVEMENT, TREES, check_entries, check_forms, check_values
+from motionmind.learned.validity import ENTRIES, FORMS, GAUGE, MOVEMENT, TREES, check_entries, check_forms, check_values
 from motionmind.notation.sources import sources
 from motionmind.retarget.retarget import own_skeleton
 
-_Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage, Pace, Plausibility)
+_Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage, Pace, Plausibility, Gauge)
 
 _CORPUS_KEYS = ("name", "title", "author", "source", "licence", "facing", "rate", "skip", "citation")
 _PARTS = {
@@ -70,6 +78,8 @@ def save(learned: Learned, folder: str | os.PathLike[str]) -> None:
     for name, kind in _PARTS.items():
         part = getattr(learned if kind in (Carriage, Pace, Plausibility) else learned.grammar, name)
         arrays |= {f"{name}.{key}": getattr(part, key) for key in _array_names(kind)}
+    gauge = learned.gauge or measure_pace(Kept.none(learned.corpus))
+    arrays |= {f"gauge.{key}": getattr(gauge, key) for key in _array_names(Gauge)}
     if learned.carriage.trees is not None:
         arrays |= {f"neighbours.{key}": array for key, array in learned.carriage.trees.arrays.items()}
     store.save(Path(folder), _manifest(learned), arrays)
@@ -127,6 +137,7 @@ def _manifest(learned: Learned) -> dict[str, Any]:
             "labels": space.labels,
         },
     }
+    manifest["code"] = learned.code
     if corpus.flip_degrees != FLIP_DEGREES:
         manifest["flip_degrees"] = corpus.flip_degrees
     if corpus.origins:
@@ -174,7 +185,9 @@ def _open(folder: Path, stored: store.Stored) -> Learned:
     arrays: Mapping[str, NDArray[Any]] = stored.arrays
     if not stored.measures_feet:
         arrays = {**arrays, "plausibility.slides": np.array([np.nan])}
-    corpus, space, states = _read_arrays(folder, stored, arrays, FORMS)
+    is_named = stored.measures_clips
+    needed = (name for name in FORMS if is_named or name not in GAUGE)
+    corpus, space, states = _read_arrays(folder, stored, arrays, needed)
     grammar = Grammar(
         corpus.chains,
         arrays["centres"],
@@ -183,8 +196,17 @@ def _open(folder: Path, stored: store.Stored) -> Learned:
         _part(Coordination, "coordination", arrays),
     )
     carriage = replace(_part(Carriage, "carriage", arrays), trees=_trees(arrays, corpus.skeleton))
-    pace = _part(Pace, "pace", arrays)
-    return Learned(corpus, space, states, grammar, carriage, pace, _part(Plausibility, "plausibility", arrays))
+    return Learned(
+        corpus,
+        space,
+        states,
+        grammar,
+        carriage,
+        _part(Pace, "pace", arrays),
+        _part(Plausibility, "plausibility", arrays),
+        _part(Gauge, "gauge", arrays) if is_named else None,
+        stored.manifest["code"] if is_named else "",
+    )
 
 
 def _read_movement(folder: Path, stored: store.Stored) -> tuple[Corpus, StateSpace, States]:
@@ -213,7 +235,8 @@ def _read_arrays(
     path = folder / store.MANIFEST
     try:
         listed = parse_manifest(stored.manifest, ListingManifest, path) if stored.lists_clips else None
-        manifest = listed or parse_manifest(stored.manifest, BuiltManifest, path)
+        kind = NamedManifest if stored.measures_clips else BuiltManifest
+        manifest = listed or parse_manifest(stored.manifest, kind, path)
     except FormatError as error:
         raise FormatError(f"{error}; {store.remedy(folder)}") from error
     lacking = (name for name in needed if name not in arrays and not (listed and name in ENTRIES))

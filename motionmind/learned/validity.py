@@ -25,6 +25,7 @@ from motionmind.files import give_back
 from motionmind.learned.neighbours import node_bounds
 from motionmind.learned.peaks import LENGTHS
 from motionmind.learned.plausibility import EVERYDAY, MEASURES
+from motionmind.learned.sampled import FPS
 
 _MOST = 1e6  # metres, seconds, rad/s, nats: far beyond any movement, and far below where sums overflow
 _SMALL, _TINY = 1e-9, 1e-300
@@ -95,6 +96,10 @@ FORMS = {
     "pace.peaks": _Form("f8", f"{len(LENGTHS)} J+4", 0.0),
     "pace.lulls": _Form("f8", "N", 0.0),
     "pace.law": _Form("f8", "4", -100.0, 100.0),
+    "gauge.starts": _Form("i8", "C+1 3"),
+    "gauge.steps": _Form("f4", "steps J+6"),
+    "gauge.stills": _Form("f8", "stills 2"),
+    "gauge.windows": _Form("f8", "windows 6"),
     "plausibility.fastest": _Form("f8", "J+2", _SMALL),
     "plausibility.most": _Form("f8", f"{len(MEASURES)}", or_nan=True),
     "plausibility.slides": _Form("f8", "1", EVERYDAY, or_nan=True),
@@ -111,6 +116,7 @@ TREES = {  # of a corpus of many moments, in versions that have them
 }
 
 MOVEMENT = [name for name in FORMS if "." not in name]  # from these, and the clips, all the others can be learned
+GAUGE = [name for name in FORMS if name.startswith("gauge.")]  # that earlier versions did not keep
 ENTRIES = [name for name in FORMS if name.startswith(("clips.", "faults."))]  # listed in the manifest of early versions
 
 
@@ -197,11 +203,13 @@ def check_values(arrays: Mapping[str, NDArray[Any]], corpus: Corpus, space: Stat
     if not (later > 0.0).all():
         raise ValueError("times does not rise within a clip")
     _check_range("states", arrays, space.sizes)
-    if FORMS.keys() - ENTRIES <= arrays.keys():
+    if FORMS.keys() - {*ENTRIES, *GAUGE} <= arrays.keys():
         _check_grammar(arrays, corpus, space, later)
         _check_carriage(arrays, len(corpus), len(later))
     if TREES.keys() & arrays.keys():
         _check_trees(arrays)
+    if arrays.keys() >= set(GAUGE):
+        _check_gauge(arrays, corpus)
 
 
 def _check_clips(corpus: Corpus) -> None:
@@ -261,6 +269,17 @@ def _check_trees(arrays: Mapping[str, NDArray[Any]]) -> None:
         raise ValueError("neighbours.ranks is not where the moments are in neighbours.order")
     if not np.array_equal(arrays["neighbours.bounds"], node_bounds(count)):
         raise ValueError(f"neighbours.bounds is not that of {count} moments")
+
+
+def _check_gauge(arrays: Mapping[str, NDArray[Any]], corpus: Corpus) -> None:
+    """Check that each clip has as many steps as it lasts, and a still moment if it has any."""
+    starts, bounds = arrays["gauge.starts"], corpus.columns.starts
+    counts, last = np.diff(starts, axis=0), [len(arrays[f"gauge.{name}"]) for name in ("steps", "stills", "windows")]
+    if starts[0].any() or starts[-1].tolist() != last or (counts < 0).any():
+        raise ValueError(f"gauge.starts does not rise from 0 to {last}")
+    steps = np.floor((corpus.times[bounds[1:] - 1] - corpus.times[bounds[:-1]]) * FPS + 1e-3)
+    if (counts[:, 0] != steps).any() or (np.minimum(counts[:, 0], 1) > counts[:, 1]).any():
+        raise ValueError("gauge.starts has not the steps and still moments that the corpus's clips have")
 
 
 def _check_units(name: str, arrays: Mapping[str, NDArray[Any]]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,21 +10,29 @@ import numpy as np
 import pytest
 from bundled_clips import ballet_clip
 from command_line import Run
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from same import assert_learned_alike
 
 from motionmind.body.motion import Motion
+from motionmind.corpus import store
 from motionmind.corpus.changing import add_recordings, remove_clips
+from motionmind.corpus.clip import Clip
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
+from motionmind.corpus.kept import Kept
 from motionmind.corpus.recordings import Flips
 from motionmind.discretize import Codebook
 from motionmind.errors import CorpusError
+from motionmind.executors.workshop import Workshop
 from motionmind.formats import write_motion
 from motionmind.geometry import rotations as rot
-from motionmind.learned.learning import learn, learn_in, outside
+from motionmind.learned import carriage, pace, persistence
+from motionmind.learned.learning import Learned, learn, learn_changed, learn_in, outside
 from motionmind.tween.engine import Engine
 
 STATES = Codebook(20.0)
+WAYS = "mirrored, backwards", "mixed", "on stage"
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +58,7 @@ def gathered(motions: Sequence[Motion], way: str) -> Corpus:
     return gather("dances", motions, facing="stage", skip=2, flips="keep")
 
 
-@pytest.mark.parametrize("way", ["mirrored, backwards", "mixed", "on stage"])
+@pytest.mark.parametrize("way", WAYS)
 def test_what_is_added_or_removed_is_as_if_it_were_built_so(dances: list[Motion], way: str) -> None:
     flips: Flips = "keep" if way == "on stage" else "repair"
     before = learn(gathered(dances[:2], way), STATES)
@@ -60,6 +68,104 @@ def test_what_is_added_or_removed_is_as_if_it_were_built_so(dances: list[Motion]
     assert_learned_alike(learn_in(left, before.space), learn_in(gathered(dances[1::2], way), before.space))
     # And there and back again is where one was.
     assert_learned_alike(learn_in(remove_clips(added, ["fondus", "jump"]), before.space), before)
+
+
+def changed(before: Learned, corpus: Corpus) -> Learned:
+    """What is learned from a changed corpus, given what was learned before."""
+    return learn_changed(before, Kept.find(corpus, before.corpus))
+
+
+@pytest.fixture(scope="module")
+def built(dances: list[Motion]) -> Callable[[str], Learned]:
+    """What is learned from the first two dances, by the way."""
+    return {way: learn(gathered(dances[:2], way), STATES) for way in WAYS}.__getitem__
+
+
+@settings(max_examples=12, deadline=None)
+@given(way=st.sampled_from(WAYS), turns=st.lists(st.integers(0, 3), min_size=1, max_size=4), trees=st.booleans())
+def test_in_any_order_it_is_as_if_it_were_built_so(
+    dances: list[Motion], built: Callable[[str], Learned], way: str, turns: list[int], trees: bool
+) -> None:
+    """Each turn removes a dance that is there, or adds it at the end; what was known is taken as it was."""
+    there = [0, 1]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(carriage, "MANY", 40 if trees else carriage.MANY)
+        learned = learn_in(built(way).corpus, built(way).space)
+        for dance in turns:
+            if dance not in there:
+                there.append(dance)
+                flips: Flips = "keep" if way == "on stage" else "repair"
+                corpus = add_recordings(learned.corpus, [dances[dance]], flips=flips)
+            elif len(there) > 1:
+                there.remove(dance)
+                corpus = remove_clips(learned.corpus, [dances[dance].name])
+            else:
+                continue
+            afresh = learn_in(gathered([dances[number] for number in there], way), learned.space)
+            learned = changed(learned, corpus)
+            assert (learned.carriage.trees is not None) == trees
+            assert_learned_alike(learned, afresh)
+
+
+def test_files_are_those_of_a_corpus_that_is_built_afresh(
+    dances: list[Motion], built: Callable[[str], Learned], tmp_path: Path
+) -> None:
+    persistence.save(built("mixed"), tmp_path / "dances")
+    before = persistence.load(str(tmp_path / "dances"))
+    persistence.save(changed(before, add_recordings(before.corpus, dances[2:3])), tmp_path / "dances")
+    persistence.save(learn_in(gathered(dances[:3], "mixed"), before.space), tmp_path / "afresh")
+    one, other = (store.load(tmp_path / name) for name in ("dances", "afresh"))
+    assert one.manifest | {"folder": 0} == other.manifest | {"folder": 0}
+    for file, same in zip(one.files, other.files, strict=True):
+        assert file.read_bytes() == same.read_bytes(), file.name
+
+
+def test_what_is_kept_is_not_measured_again(
+    dances: list[Motion], built: Callable[[str], Learned], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[str] = []
+    measured: list[str] = []
+    show, measure = pace._show, carriage._measure_moments
+
+    def showing(corpus: Corpus, clip: Clip) -> object:
+        shown.append(clip.name)
+        return show(corpus, clip)
+
+    def measuring(corpus: Corpus, workshop: Workshop) -> object:
+        measured.extend(clip.name for clip in corpus.clips)
+        return measure(corpus, workshop)
+
+    monkeypatch.setattr(pace, "_show", showing)
+    monkeypatch.setattr(carriage, "_measure_moments", measuring)
+    before = built("on stage")
+    added = changed(before, add_recordings(before.corpus, dances[2:3], flips="keep"))
+    assert shown == measured == ["fondus"]
+    assert_learned_alike(changed(added, remove_clips(added.corpus, ["fondus"])), before)
+    assert shown == measured == ["fondus"]
+    for other in (replace(before, code="other code"), replace(before, gauge=None)):
+        shown.clear()
+        assert_learned_alike(changed(other, before.corpus), before)
+        assert shown == ["tendus", "degages"]
+
+
+def test_a_clip_is_kept_if_it_is_the_same_to_the_last_bit(built: Callable[[str], Learned]) -> None:
+    corpus = built("on stage").corpus
+    first, second = corpus.clips
+    for name in ("rotations", "root", "times", "detail"):
+        array = getattr(corpus, name).copy()
+        last = array[second.stop - 2 : second.stop - 1].reshape(-1)
+        last[-1:] = np.nextafter(last[-1:], last.dtype.type(9.0))
+        kept = Kept.find(replace(corpus, **{name: array}), corpus)
+        assert (kept.numbers.tolist(), kept.places.tolist()) == ([0, -1], [0, 0]), name
+        assert kept.new is not None
+        assert [clip.name for clip in kept.new.clips] == [second.name]
+    lighter = replace(corpus, clips=(replace(first, weight=0.5), second))
+    assert Kept.find(lighter, corpus).new is None
+    taller = replace(corpus.skeleton, offsets=1.1 * corpus.skeleton.offsets)
+    for other in (replace(corpus, skeleton=taller), replace(corpus, facing="free")):
+        assert Kept.find(other, corpus).numbers.tolist() == [-1, -1]
+    turned = replace(corpus, clips=(first, replace(second, reverse=1.0)))
+    assert Kept.find(turned, corpus).numbers.tolist() == [0, -1]
 
 
 def test_how_much_is_outside_of_all_states_is_told(dances: list[Motion]) -> None:

@@ -194,6 +194,22 @@ def test_columns_that_are_of_other_clips_are_refused(built: Path, tmp_path: Path
     Engine.load(str(folder))
 
 
+def test_steps_that_are_of_another_clip_are_refused(built: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "altered"
+    shutil.copytree(built, folder)
+    file = store.load(folder).place / "gauge.starts.npy"
+    whole = np.load(file)
+    for column, step in (
+        (0, 1),
+        (1, -int(whole[1, 1])),
+    ):  # one step less of the second clip; no still moment of the first
+        array = whole.copy()
+        array[1, column] += step
+        np.save(file, array)
+        with pytest.raises(FormatError, match=r"gauge.starts has not the steps and still moments .*; build the corpus"):
+            Engine.load(str(folder))
+
+
 def test_arrays_are_checked_once_and_again_when_a_file_is_another(built: Path, tmp_path: Path) -> None:
     folder = tmp_path / "altered"
     shutil.copytree(built, folder, ignore=shutil.ignore_patterns(versions.CHECKED))
