@@ -219,7 +219,7 @@ def test_what_goes_wrong_in_a_recorder_is_said(show: Callable[..., Opened]) -> N
 
 
 def test_a_film_can_be_stopped(show: Callable[..., Opened]) -> None:
-    tab = show(briefly(seconds=5.0))
+    tab = show(briefly(seconds=5.0), is_drawn=True)
     tab.get("motionmind.player.seek(0.4)")
     tab.click("film")
     tab.wait("motionmind.player.time !== 0.4 && document.querySelector('#filming progress').value > 0.01")
