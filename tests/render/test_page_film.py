@@ -111,7 +111,7 @@ def test_a_film_has_the_shape_of_the_picture_whatever_becomes_of_the_page(
     motion = replace(briefly(), insertions=())
     count = len(motion)
     still = replace(motion, rotations=motion.rotations[[0] * count], root=motion.root[[0] * count])
-    tab = show(still, **SCREENS["upright"])
+    tab = show(still, **SCREENS["upright"], is_drawn=True)
     box = tab.page.locator("#canvas").bounding_box()
     with tab.page.expect_download(timeout=120_000) as download:
         tab.page.tap("#film")
