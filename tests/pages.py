@@ -20,11 +20,9 @@ FINE = {"device_scale_factor": 1, "is_drawn": True}  # for pictures that are mea
 # Few pixels and, until somebody asks for it, nothing that plays.
 RESTING: dict[str, Any] = {"device_scale_factor": 0.5, "reduced_motion": "reduce"}
 PLAIN = {"color_scheme": "light", "reduced_motion": "no-preference"}  # what a browser is told of its user's wishes
-# WebGL does all but draw, shaders are still translated and linked; and pages are asked for a picture 25 times a second.
-# Drawing in software is most of the time of a page whose picture nobody looks at.
+# WebGL does all but draw: shaders are still translated and linked. Drawing in software is most of the time of a page
+# whose picture nobody looks at.
 _UNDRAWN = """
-window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 40);
-window.cancelAnimationFrame = clearTimeout;
 for (const what of ['Arrays', 'Elements', 'ArraysInstanced', 'ElementsInstanced', 'RangeElements'])
   WebGL2RenderingContext.prototype[`draw${what}`] = () => {};
 """
