@@ -18,6 +18,7 @@ os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM
 import pytest
 from command_line import Ran, Run
 from hypothesis import HealthCheck, settings
+from pages import Tabs
 
 import motionmind
 from motionmind.cli import main
@@ -133,6 +134,12 @@ def browser() -> Iterator[Any]:
         browser = playwright.chromium.launch(executable_path=chromium, args=_FLAGS)
         yield browser
         browser.close()
+
+
+@pytest.fixture(scope="module")
+def tabs(browser: Any) -> Tabs:
+    """Tabs of Chromium, in which WebGL draws only where that is asked for."""
+    return Tabs(browser)
 
 
 _BAD = ["nan", "1e999", "1e300", "-", "{", "}", "[", "9" * 30, "End", "\0", "é", ":", ";", ",", "#", '"', "_", "0"]

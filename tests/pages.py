@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from io import BytesIO
 from typing import Any
@@ -12,7 +16,16 @@ from PIL import Image
 from motionmind._typing import Bools, Int16s
 
 SIZE = {"width": 640, "height": 480}  # of a page, where its size is all the same
-FINE = {"device_scale_factor": 1}  # for pictures that are measured
+FINE = {"device_scale_factor": 1, "is_drawn": True}  # for pictures that are measured
+# Few pixels and, until somebody asks for it, nothing that plays.
+RESTING: dict[str, Any] = {"device_scale_factor": 0.5, "reduced_motion": "reduce"}
+PLAIN = {"color_scheme": "light", "reduced_motion": "no-preference"}  # what a browser is told of its user's wishes
+# WebGL does all but draw: shaders are still translated and linked. Drawing in software is most of the time of a page
+# whose picture nobody looks at.
+_UNDRAWN = """
+for (const what of ['Arrays', 'Elements', 'ArraysInstanced', 'ElementsInstanced', 'RangeElements'])
+  WebGL2RenderingContext.prototype[`draw${what}`] = () => {};
+"""
 
 # The sizes of a notebook computer, of a telephone, upright and lying, and of the smallest; these are used by fingers.
 SCREENS: dict[str, dict[str, Any]] = {
@@ -63,6 +76,53 @@ _TARGETS = """
       one === met || one.contains(met), Math.min(width, height)];
   })
 """
+
+
+class Tabs:
+    """Tabs of a browser, which tests use one after the other: to begin one takes half the time of showing a page."""
+
+    def __init__(self, browser: Any) -> None:
+        self._browser = browser
+        self._free: dict[str, list[Any]] = defaultdict(list)
+
+    @contextmanager
+    def tab(
+        self, hearing: Mapping[str, Callable[[Any], object]], is_drawn: bool = False, script: str = "", **options: Any
+    ) -> Iterator[Any]:
+        """Yield a tab as of a context of its own, of Playwright's `options`, which holds nothing of who had it before.
+
+        Args:
+            hearing: what hears each event of the tab.
+            is_drawn: whether WebGL draws.
+            script: what runs before those of each page; a tab with one serves nobody else.
+            options: of the context; a viewport is among them.
+        """
+        wishes = {name: options.get(name, usual) for name, usual in PLAIN.items()}
+        is_mobile = "is_mobile" in options  # a page on a telephone keeps the scale at which it was laid out
+        lasting = {name: value for name, value in options.items() if is_mobile or name not in (*PLAIN, "viewport")}
+        free = [] if script else self._free[json.dumps([is_drawn, lasting], sort_keys=True)]
+        tab = free.pop() if free else self._begin("" if is_drawn else _UNDRAWN, script, options)
+        tab.set_viewport_size(options["viewport"])
+        tab.emulate_media(**wishes)
+        for event, hear in hearing.items():
+            tab.on(event, hear)
+        yield tab
+        tab.unroute_all(behavior="wait")  # an answer still held back would fail in whatever test comes next
+        if script or not tab.url.startswith("file:"):  # a server's page keeps its process from those of others
+            tab.context.close()
+            return
+        for event, hear in hearing.items():
+            tab.remove_listener(event, hear)
+        tab.goto("about:blank")
+        tab.mouse.move(0, 0)
+        free.append(tab)
+
+    def _begin(self, *scripts_and_options: Any) -> Any:
+        *scripts, options = scripts_and_options
+        context = self._browser.new_context(**options)
+        for script in filter(None, scripts):
+            context.add_init_script(script)
+        return context.new_page()
 
 
 @dataclass

@@ -26,8 +26,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motionmind._typing import Floats, Int32s, Ints
+from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.errors import InfeasibleError
+from motionmind.jit import jit
 from motionmind.search.bounding import PROVEN
 from motionmind.search.costs import path_cost
 from motionmind.search.polish import minimise_chain, minimise_moment
@@ -237,36 +238,48 @@ def _improve(trellis: Trellis, chosen: Ints, agreeing: Floats, allowed: Floats, 
     def excess(path: Ints) -> float:
         return float(np.maximum(agreeing[:, path].sum(axis=1) - allowed, 0.0).sum())
 
-    everywhere = np.ones(len(trellis.dom), dtype=np.bool_)
+    trial, everywhere, parts = chosen.copy(), np.ones(len(trellis.dom), dtype=np.bool_), trellis.chains + trellis.moves
 
-    def minimise(dearer: Trellis, path: Ints, which: int) -> None:
-        if which < trellis.chains:
-            minimise_chain(dearer, path, which, everywhere)
-        else:
-            minimise_moment(dearer, path, which - trellis.chains + 1, everywhere)
-
-    def replacements(factors: Sequence[float]) -> Iterator[Ints]:
-        for factor in factors:
+    def replacements(factors: Sequence[float]) -> Iterator[int]:
+        """Let `trial` be one replacement after another, and yield its number: at each price, chains, then moments."""
+        for row, factor in enumerate(factors):
             dearer = trellis._replace(unary=trellis.unary + factor * prices @ agreeing)
-            for which in range(trellis.chains + trellis.moves):  # each chain, then each moment
-                trial = chosen.copy()
-                minimise(dearer, trial, which)
-                if not np.array_equal(trial, chosen):
-                    yield trial
+            part = _replace_next(dearer, chosen, 0, everywhere, trial)
+            while part < parts:
+                yield row * parts + part
+                part = _replace_next(dearer, chosen, part + 1, everywhere, trial)
 
     too_much = excess(chosen)
-    for trial in replacements(DEARER):
+    for _ in replacements(DEARER):
         if too_much == 0.0:
             break
         if (less := excess(trial)) < too_much:
             chosen[:], too_much = trial, less
-    cost, before = path_cost(trellis, chosen), np.inf
+    cost, before, last = path_cost(trellis, chosen), np.inf, len(CHANGED) * parts
     while cost < before - 1e-9:
         before = cost
-        for trial in replacements(CHANGED):
-            if (least := path_cost(trellis, trial)) < cost and excess(trial) <= too_much:
-                chosen[:], cost = trial, least
+        for number in replacements(CHANGED):
+            if number > last and cost == before:  # all from here on were tried since the path last changed
+                break
+            if excess(trial) <= too_much and (least := path_cost(trellis, trial)) < cost:
+                chosen[:], cost, last = trial, least, number
     return cost
+
+
+@jit
+def _replace_next(trellis: Trellis, path: Ints, first: int, everywhere: Bools, trial: Ints) -> int:
+    """Replace a chain, or else a moment, of a path [n] by what is cheapest, the first of those from `first` on that is
+    another then; write the path with it into `trial`, and return its number, or how many there are if all stay."""
+    for part in range(first, trellis.chains + trellis.moves):
+        trial[:] = path
+        if part < trellis.chains:
+            minimise_chain(trellis, trial, part, everywhere)
+        else:
+            minimise_moment(trellis, trial, part - trellis.chains + 1, everywhere)
+        for i in range(len(path)):
+            if trial[i] != path[i]:
+                return part
+    return trellis.chains + trellis.moves
 
 
 def _greatest(cuts: Sequence[_Cut]) -> tuple[Floats, float]:

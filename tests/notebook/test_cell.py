@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bundled_clips import ballet_clip
+from pages import Tabs
 
 from motionmind import Engine, Motion, Piece, vary
 from motionmind.notebook.cell import MOST_PLACES, html_of
@@ -39,15 +40,13 @@ def motion_of(thing: Any) -> Motion:
 
 
 @pytest.fixture
-def opened(request: pytest.FixtureRequest, browser: Any, tmp_path: Path) -> Iterator[Callable[..., Any]]:
+def opened(tabs: Tabs, tmp_path: Path) -> Iterator[Callable[..., Any]]:
     """Open cells in one page, as a notebook shows them, and wait until each is there; what was asked for is `asked`.
 
     They play by themselves only where that is asked for, and are drawn with few pixels: drawing in software is most of
     a test's time.
     """
-    tab = browser.new_page(viewport={"width": 800, "height": 600}, device_scale_factor=0.5)
     asked: list[str] = []
-    tab.on("request", lambda request: asked.append(request.url))
 
     def call(*cells: str, plays: bool = False) -> Any:
         tab.emulate_media(reduced_motion="no-preference" if plays else "reduce")
@@ -64,8 +63,9 @@ def opened(request: pytest.FixtureRequest, browser: Any, tmp_path: Path) -> Iter
         tab.asked = asked
         return tab
 
-    yield call
-    tab.close()
+    hearing = {"request": lambda request: asked.append(request.url)}
+    with tabs.tab(hearing, viewport={"width": 800, "height": 600}, device_scale_factor=0.5) as tab:
+        yield call
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bundled_clips import ballet_clip
+from pages import RESTING, Tabs
 
 from motionmind import Motion, MotionMindError, Posture, WrongTypeError, vary
 from motionmind.notebook.cell import MOST_PLACES
@@ -195,21 +196,19 @@ class Host:
 
 
 @pytest.fixture
-def host(browser: Any, tmp_path: Path) -> Iterator[Host]:
+def host(tabs: Tabs, tmp_path: Path) -> Iterator[Host]:
     player = Player(ADAGIO, height=400)
     state = {key: player.get_state(key)[key] for key in ("time", "selection", "height", "_page")}
     text = [json.dumps(part).replace("<", "\\u003c") for part in (state, player.get_state("_esm")["_esm"])]
     (tmp_path / "host.html").write_text(HOST.replace("ESM", text[1]).replace("STATE", text[0]), "utf-8")
-    # Few pixels, and nothing plays by itself: drawing two views in software is most of a test's time.
-    tab = browser.new_page(viewport={"width": 800, "height": 900}, device_scale_factor=0.5, reduced_motion="reduce")
     asked: list[str] = []
-    tab.on("request", lambda request: asked.append(request.url))
-    tab.goto((tmp_path / "host.html").as_uri())
-    host = Host(tab)
-    host.wait_until_ready()
-    yield host
+    hearing = {"request": lambda request: asked.append(request.url)}
+    with tabs.tab(hearing, viewport={"width": 800, "height": 900}, **RESTING) as tab:
+        tab.goto((tmp_path / "host.html").as_uri())
+        host = Host(tab)
+        host.wait_until_ready()
+        yield host
     assert [url for url in asked if not url.startswith(("data:", "file:", "blob:", "about:"))] == []
-    tab.close()
 
 
 def test_the_page_tells_the_model_of_the_time_and_the_other_view_follows(host: Host) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import replace
 from io import BytesIO
 from itertools import combinations
@@ -16,7 +17,7 @@ import pytest
 from bundled_clips import ballet_clip
 from command_line import Run
 from numpy.typing import ArrayLike
-from pages import FINE, SCREENS, reachable_controls, readable_words
+from pages import FINE, SCREENS, Tabs, reachable_controls, readable_words
 from PIL import Image
 from scipy.spatial import cKDTree
 
@@ -364,20 +365,19 @@ def said() -> list[str]:
 
 
 @pytest.fixture
-def show(browser: Any, tmp_path: Path, danced: Variation, said: list[str]) -> Iterator[Callable[..., Any]]:
+def show(tabs: Tabs, tmp_path: Path, danced: Variation, said: list[str]) -> Iterator[Callable[..., Any]]:
     """A function that opens the page of `danced`; afterwards, that it neither complained nor asked for anything."""
     asked: list[str] = []
-    contexts: list[Any] = []
+    hearing = {
+        "console": lambda message: said.append(message.text),
+        "pageerror": lambda error: said.append(str(error)),
+        "request": lambda request: asked.append(request.url),
+    }
     write_attractor(tmp_path / "page.html", danced)
 
     def show(ready: str = "window.motionmind?.attractor", script: str = "", **options: Any) -> Any:
         usual = {"viewport": {"width": 900, "height": 500}, "reduced_motion": "reduce", "device_scale_factor": 0.5}
-        contexts.append(browser.new_context(**(usual | options)))
-        tab = contexts[-1].new_page()
-        tab.on("console", lambda message: said.append(message.text))
-        tab.on("pageerror", lambda error: said.append(str(error)))
-        tab.on("request", lambda request: asked.append(request.url))
-        tab.add_init_script(script)
+        tab = using.enter_context(tabs.tab(hearing, script=script, **(usual | options)))
         tab.goto((tmp_path / "page.html").as_uri())
         for _ in range(500):
             if tab.evaluate(f"!!({ready})"):
@@ -385,9 +385,8 @@ def show(browser: Any, tmp_path: Path, danced: Variation, said: list[str]) -> It
             tab.wait_for_timeout(20)
         return tab
 
-    yield show
-    for context in contexts:
-        context.close()
+    with ExitStack() as using:
+        yield show
     assert [line for line in said if not re.search("GPU stall|WebGL context could not", line)] == []
     assert [url for url in asked if not url.startswith(("data:", "file:"))] == []
 

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
-from pages import SIZE, Opened
+from pages import SIZE, Opened, Tabs
 
 from motionmind.body.motion import Motion
 from motionmind.render.page import write_page
 
 
 @pytest.fixture
-def show(browser: Any, tmp_path: Path) -> Iterator[Callable[..., Opened]]:
+def show(tabs: Tabs, tmp_path: Path) -> Iterator[Callable[..., Opened]]:
     """A function that opens a motion's page; afterwards, that it neither complained nor asked for anything."""
     opened: list[Opened] = []
 
@@ -24,20 +25,22 @@ def show(browser: Any, tmp_path: Path) -> Iterator[Callable[..., Opened]]:
         write_page(path, motion)
         # Few pixels: drawing in software is most of a test's time. Tests that measure pictures ask for all of them.
         usual = {"viewport": SIZE, "reduced_motion": "reduce", "device_scale_factor": 0.5}
-        context = browser.new_context(**(usual | options))
-        tab = Opened(context.new_page())
-        tab.page.on("console", lambda message: tab.said.append(message.text))
-        tab.page.on("pageerror", lambda error: tab.said.append(str(error)))
-        tab.page.on("request", lambda request: tab.asked.append(request.url))
-        tab.page.add_init_script(script)
+        said: list[str] = []
+        asked: list[str] = []
+        hearing = {
+            "console": lambda message: said.append(message.text),
+            "pageerror": lambda error: said.append(str(error)),
+            "request": lambda request: asked.append(request.url),
+        }
+        tab = Opened(using.enter_context(tabs.tab(hearing, script=script, **(usual | options))), said, asked)
+        opened.append(tab)
         tab.page.goto(path.as_uri())
         tab.wait(ready)
-        opened.append(tab)
         return tab
 
-    yield show
+    with ExitStack() as using:
+        yield show
     for tab in opened:
-        tab.page.context.close()
         assert [line for line in tab.said if not re.search("GPU stall|WebGL context could not", line)] == []
         assert [url for url in tab.asked if not url.startswith(("data:", "file:"))] == []
         assert len([url for url in tab.asked if url.startswith("file:")]) == 1

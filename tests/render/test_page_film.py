@@ -111,7 +111,7 @@ def test_a_film_has_the_shape_of_the_picture_whatever_becomes_of_the_page(
     motion = replace(briefly(), insertions=())
     count = len(motion)
     still = replace(motion, rotations=motion.rotations[[0] * count], root=motion.root[[0] * count])
-    tab = show(still, **SCREENS["upright"])
+    tab = show(still, **SCREENS["upright"], is_drawn=True)
     box = tab.page.locator("#canvas").bounding_box()
     with tab.page.expect_download(timeout=120_000) as download:
         tab.page.tap("#film")
@@ -219,7 +219,7 @@ def test_what_goes_wrong_in_a_recorder_is_said(show: Callable[..., Opened]) -> N
 
 
 def test_a_film_can_be_stopped(show: Callable[..., Opened]) -> None:
-    tab = show(briefly(seconds=5.0))
+    tab = show(briefly(seconds=5.0), is_drawn=True)
     tab.get("motionmind.player.seek(0.4)")
     tab.click("film")
     tab.wait("motionmind.player.time !== 0.4 && document.querySelector('#filming progress').value > 0.01")

@@ -12,12 +12,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from toys import Toy, random_toy, solution
 
-from motionmind._typing import Bools, Floats, Int32s
+from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.errors import InfeasibleError
-from motionmind.search.apart import TooAlikeError, difference, solve_apart
+from motionmind.search.apart import CHANGED, TooAlikeError, _improve, difference, solve_apart
 from motionmind.search.bounding import PROVEN
+from motionmind.search.costs import path_cost
+from motionmind.search.polish import minimise_chain, minimise_moment
 from motionmind.search.problem import Problem, Via
 from motionmind.search.solve import Certificate, Progress, solve
+from motionmind.search.trellis import locate, segment_trellises
 
 ROUNDING = 1e-9
 
@@ -154,6 +157,37 @@ def test_a_greater_share_has_no_lower_optimum(seed: int) -> None:
     known = [one for one in by_share if isinstance(one, Certificate)]
     assert all(less.lower_bound <= more.cost + ROUNDING for less, more in pairwise(known))
     assert all(not isinstance(one, Certificate) for one in by_share[len(known) :])
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds)
+def test_no_chain_or_moment_alone_would_make_an_improved_path_cheaper(seed: int) -> None:
+    toy, rng = small_toy(seed), np.random.default_rng(seed)
+    guide = random_guide(toy, seed)
+    every = listed(toy, 4 if len(toy.joint_states()) < 10 else 3, np.ones(sum(toy.sizes), dtype=bool), [], guide)
+    if not every:
+        return
+    moves = len(every[0]) - 1
+    (trellis,) = segment_trellises(toy.problem(toy.rules(moves, moves), [], guide), [0, moves])
+    path = locate(trellis, every[int(rng.integers(len(every)))])
+    agreeing = rng.integers(0, 2, (2, len(trellis.dom))).astype(np.float64)
+    allowed, prices = agreeing[:, path].sum(axis=1) - rng.integers(0, 2, 2), rng.uniform(0.1, 2.0, 2)
+
+    def excess(path: Ints) -> float:
+        return float(np.maximum(agreeing[:, path].sum(axis=1) - allowed, 0.0).sum())
+
+    before = excess(path)
+    cost = _improve(trellis, path, agreeing, allowed, prices)
+    assert cost == path_cost(trellis, path)
+    assert excess(path) <= before
+    for factor, part in product(CHANGED, range(trellis.chains + trellis.moves)):
+        dearer = trellis._replace(unary=trellis.unary + factor * prices @ agreeing)
+        trial, kept = path.copy(), np.ones(len(trellis.dom), dtype=np.bool_)
+        if part < trellis.chains:
+            minimise_chain(dearer, trial, part, kept)
+        else:
+            minimise_moment(dearer, trial, part - trellis.chains + 1, kept)
+        assert path_cost(trellis, trial) > cost - ROUNDING or excess(trial) > excess(path)
 
 
 def test_a_path_without_a_way_cannot_differ() -> None:

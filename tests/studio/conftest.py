@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from pages import RESTING
 
 _IS_HERE = find_spec("starlette") is not None and find_spec("uvicorn") is not None
 collect_ignore_glob = [] if _IS_HERE else ["test_studio_*.py"]  # the extra studio
 
 if TYPE_CHECKING:
+    from pages import Tabs
     from studio_server import Served
 
     from motionmind.body.motion import Motion
@@ -72,27 +74,26 @@ def studio_server(tmp_path: Path) -> Iterator[Served]:
 
 
 @pytest.fixture
-def studio_page(request: pytest.FixtureRequest, studio_server: Served, browser: Any) -> Iterator[Any]:
+def is_drawn() -> bool:
+    """Whether WebGL draws on `studio_page`: tests that look at what it draws ask for it by a parameter."""
+    return False
+
+
+@pytest.fixture
+def studio_page(request: pytest.FixtureRequest, studio_server: Served, tabs: Tabs, is_drawn: bool) -> Iterator[Any]:
     """A page of Playwright, LARGE or of the size that is its parameter, that is let into `studio_server`; an error on
     its console fails the test."""
     from studio_server import LARGE
 
     width, height = getattr(request, "param", LARGE)
-    # Few pixels and, until somebody asks for it, nothing that plays: drawing in software is most of a test's time.
-    context = browser.new_context(
-        viewport={"width": width, "height": height}, device_scale_factor=0.5, reduced_motion="reduce"
-    )
-    page = context.new_page()
     errors: list[str] = []
 
     def hear(message: Any) -> None:
         if message.type == "error":
             errors.append(f"{message.text} {message.location.get('url', '')}")
 
-    page.on("console", hear)
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(studio_server.entry)
-    yield page
-    page.unroute_all(behavior="wait")  # an answer still held back would fail in whatever test comes next
-    context.close()
+    hearing = {"console": hear, "pageerror": lambda error: errors.append(str(error))}
+    with tabs.tab(hearing, is_drawn, viewport={"width": width, "height": height}, **RESTING) as page:
+        page.goto(studio_server.entry)
+        yield page
     assert not errors

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
+from pages import RESTING, Tabs
 from piece_page import until
 from scores import BENDS
 from studio_server import Served, serving
@@ -29,7 +31,7 @@ def served(tmp_path: Path) -> Iterator[Served]:
 
 
 @pytest.fixture
-def open_page(served: Served, browser: Any) -> Iterator[Open]:
+def open_page(served: Served, tabs: Tabs) -> Iterator[Open]:
     """Open the page at a size; whatever its console calls an error fails the test."""
     errors: list[str] = []
 
@@ -38,26 +40,18 @@ def open_page(served: Served, browser: Any) -> Iterator[Open]:
         if message.type == "error" and "/api/thumbnails/mine" not in message.location.get("url", ""):
             errors.append(f"{message.text} {message.location.get('url', '')}")
 
-    contexts = []
+    hearing = {"console": note, "pageerror": lambda error: errors.append(str(error))}
 
     def visit(width: int = 1440, height: int = 900, scheme: str = "light") -> Any:
         size = {"width": width, "height": height}
-        # As for `studio_page`, nothing plays: drawing in software is most of a test's time.
-        context = browser.new_context(
-            viewport=size, device_scale_factor=0.5, color_scheme=scheme, reduced_motion="reduce"
-        )
-        contexts.append(context)
-        page = context.new_page()
+        page = using.enter_context(tabs.tab(hearing, viewport=size, color_scheme=scheme, **RESTING))
         page.set_default_timeout(LONG)
-        page.on("console", note)
-        page.on("pageerror", lambda error: errors.append(str(error)))
         page.goto(served.entry)
         until(page, "window.studio?.store.state")
         return page
 
-    yield visit
-    for context in contexts:
-        context.close()
+    with ExitStack() as using:
+        yield visit
     assert not errors
 
 

@@ -104,6 +104,7 @@ def test_how_far_a_film_is_leads_to_where_it_is_stopped(studio_server: Any, stud
     assert studio_page.get_by_test_id("toast").count() == 0
 
 
+@pytest.mark.parametrize("is_drawn", [True])
 def test_four_alternatives_play_in_step_and_say_what_they_are(studio_page: Any) -> None:
     studio_page.emulate_media(reduced_motion="no-preference")
     # What is sought is seen to be: both ends, and nothing to play yet.

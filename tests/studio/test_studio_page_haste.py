@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pytest
 from piece_page import from_a_to_b, piece, until, wait_for, wait_for_alternatives
 from scores import BENDS
 
@@ -131,6 +132,7 @@ def test_every_press_is_a_step(studio_server: Served, studio_page: Any) -> None:
     assert page.get_by_test_id("toast").count() == 0
 
 
+@pytest.mark.parametrize("is_drawn", [True])
 def test_a_field_shows_what_is_wished(studio_server: Served, studio_page: Any) -> None:
     page = studio_page
     page.evaluate("studio.api.delete('/api/seams')")  # nothing is sought

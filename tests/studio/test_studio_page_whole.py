@@ -9,13 +9,18 @@ import json
 import re
 import shutil
 import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import pytest
+from pages import RESTING, Tabs
 
 if TYPE_CHECKING:
     from studio_server import Served
+
+Enter = Callable[[Literal["light", "dark"], int], Any]
 
 PANELS = ("between", "vary", "pose", "movement", "take")
 # The engine's words, not a choreographer's.
@@ -70,16 +75,26 @@ def _piece(server: Served) -> None:
     )
 
 
-def _enter(server: Served, browser: Any, scheme: Literal["light", "dark"], width: int) -> tuple[Any, list[str]]:
-    size = {"width": width, "height": 900}
-    context = browser.new_context(viewport=size, device_scale_factor=0.5, color_scheme=scheme, reduced_motion="reduce")
-    page, errors = context.new_page(), []
-    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(server.entry)
-    page.get_by_test_id("open-between").wait_for()
-    page.wait_for_function("() => window.studio?.store.state")
-    return page, errors
+@pytest.fixture
+def enter(studio_server: Served, tabs: Tabs) -> Iterator[Enter]:
+    """Open the page in a colour scheme and a width; whatever its console calls an error fails the test."""
+    errors: list[str] = []
+    hearing = {
+        "console": lambda message: errors.append(message.text) if message.type == "error" else None,
+        "pageerror": lambda error: errors.append(str(error)),
+    }
+
+    def enter(scheme: Literal["light", "dark"], width: int) -> Any:
+        size = {"width": width, "height": 900}
+        page = using.enter_context(tabs.tab(hearing, viewport=size, color_scheme=scheme, **RESTING))
+        page.goto(studio_server.entry)
+        page.get_by_test_id("open-between").wait_for()
+        page.wait_for_function("() => window.studio?.store.state")
+        return page
+
+    with ExitStack() as using:
+        yield enter
+    assert errors == []
 
 
 def _panels(page: Any) -> Any:
@@ -90,9 +105,9 @@ def _panels(page: Any) -> Any:
         yield name
 
 
-def test_no_panel_shuts_anybody_out(studio_server: Served, browser: Any, scheme: Any, axe: str) -> None:
+def test_no_panel_shuts_anybody_out(studio_server: Served, enter: Enter, scheme: Any, axe: str) -> None:
     _piece(studio_server)
-    page, errors = _enter(studio_server, browser, scheme, 1440)
+    page = enter(scheme, 1440)
     page.evaluate(f"{axe};0")
     faults = {}
     for name in _panels(page):
@@ -112,14 +127,12 @@ def test_no_panel_shuts_anybody_out(studio_server: Served, browser: Any, scheme:
     page.get_by_test_id("restore").wait_for()
     if found := page.evaluate(_FAULTS):
         faults["own postures"] = found
-    page.context.close()
     assert faults == {}, json.dumps(faults, indent=1)
-    assert errors == []
 
 
-def test_the_page_speaks_a_choreographers_words(studio_server: Served, browser: Any) -> None:
+def test_the_page_speaks_a_choreographers_words(studio_server: Served, enter: Enter) -> None:
     _piece(studio_server)
-    page, errors = _enter(studio_server, browser, "light", 1024)
+    page = enter("light", 1024)
     found = {}
     for name in _panels(page):
         words = page.evaluate(_WORDS)
@@ -128,16 +141,14 @@ def test_the_page_speaks_a_choreographers_words(studio_server: Served, browser: 
         assert page.locator(".panel").evaluate("(panel) => panel.scrollTop") == 0
         page.locator(".panel").evaluate("(panel) => panel.scrollTo(0, 9999)")
         found[name] = sorted({match[0] for match in FORBIDDEN.finditer(words)})
-    page.context.close()
     assert {name: words for name, words in found.items() if words} == {}
-    assert errors == []
 
 
-def test_nothing_covers_what_it_stands_beside(studio_server: Served, browser: Any) -> None:
+def test_nothing_covers_what_it_stands_beside(studio_server: Served, enter: Enter) -> None:
     studio_server.send("DELETE", "/api/seams")  # no insertion moves what stands there
     for number in range(9):
         studio_server.insert(f"b{number}", "ballet/adagio", 0, 40)
-    page, errors = _enter(studio_server, browser, "light", 1024)
+    page = enter("light", 1024)
     # Counts on the ruler, up to eights of three digits.
     page.get_by_test_id("tempo").fill("300")
     page.get_by_test_id("tempo").press("Tab")
@@ -163,25 +174,21 @@ def test_nothing_covers_what_it_stands_beside(studio_server: Served, browser: An
         for name in ("wish-joint", "wish-hold"):
             field = page.get_by_test_id(name)
             assert field.bounding_box()["width"] >= field.evaluate(_NEEDS) - 1
-    page.context.close()
-    assert errors == []
 
 
-def test_one_is_not_several(studio_server: Served, browser: Any) -> None:
+def test_one_is_not_several(studio_server: Served, enter: Enter) -> None:
     studio_server.insert("b0", "ballet/adagio", 0, 40)
-    page, errors = _enter(studio_server, browser, "light", 1024)
+    page = enter("light", 1024)
     page.get_by_text(re.compile(r"^1 stretch, \d")).wait_for()
     studio_server.insert("b1", "ballet/plies", 0, 20)
     page.get_by_test_id("insertion-1").and_(page.locator("[data-state=inserted]")).click()
     assert re.fullmatch(r"Insertion, [\d.]+ s +(?!\d).+", page.get_by_test_id("selected").inner_text())
-    page.context.close()
-    assert errors == []
 
 
-def test_what_is_shown_is_named_where_there_is_little_room(studio_server: Served, browser: Any) -> None:
+def test_what_is_shown_is_named_where_there_is_little_room(studio_server: Served, enter: Enter) -> None:
     studio_server.send("DELETE", "/api/seams")
     studio_server.insert("b0", "ballet/adagio", 0, 40)
-    page, errors = _enter(studio_server, browser, "light", 820)
+    page = enter("light", 820)
     page.get_by_test_id("open-vary").click()
     page.get_by_test_id("tile-2").wait_for()
     page.get_by_test_id("beside").click()
@@ -205,5 +212,3 @@ def test_what_is_shown_is_named_where_there_is_little_room(studio_server: Served
     for one, other in ((boxes[0], boxes[1]), (boxes[0], boxes[2]), (boxes[1], boxes[2])):
         beside = one["x"] + one["width"] <= other["x"] or other["x"] + other["width"] <= one["x"]
         assert beside or one["y"] + one["height"] <= other["y"] or other["y"] + other["height"] <= one["y"]
-    page.context.close()
-    assert errors == []

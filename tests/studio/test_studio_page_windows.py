@@ -9,6 +9,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from pages import RESTING, Tabs
 from piece_page import until
 from studio_server import LARGE, SMALL, Client, Served
 
@@ -41,18 +42,15 @@ def test_the_address_forgets_the_token_and_a_reload_keeps_the_window(
     assert studio_page.evaluate("studio.window") == window
 
 
-def test_no_request_leaves_this_machine(studio_server: Served, browser: Any, expect: Any) -> None:
-    context = browser.new_context(
-        viewport={"width": 1024, "height": 768}, device_scale_factor=0.5, reduced_motion="reduce"
-    )
-    page, asked = context.new_page(), set[str]()
-    page.on("request", lambda request: asked.add(urlsplit(request.url).netloc))
-    page.goto(studio_server.entry)
-    expect(page.get_by_test_id("posture-arabesque")).to_be_visible()
-    for name in ("vary", "pose", "movement", "take"):
-        page.get_by_test_id(f"open-{name}").click()
-        expect(page.get_by_test_id(f"panel-{name}")).to_be_visible()
-    context.close()
+def test_no_request_leaves_this_machine(studio_server: Served, tabs: Tabs, expect: Any) -> None:
+    asked: set[str] = set()
+    hearing = {"request": lambda request: asked.add(urlsplit(request.url).netloc)}
+    with tabs.tab(hearing, viewport={"width": 1024, "height": 768}, **RESTING) as page:
+        page.goto(studio_server.entry)
+        expect(page.get_by_test_id("posture-arabesque")).to_be_visible()
+        for name in ("vary", "pose", "movement", "take"):
+            page.get_by_test_id(f"open-{name}").click()
+            expect(page.get_by_test_id(f"panel-{name}")).to_be_visible()
     assert asked - {""} == {urlsplit(studio_server.url).netloc}  # "" of data: and blob:
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Literal
 
 import pytest
+from pages import RESTING, Tabs
 
 if TYPE_CHECKING:
     from studio_server import Served
@@ -26,18 +27,17 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
 
 @pytest.fixture
-def page(served: Served, browser: Any) -> Iterator[Any]:
+def page(served: Served, tabs: Tabs) -> Iterator[Any]:
     """A page, 1440x900, that fingers can touch; an error on its console fails the test."""
     served.edit(edit="arrange", blocks=[], about={"words": "begin anew"})
-    context = browser.new_context(
-        viewport={"width": 1440, "height": 900}, device_scale_factor=0.5, reduced_motion="reduce", has_touch=True
-    )
-    page, errors = context.new_page(), []
-    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(served.entry)
-    yield page
-    context.close()
+    errors: list[str] = []
+    hearing = {
+        "console": lambda message: errors.append(message.text) if message.type == "error" else None,
+        "pageerror": lambda error: errors.append(str(error)),
+    }
+    with tabs.tab(hearing, viewport={"width": 1440, "height": 900}, has_touch=True, **RESTING) as page:
+        page.goto(served.entry)
+        yield page
     assert errors == []
 
 
