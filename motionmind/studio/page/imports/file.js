@@ -1,7 +1,7 @@
 /** A file that somebody brought: what was understood, what it leaves open, and what can be done with it. */
 
 import { html } from "../vendor/htm-preact-standalone.js";
-import { written } from "../shell/fields.js";
+import { NumberField } from "../shell/fields.js";
 import { bodyOf, doubtsOf, lengthOf, sizeOf } from "./words.js";
 
 const UNITS = /** @type {[string, string][]} */ ([
@@ -71,13 +71,13 @@ function Questions({ file, choose }) {
     ${WITH_RATE.includes(kind) &&
     clip.fps !== null &&
     html`<label class="row"><span class="grow">Frames a second</span>
-      <input class="field numbers" data-testid="fps" type="number" min="1" max="1000" step="any" inputmode="decimal"
+      <${NumberField} data-testid="fps" min="1" max="1000" step="any" inputmode="decimal"
         value=${fps}
-        onChange=${written((given) => {
+        use=${(given) => {
           if (given < 1 || given > 1000) return fps;
           choose({ fps: given });
           return given;
-        })} /></label>`}
+        }} /></label>`}
     ${(posed || (skips?.[0] ?? 0) > 0) &&
     html`<label class="check"><input type="checkbox" data-testid="skip" checked=${(skips?.[0] ?? 0) > 0}
       onChange=${(/** @type {any} */ event) => choose({ skip: event.target.checked ? null : 0 })} />

@@ -1,12 +1,24 @@
 /** Fields for numbers. */
 
+import { html, useState } from "../vendor/htm-preact-standalone.js";
+
 /**
- * Hear what is written into a field for a number: `use` returns the number that is in use then, or null for none, and the
- * field shows that.
- * @param {(given: number) => number | string | null} use
+ * A field for a number. What is being written stays in it, however often its view is drawn anew meanwhile; then `use`
+ * returns the number that is in use, or null for none, and the field shows that.
+ * @param {{value: number | string, use: (given: number) => number | string | null, rest?: unknown}} props
  */
-export function written(use) {
-  return (/** @type {any} */ event) => {
-    event.target.value = String(use(Number(event.target.value)) ?? "");
-  };
+export function NumberField({ value, use, ...rest }) {
+  const [written, write] = useState(/** @type {string | null} */ (null));
+  return html`<input
+    class="field numbers"
+    type="number"
+    ...${rest}
+    value=${written ?? value}
+    onInput=${(/** @type {any} */ event) => write(event.target.value)}
+    onChange=${(/** @type {any} */ event) => {
+      event.target.value = String(use(Number(event.target.value)) ?? "");
+      write(null);
+    }}
+    onBlur=${() => write(null)}
+  />`;
 }

@@ -1,7 +1,7 @@
 /** The bar above the tracks: what can be done with what is selected, how smoothing goes, tempo and zoom. */
 
 import { html } from "../vendor/htm-preact-standalone.js";
-import { written } from "../shell/fields.js";
+import { NumberField } from "../shell/fields.js";
 import { selected } from "./items.js";
 import { clock } from "./scale.js";
 
@@ -34,20 +34,18 @@ export function Toolbar({ does, piece, selection, tempo, onTempo, stopped, onSto
     <${Smoothing} piece=${piece} stopped=${stopped} onStop=${onStop} />
     <label class="tempo" title="beats a minute: the ruler's counts">
       <span class="pale">♩=</span>
-      <input
-        class="field numbers"
-        type="number"
+      <${NumberField}
         min="20"
         max="300"
         step="1"
         value=${tempo}
         data-testid="tempo"
         aria-label="Tempo, beats a minute"
-        onChange=${written((given) => {
+        use=${(given) => {
           const beats = Math.min(Math.max(given || 120, 20), 300);
           onTempo(beats);
           return beats;
-        })}
+        }}
       />
     </label>
     <div class="zoom row">

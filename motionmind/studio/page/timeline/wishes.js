@@ -1,7 +1,7 @@
 /** What is wished of an insertion: its length, postures that it passes, hands and feet that stay. */
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
-import { written } from "../shell/fields.js";
+import { NumberField } from "../shell/fields.js";
 import { plain } from "./blocks.js";
 import { lasting, LONGEST, SHORTEST } from "./items.js";
 
@@ -55,9 +55,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
     ${locked && html`<p class="said warning">It is locked: unlock it to ask for something else.</p>`}
     <label class="row">
       <span class="grow">Seconds</span>
-      <input
-        class="field numbers"
-        type="number"
+      <${NumberField}
         min=${SHORTEST}
         max=${LONGEST}
         step="0.1"
@@ -65,11 +63,11 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
         data-testid="wish-seconds"
         disabled=${locked}
         value=${ask.seconds ?? ""}
-        onChange=${written((given) => {
+        use=${(given) => {
           const seconds = given > 0 ? lasting(seam, given).seconds : null;
           does.wish(seam, () => ({ seconds }));
           return seconds;
-        })}
+        }}
       />
     </label>
     <div class="stack">
@@ -145,9 +143,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
 function Stay({ seam, stay, locked, onStay }) {
   const field = (name, words, least, most) => html`<label class="row">
     ${words}
-    <input
-      class="field numbers"
-      type="number"
+    <${NumberField}
       min=${(least * seam.seconds).toFixed(1)}
       max=${(most * seam.seconds).toFixed(1)}
       step="0.1"
@@ -155,11 +151,11 @@ function Stay({ seam, stay, locked, onStay }) {
       data-testid=${`wish-${name}`}
       disabled=${locked}
       value=${(stay[name] * seam.seconds).toFixed(1)}
-      onChange=${written((given) => {
+      use=${(given) => {
         const share = Math.min(Math.max(given / seam.seconds, least), most);
         onStay({ ...stay, [name]: share });
         return (share * seam.seconds).toFixed(1);
-      })}
+      }}
     />
   </label>`;
   const gap = Math.min(LEAST / seam.seconds, 0.5);
