@@ -6,7 +6,6 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import pytest
 from piece_page import from_a_to_b, piece, until, wait_for, wait_for_alternatives
 from scores import BENDS
 
