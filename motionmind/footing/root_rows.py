@@ -33,7 +33,7 @@ STRAIGHT = 0.15  # radians: a knee that is straighter counts as bent so far, for
 PRIOR = 0.3  # metres off the trajectory that feet have the root on by themselves
 TRAVEL = 0.3, 0.03  # metres a second off that, where feet alone bear, and where other parts do
 PUSH = 2.0  # metres a second squared: accelerations of the centre of mass
-HURRY = 0.018  # metres a second by which a body travels faster than it may; chosen on cmu-05
+HURRY = 0.018  # metres a second by which a body travels faster than it may; chosen on cmu-05, 0.02, and with SLIDES
 JERKS = 0.2  # metres a second squared by which it is accelerated level more than it may; chosen on cmu-16
 NEARLY = 0.9  # of that speed, or acceleration: from here on it is held to it
 
