@@ -47,6 +47,12 @@ def test_thighs_and_shins() -> None:
     ]
 
 
+def hung(bones: list[str], above: str) -> str:
+    """The bones of a limb on both sides, each on the one before, the first on a joint of the trunk."""
+    named = [f"{bone}_{{S}}" for bone in bones]
+    return " ".join(f"{bone}<{parent}" for bone, parent in zip(named, [above, *named], strict=False))
+
+
 @pytest.mark.parametrize(
     ("leg", "joints"),
     [
@@ -63,9 +69,7 @@ def test_thighs_and_shins() -> None:
 )
 def test_what_a_word_of_a_leg_means_is_where_it_hangs(leg: str, joints: str) -> None:
     bones = leg.split()
-    above = ["Hips", *(f"{bone}_{{S}}" for bone in bones)]
-    rows = [f"{bone}_{{S}}<{parent}" for bone, parent in zip(bones, above, strict=False)]
-    found = mapped(f"{TRUNK} {ARM} {' '.join(rows)}")
+    found = mapped(f"{TRUNK} {ARM} {hung(bones, 'Hips')}")
     assert [found.get(f"{bone}_R", "-").removeprefix("right_") for bone in bones] == joints.split()
 
 
@@ -83,9 +87,7 @@ def test_what_a_word_of_a_leg_means_is_where_it_hangs(leg: str, joints: str) -> 
 )
 def test_what_a_word_of_an_arm_means_is_where_it_hangs(arm: str, joints: str) -> None:
     bones = arm.split()
-    above = ["Chest", *(f"{bone}_{{S}}" for bone in bones)]
-    rows = [f"{bone}_{{S}}<{parent}" for bone, parent in zip(bones, above, strict=False)]
-    found = mapped(f"{TRUNK} {LEG} {' '.join(rows)}")
+    found = mapped(f"{TRUNK} {LEG} {hung(bones, 'Chest')}")
     assert [found.get(f"{bone}_L", "-").removeprefix("left_") for bone in bones] == joints.split()
 
 
