@@ -144,8 +144,22 @@ def stands_alone(skeleton: Skeleton, rotations: Floats, root: Floats) -> Ints:
 def standing_rise(skeleton: Skeleton, rotations: Floats, root: Floats) -> float:
     """Return how far the limb that a movement stands on alone at both ends rises above it on the way, metres.
 
-    It is the height of the limb's lowest point above a line from where it is first to where it is last, the greatest
-    over the frames. NaN where the ends do not stand on one and the same limb, or where it makes a step.
+    The greatest of `standing_rises`; NaN where that is None.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [T, J, 4].
+        root: positions of the root [T, 3], metres.
+    """
+    rises = standing_rises(skeleton, rotations, root)
+    return float("nan") if rises is None else float(rises.max())
+
+
+def standing_rises(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats | None:
+    """Return how far the limb that a movement stands on alone at both ends is above where it should be [T], metres.
+
+    It is the height of the limb's lowest point above a line from where it is first to where it is last. None where the
+    ends do not stand on one and the same limb, or where it makes a step.
 
     Args:
         skeleton: the body.
@@ -154,14 +168,14 @@ def standing_rise(skeleton: Skeleton, rotations: Floats, root: Floats) -> float:
     """
     ends = stands_alone(skeleton, rotations[[0, -1]], root[[0, -1]])
     if ends[0] < 0 or ends[0] != ends[1]:
-        return float("nan")
+        return None
     places, joints = contact_points(skeleton, rotations, root)
     places = places[:, limb_of_points(skeleton)[joints] == ends[0]]
     moved = (places[-1] - places[0])[:, [0, 2]]
     if np.linalg.norm(moved, axis=1).min() > STEPS * size_of(skeleton):
-        return float("nan")
+        return None
     heights = places[..., 1].min(axis=1)
-    return float((heights - np.linspace(heights[0], heights[-1], len(heights))).max())
+    return np.asarray(heights - np.linspace(heights[0], heights[-1], len(heights)))
 
 
 @cache

@@ -117,6 +117,12 @@ def _of_ends(low: Mapping[int, float]) -> Floats:
     return np.array([first, last])
 
 
+def floors_at_ends(stance: Stance, low: Mapping[int, float], size: float) -> tuple[float, float]:
+    """Return the heights of the floor under the first and the last posture, metres; see `ends_in_air`."""
+    first, last = _of_ends(low) - ends_in_air(stance, low, size)[1]
+    return float(first), float(last)
+
+
 def set_on_floor(
     skeleton: Skeleton,
     rotations: Floats,

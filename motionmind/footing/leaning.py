@@ -3,7 +3,7 @@
 The root is carried in balance before limbs are kept apart and legs reach for their places, and both move the mass and
 the feet that it is to be over. What they leave is made up for here, where one limb bears alone and the body is hardly
 accelerated: the hips move level, as little and as smoothly as will do, and the legs keep the feet where they are. A
-body that moves may fall from foot to foot.
+body that is accelerated may fall from foot to foot.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from motionmind.body.limbs import limb_of_points
 from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, find_bearers, size_of
-from motionmind.footing.balance import GRAVITY, balance_rows, is_beyond, walks
-from motionmind.footing.feet import QUICK, bend_legs, find_free_feet, pose
+from motionmind.footing.balance import GRAVITY, balance_rows, is_beyond
+from motionmind.footing.feet import QUICK, Foot, bend_legs, find_free_feet, pose
 from motionmind.footing.least_squares import difference_rows, joined, position_rows, solve
 from motionmind.footing.legs import SOFT, find_legs
 from motionmind.geometry import rotations as rot
@@ -28,6 +28,7 @@ STILL = 0.5  # metres a second squared: level acceleration up to which they do; 
 LESS = 1.0, 0.7, 0.4  # shares of that shift: the first for which no leg has to hurry
 HURRIES = 1.1  # times as fast as before that a joint may then turn; chosen on ballet and karate
 ROUNDS = 4  # of finding the support's nearest points, and the shift
+TIMES = 3  # that weight is shifted: a body that moved where it leaned may lean where it now moves no more
 
 
 def shift_weight(
@@ -43,8 +44,8 @@ def shift_weight(
 ) -> tuple[Floats, Floats]:
     """Return rotations [N, J, 4] and positions of the root [N, 3], metres, that have the weight over what bears it.
 
-    Nothing changes where the weight is over it, where it is not known, where a leg must not change, and in a walk. Only
-    what one limb bears, and nothing accelerates, is to be over it.
+    Nothing changes where the weight is over it, where it is not known, and where a leg must not change. Only what one
+    limb bears, and nothing accelerates, is to be over it.
 
     Args:
         skeleton: the body.
@@ -57,9 +58,36 @@ def shift_weight(
         fps: frames a second.
         fastest: speeds of the joints [J], rad/s, for which the weight is shifted less; None for any speed.
     """
-    size, feet = size_of(skeleton), find_free_feet(skeleton, fixed)
-    if len(root) < 3 or not feet or len(feet) < len(find_legs(skeleton)[0]) or walks(root / size, fps):
+    feet = find_free_feet(skeleton, fixed)
+    if len(root) < 3 or not feet or len(feet) < len(find_legs(skeleton)[0]):
         return rotations, root
+    most = None
+    if fastest is not None:
+        most = np.maximum(QUICK * fastest, HURRIES * _fastest_turns(rotations, fps))
+    for _ in range(TIMES):
+        before = root
+        rotations, root = _shift_once(skeleton, rotations, root, feet, overhang, given, loose, fps, most)
+        if root is before:
+            break
+    return rotations, root
+
+
+def _shift_once(
+    skeleton: Skeleton,
+    rotations: Floats,
+    root: Floats,
+    feet: list[Foot],
+    overhang: float,
+    given: Bools,
+    loose: Bools,
+    fps: float,
+    most: Floats | None,
+) -> tuple[Floats, Floats]:
+    """Return what `shift_weight` does where the body leans now; the same arrays where nothing is to change.
+
+    Joints turn at most so fast [J], rad/s; None for any speed.
+    """
+    size = size_of(skeleton)
     centre = centre_of_mass(skeleton, rotations, root)
     if centre is None:
         return rotations, root
@@ -87,16 +115,13 @@ def shift_weight(
         shift = solve(rows + small, shift, given)
     shift[given] = 0.0
     legs, posed = [joint for foot in feet for joint in foot.leg], pose(skeleton, rotations)
-    most = None
-    if fastest is not None:
-        most = np.maximum(QUICK * fastest[legs], HURRIES * _fastest_turns(rotations[:, legs], fps))
     for share in LESS:
         off = -share * size * np.repeat(shift[:, None], len(feet), axis=1)
         bent = bend_legs(skeleton, posed, feet, off, np.full(off.shape[:2], SOFT))
         out = rotations.copy()
         limited = within_limits(skeleton, bent, rotations[given], loose, legs)
         out[:, legs] = np.where(given[:, None, None], rotations[:, legs], limited[:, legs])
-        if most is None or np.all(_fastest_turns(out[:, legs], fps) <= most):
+        if most is None or np.all(_fastest_turns(out[:, legs], fps) <= most[legs]):
             return out, root + share * size * shift
     return rotations, root
 

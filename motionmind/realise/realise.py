@@ -21,7 +21,7 @@ from motionmind.corpus.corpus import Corpus, subdivide_times
 from motionmind.footing.carrying import Allowed
 from motionmind.footing.corrections import Correction
 from motionmind.footing.feet import KNEE
-from motionmind.footing.ground import Given, Stance, ends_in_air, set_on_floor
+from motionmind.footing.ground import Given, Stance, ends_in_air, floors_at_ends, set_on_floor
 from motionmind.footing.legs import find_legs
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
@@ -191,6 +191,7 @@ def realise(
         wished=wished,
         carriage=carriage,
         overhang=stance.overhang,
+        floors=floors_at_ends(stance, low, size_of(a.skeleton)),
         fastest=None if quick is None else quick[: len(a.skeleton)],
         without=without,
     )

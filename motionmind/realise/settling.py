@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.contact import lowest_height
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
+from motionmind.body.support import size_of, standing_rises
+from motionmind.footing.carrying import TIPTOE
 from motionmind.footing.corrections import Correction
 from motionmind.footing.flight import fall_freely
 from motionmind.footing.ground import SINKS
@@ -24,6 +27,7 @@ from motionmind.learned.carriage import Carriage
 from motionmind.realise.limbs_apart import keep_limbs_apart
 from motionmind.realise.timeline import Timeline
 
+RISES = 0.01  # metres that a limb which stands may rise
 FOLLOWS = 0.1  # seconds over which a body follows a leg that is turned aside under it
 
 
@@ -61,6 +65,7 @@ def settled(
     wished: Bools,
     carriage: Carriage,
     overhang: float,
+    floors: tuple[float, float],
     fastest: Floats | None,
     without: Collection[Correction],
 ) -> Motion:
@@ -76,6 +81,7 @@ def settled(
         wished: chains of which something is asked [L].
         carriage: how the corpus's bodies hold themselves.
         overhang: how far beyond its support the centre of mass may be, metres.
+        floors: heights of the floor under the first and the last posture, metres.
         fastest: speeds of the joints [J], rad/s; None for any speed.
         without: corrections to leave out.
     """
@@ -87,7 +93,9 @@ def settled(
     if "balance" not in without:
         joints = fixed[: len(skeleton)]
         rotations, root = shift_weight(skeleton, rotations, root, overhang, given, carriage.loose, joints, fps, fastest)
-    root = _lifted(skeleton, rotations, root, given, fps)
+    floor = np.linspace(*floors, len(root))
+    root = _lowered(skeleton, rotations, root, floor, given, fps)
+    root = _lifted(skeleton, rotations, root, floor, given, fps)
     if "flight" not in without:
         root = fall_freely(skeleton, rotations, root, given, fps)
     return replace(motion, rotations=rotations, root=root)
@@ -111,20 +119,43 @@ def _with_its_legs(motion: Motion, rotations: Floats, given: Bools, fps: float) 
     return out
 
 
-def _lifted(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bools, fps: float) -> Floats:
-    """Return positions of the root [N, 3], metres, with which nothing is in the floor: at 0, or lower under ends that
-    are lower.
+def _lowered(skeleton: Skeleton, rotations: Floats, root: Floats, floor: Floats, given: Bools, fps: float) -> Floats:
+    """Return positions of the root [N, 3], metres, with which limbs that stand alone between given postures stay down.
+
+    Joints that meet their limits, and limbs that are kept apart, may have raised them.
 
     Args:
         skeleton: the body.
         rotations: local rotations [N, J, 4].
         root: positions of the root before [N, 3], metres.
+        floor: height of the floor [N], metres.
         given: frames that must not change [N].
         fps: frames a second.
     """
-    low = lowest_height(skeleton, rotations, root)
-    floor = np.linspace(min(low[0], 0.0), min(low[-1], 0.0), len(low))
-    sunk = np.where(given, 0.0, np.maximum(floor - low - SINKS, 0.0))
+    stops, out = np.flatnonzero(given), root.copy()
+    stands = lowest_height(skeleton, rotations[stops], root[stops]) - floor[stops] < TIPTOE * size_of(skeleton)
+    for (start, end), stand in zip(pairwise(stops), stands[:-1] & stands[1:], strict=True):
+        part = slice(start, end + 1)
+        rises = standing_rises(skeleton, rotations[part], root[part]) if stand else None
+        if rises is not None:
+            lowered = smoothed(rises, FOLLOWS, fps)
+            lowered += cover(np.maximum(rises - lowered - RISES, 0.0), fps)
+            out[part, 1] -= np.where(given[part], 0.0, lowered)
+    return out
+
+
+def _lifted(skeleton: Skeleton, rotations: Floats, root: Floats, floor: Floats, given: Bools, fps: float) -> Floats:
+    """Return positions of the root [N, 3], metres, with which nothing is in the floor.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [N, J, 4].
+        root: positions of the root before [N, 3], metres.
+        floor: its height [N], metres.
+        given: frames that must not change [N].
+        fps: frames a second.
+    """
+    sunk = np.where(given, 0.0, np.maximum(floor - lowest_height(skeleton, rotations, root) - SINKS, 0.0))
     if not sunk.any():
         return root
     out = root.copy()
