@@ -31,19 +31,16 @@ def select_entries(
     Returns:
         Row pointers [N + 1], columns [M] and entries [M] of the new matrix.
     """
-    out_ptr = np.zeros(len(rows) + 1, np.int64)
+    most = 0
+    for row in rows:
+        most += ptr[row + 1] - ptr[row]
+    # Every entry is written, and the next one over it where it is left out: a branch would be foretold wrongly.
+    out_ptr, at = np.zeros(len(rows) + 1, np.int64), np.uint64(0)
+    out_columns, out_costs = np.empty(most + 1, np.int32), np.empty(most + 1)
     for k in range(len(rows)):
-        count = 0
-        for e in range(ptr[rows[k]], ptr[rows[k] + 1]):
-            if numbers[shifts[k] + columns[e]] >= 0:
-                count += 1
-        out_ptr[k + 1] = out_ptr[k] + count
-    out_columns, out_costs = np.empty(out_ptr[-1], np.int32), np.empty(out_ptr[-1])
-    at = 0
-    for k in range(len(rows)):
-        for e in range(ptr[rows[k]], ptr[rows[k] + 1]):
-            number = numbers[shifts[k] + columns[e]]
-            if number >= 0:
-                out_columns[at], out_costs[at] = number, costs[e]
-                at += 1
-    return out_ptr, out_columns, out_costs
+        for e in range(np.uint64(ptr[rows[k]]), np.uint64(ptr[rows[k] + 1])):
+            number = numbers[np.uint64(shifts[k] + columns[e])]
+            out_columns[at], out_costs[at] = number, costs[e]
+            at += np.uint64(number >= 0)
+        out_ptr[k + 1] = at
+    return out_ptr, out_columns[:at], out_costs[:at]
