@@ -44,3 +44,31 @@ def select_entries(
             at += np.uint64(number >= 0)
         out_ptr[k + 1] = at
     return out_ptr, out_columns[:at], out_costs[:at]
+
+
+@jit
+def insert_entries(
+    ptr: Ints, columns: Int32s, costs: Floats, rows: Ints, at: Ints, new: Int32s, cost: float
+) -> tuple[Ints, Int32s, Floats]:
+    """Build a matrix that has further entries, of one cost.
+
+    Args:
+        ptr: rows of the other matrix [R + 1].
+        columns: its columns [E].
+        costs: its entries [E].
+        rows: the row of each further entry, rising [N].
+        at: the entry that each comes before, or the end of the row [N].
+        new: their columns [N].
+        cost: the cost of each.
+    """
+    out_ptr, count = ptr.copy(), len(columns) + len(new)
+    out_columns, out_costs = np.empty(count, np.int32), np.empty(count)
+    first = 0
+    for k in range(len(new) + 1):
+        last = at[k] if k < len(new) else len(columns)
+        out_columns[first + k : last + k], out_costs[first + k : last + k] = columns[first:last], costs[first:last]
+        first = last
+        if k < len(new):
+            out_columns[last + k], out_costs[last + k] = new[k], cost
+            out_ptr[rows[k] + 1 :] += 1
+    return out_ptr, out_columns, out_costs

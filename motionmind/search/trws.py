@@ -145,8 +145,7 @@ def _send_ahead(trellis: Trellis, messages: Messages, i: int, theta: Floats) -> 
     the time of the innermost loops.
     """
     first, begin, end = trellis.dom_ptr[i], trellis.dom_ptr[i + trellis.chains], trellis.dom_ptr[i + trellis.chains + 1]
-    for x in range(begin, end):
-        messages.down_row[x] = np.inf
+    messages.down_row[begin:end] = np.inf
     for p in range(first, trellis.dom_ptr[i + 1]):
         value = theta[p - first] - messages.up_row[p]
         for e in range(np.uint64(trellis.row_ptr[p]), np.uint64(trellis.row_ptr[p + 1])):
@@ -234,9 +233,9 @@ def _send_up(trellis: Trellis, messages: Messages, i: int, theta: Floats) -> flo
             if k == best:
                 more = trellis.col_cost[q]
         if more > 0.0:  # others may do better
-            for k in range(len(values)):
-                if values[k] < least:
-                    least = min(least, values[k] + correction(trellis, u, trellis.dom_ptr[i] + k))
+            for other in range(len(values)):
+                if values[other] < least:
+                    least = min(least, values[other] + correction(trellis, u, trellis.dom_ptr[i] + other))
         else:
             least = min(least, values[best])
         messages.up_col[u] = least
