@@ -31,6 +31,7 @@ LIVELIER = 4.0
 # How much more detail all joints but the legs' get, where a movement stands still beside what it copies; chosen on
 # `cmu-05`.
 MISSES = 0.6
+_SIDE = 8  # poses that are measured at once, of which the last may be none
 
 
 def likest_moves(moves: Moves, orientations: Floats, poses: Floats, among: Ints | None = None) -> Ints:
@@ -150,8 +151,10 @@ def _predecessors(some: Moves, among: Ints) -> Ints:
 @jit
 def _squared_distances(orientations: Floats, some: Ints, poses: Floats) -> Floats:
     """Return the squared distance of each of `poses` [T, J, 4] from some of all `orientations` [N, L, 4]: [T, n]."""
-    out, off = np.empty((len(poses), len(some))), np.empty(len(poses))
-    shown = np.ascontiguousarray(poses.transpose(1, 2, 0))
+    count = len(poses)
+    out, off = np.empty((count, len(some))), np.empty(count + -count % _SIDE)
+    shown = np.zeros((poses.shape[1], 4, len(off)))
+    shown[:, :, :count] = poses.transpose(1, 2, 0)
     for i in range(len(some)):
         off[:] = 0.0
         for j in range(len(shown)):
@@ -159,5 +162,5 @@ def _squared_distances(orientations: Floats, some: Ints, poses: Floats) -> Float
             for t in range(len(off)):  # side by side, so that several are measured at once; as `squared_turn`
                 cosine = x * shown[j, 0, t] + y * shown[j, 1, t] + z * shown[j, 2, t] + w * shown[j, 3, t]
                 off[t] += 4.0 * max(1.0 - cosine * cosine, 0.0)
-        out[:, i] = off
+        out[:, i] = off[:count]
     return out
