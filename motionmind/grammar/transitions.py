@@ -7,6 +7,7 @@ state s of chain j has the row `starts[j] + s` in flat arrays.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,10 +43,28 @@ class Transitions:
     arrives: Int32s
     seconds: Floats
 
-    @property
+    # What each tween asks for is kept: it takes time in proportion to all transitions.
+
+    @cached_property
     def sources(self) -> Ints:
         """Row of the state that each transition leaves [E]."""
         return np.repeat(np.arange(len(self.visits)), np.diff(self.indptr))
+
+    @cached_property
+    def _conditional(self) -> Floats:
+        """Weight of each transition in the scheme `conditional` [E], nats."""
+        leaving = np.bincount(self.sources, weights=self.counts, minlength=len(self.visits))
+        return np.asarray(np.log(leaving[self.sources]) - np.log(self.counts))
+
+    @cached_property
+    def _keys(self) -> Ints:
+        """A number for each transition that rises with its row, and with its target in each row [E]."""
+        return np.asarray(self.sources * self._width + self.targets)
+
+    @property
+    def _width(self) -> int:
+        """More than the number of states in any chain."""
+        return int(self.sizes().max()) + 1
 
     def sizes(self) -> Ints:
         """Number of states in each chain [L]."""
@@ -66,14 +85,14 @@ class Transitions:
                 report CU-CS-844-97 (1997).
             novelty: 0 to 1; at 1 all transitions that leave a state cost the same.
         """
-        weights = self._weights(scheme)
+        weights = self._conditional if scheme == "conditional" else self._printed()
+        if novelty == 0.0:
+            return weights.copy()
         return (1.0 - novelty) * weights + novelty * np.log(np.diff(self.indptr)[self.sources])
 
-    def _weights(self, scheme: Weights) -> Floats:
+    def _printed(self) -> Floats:
+        """Return the weight of each transition in the scheme `printed` [E], nats."""
         sources = self.sources
-        if scheme == "conditional":
-            leaving = np.bincount(sources, weights=self.counts, minlength=len(self.visits))
-            return np.asarray(np.log(leaving[sources]) - np.log(self.counts))
         chain = np.searchsorted(self.starts, sources, side="right") - 1
         chain_of_row = np.repeat(np.arange(len(self.starts) - 1), self.sizes())
         visited = self.visits / np.bincount(chain_of_row, weights=self.visits)[chain_of_row]
@@ -95,9 +114,7 @@ class Transitions:
         Args:
             path: states [T + 1, L].
         """
-        width = int(self.sizes().max()) + 1
-        keys = self.sources * width + self.targets  # increasing, as rows are, and the targets in each
-        wanted = (self.starts[:-1] + path[:-1]) * width + path[1:]
+        keys, wanted = self._keys, (self.starts[:-1] + path[:-1]) * self._width + path[1:]
         at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
         return np.where(keys[at] == wanted, at, -1) if len(keys) else np.full(wanted.shape, -1)
 

@@ -167,8 +167,20 @@ def postures_near(
         below: number of the corpus's postures.
         leaves: how many to search.
     """
-    found = find_near(trees, 0, orientations, posture[None], leaves * LEAF, leaves)[0]
-    return np.asarray(found[found < below][:count])
+    part = trees.parts[0]
+    return _find_below(
+        orientations,
+        part,
+        np.ascontiguousarray(posture[part]),
+        trees.codes_of(0),
+        trees.order[0],
+        trees.bounds,
+        trees.centres_of(0),
+        trees.radii[0],
+        count,
+        leaves,
+        below,
+    )
 
 
 def node_bounds(count: int) -> Int32s:
@@ -269,10 +281,38 @@ def _find(
     for k in range(len(postures)):
         near = _search(postures[k], bounds, centres, radii, leaves)
         moments, off = _leaves(orientations, part, postures[k], codes, order, bounds, near)
-        # Few of many are sorted.
-        within = np.flatnonzero(off <= np.partition(off, count - 1)[count - 1])
-        found[k] = moments[within[np.argsort(off[within], kind="mergesort")[:count]]]
+        found[k] = _nearest(moments, off, count)
     return found
+
+
+@jit
+def _find_below(
+    orientations: Floats,
+    part: Ints,
+    posture: Floats,
+    codes: Int8s,
+    order: Int32s,
+    bounds: Int32s,
+    centres: Singles,
+    radii: Floats,
+    count: int,
+    leaves: int,
+    below: int,
+) -> Ints:
+    """Return moments near a posture of a part [m, 4] whose numbers are below one, so many or all that are found [n]."""
+    near = _search(posture, bounds, centres, radii, leaves)
+    moments, off = _leaves(orientations, part, posture, codes, order, bounds, near)
+    some = np.flatnonzero(moments < below)
+    return _nearest(moments[some], off[some], min(count, len(some)))
+
+
+@jit
+def _nearest(moments: Int32s, off: Singles, count: int) -> Ints:
+    """Return so many of some moments, those that are least off, the nearest first [n]."""
+    if count == 0:
+        return np.empty(0, np.int64)
+    within = np.flatnonzero(off <= np.partition(off, count - 1)[count - 1])  # few of many are sorted
+    return moments[within[np.argsort(off[within], kind="mergesort")[:count]]].astype(np.int64)
 
 
 @jit

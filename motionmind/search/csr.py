@@ -31,19 +31,44 @@ def select_entries(
     Returns:
         Row pointers [N + 1], columns [M] and entries [M] of the new matrix.
     """
-    out_ptr = np.zeros(len(rows) + 1, np.int64)
+    most = 0
+    for row in rows:
+        most += ptr[row + 1] - ptr[row]
+    # Every entry is written, and the next one over it where it is left out: a branch would be foretold wrongly.
+    out_ptr, at = np.zeros(len(rows) + 1, np.int64), np.uint64(0)
+    out_columns, out_costs = np.empty(most + 1, np.int32), np.empty(most + 1)
     for k in range(len(rows)):
-        count = 0
-        for e in range(ptr[rows[k]], ptr[rows[k] + 1]):
-            if numbers[shifts[k] + columns[e]] >= 0:
-                count += 1
-        out_ptr[k + 1] = out_ptr[k] + count
-    out_columns, out_costs = np.empty(out_ptr[-1], np.int32), np.empty(out_ptr[-1])
-    at = 0
-    for k in range(len(rows)):
-        for e in range(ptr[rows[k]], ptr[rows[k] + 1]):
-            number = numbers[shifts[k] + columns[e]]
-            if number >= 0:
-                out_columns[at], out_costs[at] = number, costs[e]
-                at += 1
+        for e in range(np.uint64(ptr[rows[k]]), np.uint64(ptr[rows[k] + 1])):
+            number = numbers[np.uint64(shifts[k] + columns[e])]
+            out_columns[at], out_costs[at] = number, costs[e]
+            at += np.uint64(number >= 0)
+        out_ptr[k + 1] = at
+    return out_ptr, out_columns[:at], out_costs[:at]
+
+
+@jit
+def insert_entries(
+    ptr: Ints, columns: Int32s, costs: Floats, rows: Ints, at: Ints, new: Int32s, cost: float
+) -> tuple[Ints, Int32s, Floats]:
+    """Build a matrix that has further entries, of one cost.
+
+    Args:
+        ptr: rows of the other matrix [R + 1].
+        columns: its columns [E].
+        costs: its entries [E].
+        rows: the row of each further entry, rising [N].
+        at: the entry that each comes before, or the end of the row [N].
+        new: their columns [N].
+        cost: the cost of each.
+    """
+    out_ptr, count = ptr.copy(), len(columns) + len(new)
+    out_columns, out_costs = np.empty(count, np.int32), np.empty(count)
+    first = 0
+    for k in range(len(new) + 1):
+        last = at[k] if k < len(new) else len(columns)
+        out_columns[first + k : last + k], out_costs[first + k : last + k] = columns[first:last], costs[first:last]
+        first = last
+        if k < len(new):
+            out_columns[last + k], out_costs[last + k] = new[k], cost
+            out_ptr[rows[k] + 1 :] += 1
     return out_ptr, out_columns, out_costs

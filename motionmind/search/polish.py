@@ -84,17 +84,19 @@ def minimise_chain(trellis: Trellis, path: Ints, chain: int, kept: Bools) -> Non
     value = np.full(trellis.dom_ptr[trellis.moves * chains + chain + 1], np.inf)
     for t in range(trellis.moves, 0, -1):
         i = t * chains + chain
-        for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
-            if not kept[p]:
-                continue
-            rest = 0.0 if t == trellis.moves else np.inf
-            for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1]):
-                rest = min(rest, trellis.row_cost[e] + value[trellis.row_to[e]])
-            value[p] = rest + trellis.unary[p]
-            for child in range(chain + 1, chains):
-                below = i - chain + child
-                if trellis.parents[child] == chain:
-                    value[p] += correction(trellis, trellis.up_ptr[below] + p - trellis.dom_ptr[i], path[below])
+        first, end = trellis.dom_ptr[i], trellis.dom_ptr[i + 1]
+        for p in range(first, end):
+            if kept[p]:
+                rest = 0.0 if t == trellis.moves else np.inf
+                for e in range(np.uint64(trellis.row_ptr[p]), np.uint64(trellis.row_ptr[p + 1])):
+                    rest = min(rest, trellis.row_cost[e] + value[np.uint64(trellis.row_to[e])])
+                value[p] = rest + trellis.unary[p]
+        for child in range(chain + 1, chains):
+            if trellis.parents[child] == chain:
+                rows, x = trellis.up_ptr[i - chain + child], path[i - chain + child]
+                for p in range(first, end):
+                    if value[p] < np.inf:
+                        value[p] += correction(trellis, rows + p - first, x)
         if trellis.up_ptr[i + 1] > trellis.up_ptr[i]:
             above = i - chain + trellis.parents[chain]
             u = trellis.up_ptr[i] + path[above] - trellis.dom_ptr[above]
@@ -117,24 +119,50 @@ def minimise_moment(trellis: Trellis, path: Ints, t: int, kept: Bools) -> None:
     chains = trellis.chains
     first = trellis.dom_ptr[t * chains]
     value = np.full(trellis.dom_ptr[(t + 1) * chains] - first, np.inf)
+    best = np.empty(chains, np.int64)  # position of each chain that has the least value
     for chain in range(chains - 1, -1, -1):
-        i = t * chains + chain
-        before = path[i - chains]
-        for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
+        i, least = t * chains + chain, np.inf
+        edges = range(trellis.row_ptr[path[i - chains]], trellis.row_ptr[path[i - chains] + 1])
+        for e in edges:
             p = trellis.row_to[e]
-            if not kept[p]:
-                continue
-            cost = trellis.row_cost[e] + trellis.unary[p]
-            if t < trellis.moves:
-                cost += edge_cost(trellis, p, path[i + chains])
-            for child in range(chain + 1, chains):
-                if trellis.parents[child] == chain and cost < np.inf:
-                    cost += _cheapest(trellis, path, value, first, i - chain + child, p - trellis.dom_ptr[i])[0]
-            value[p - first] = cost
+            if kept[p]:
+                cost = trellis.row_cost[e] + trellis.unary[p]
+                if t < trellis.moves:
+                    cost += edge_cost(trellis, p, path[i + chains])
+                value[p - first] = cost
+        for child in range(chain + 1, chains):
+            if trellis.parents[child] == chain:
+                below = i - chain + child
+                for e in edges:
+                    p = trellis.row_to[e]
+                    if value[p - first] < np.inf:
+                        above = p - trellis.dom_ptr[i]
+                        value[p - first] += _least_below(trellis, path, value, first, below, above, best[child])
+        best[chain] = first
+        for e in edges:
+            p = trellis.row_to[e]
+            if value[p - first] < least:
+                least, best[chain] = value[p - first], p
     for chain in range(chains):
         i, parent = t * chains + chain, trellis.parents[chain]
         above = -1 if parent < 0 else path[i - chain + parent] - trellis.dom_ptr[i - chain + parent]
         path[i] = _cheapest(trellis, path, value, first, i, above)[1]
+
+
+@jit
+def _least_below(trellis: Trellis, path: Ints, value: Floats, first: int, i: int, above: int, best: int) -> float:
+    """Return the least cost of variable i, as `_cheapest` does, where position `best` has the least value.
+
+    Unless that costs more with this parent, only what costs less with it can do better.
+    """
+    u = trellis.up_ptr[i] + above
+    least, more = value[best - first], 0.0
+    for q in range(np.uint64(trellis.col_ptr[u]), np.uint64(trellis.col_ptr[u + 1])):
+        x = np.uint64(trellis.col_to[q])
+        least = min(least, value[x - np.uint64(first)] + trellis.col_cost[q])
+        if x == np.uint64(best):
+            more = trellis.col_cost[q]
+    return _cheapest(trellis, path, value, first, i, above)[0] if more > 0.0 else least
 
 
 @jit

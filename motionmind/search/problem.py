@@ -17,7 +17,7 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.jit import jit
-from motionmind.search.csr import insertion_point
+from motionmind.search.csr import insert_entries, insertion_point
 
 
 class Model(NamedTuple):
@@ -170,13 +170,10 @@ def with_waits(model: Model, goal: Ints, wait: float) -> Model:
     held[listed] = model.targets[at[listed]] == goal[listed]
     costs = model.costs.copy()
     costs[at[held]] = np.minimum(costs[at[held]], wait)
-    added = np.zeros(len(model.indptr), dtype=np.int64)
-    added[rows[~held] + 1] = 1
-    return model._replace(
-        indptr=model.indptr + np.cumsum(added),
-        targets=np.insert(model.targets, at[~held], goal[~held].astype(np.int32)),
-        costs=np.insert(costs, at[~held], wait),
+    indptr, targets, costs = insert_entries(
+        model.indptr, model.targets, costs, rows[~held], at[~held], goal[~held].astype(np.int32), wait
     )
+    return model._replace(indptr=indptr, targets=targets, costs=costs)
 
 
 def places(model: Model, path: Int32s) -> Int32s:
@@ -230,8 +227,8 @@ def _costs_to_go(model: Model, goal: Ints, moves: int, timed: Floats, known: Flo
                 least, other = np.inf, np.inf  # of every other edge, for the next need not wait for the one before
                 end = model.indptr[row + 1]
                 for e in range(model.indptr[row], end - 1, 2):
-                    least = min(least, model.costs[e] + arrived[model.targets[e]])
-                    other = min(other, model.costs[e + 1] + arrived[model.targets[e + 1]])
+                    least = min(least, model.costs[e] + arrived[np.uint64(model.targets[e])])
+                    other = min(other, model.costs[e + 1] + arrived[np.uint64(model.targets[e + 1])])
                 if (end - model.indptr[row]) % 2:
                     least = min(least, model.costs[end - 1] + arrived[model.targets[end - 1]])
                 value[k, row] = min(least, other)

@@ -134,7 +134,7 @@ def reachable(trellis: Trellis, through: Floats, below: float) -> Bools:
         for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
             leads, e = False, trellis.row_ptr[p]
             while kept[p] and not leads and e < trellis.row_ptr[p + 1]:
-                leads = kept[trellis.row_to[e]]
+                leads = kept[np.uint64(trellis.row_to[e])]
                 e += 1
             kept[p] = leads
     led_to = np.zeros(len(kept), np.bool_)
@@ -142,8 +142,8 @@ def reachable(trellis: Trellis, through: Floats, below: float) -> Bools:
     for p in range(len(kept)):  # what nothing leads to
         kept[p] = kept[p] and led_to[p]
         if kept[p]:
-            for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1]):
-                led_to[trellis.row_to[e]] = True
+            for e in range(np.uint64(trellis.row_ptr[p]), np.uint64(trellis.row_ptr[p + 1])):
+                led_to[np.uint64(trellis.row_to[e])] = True
     return kept
 
 
@@ -217,8 +217,8 @@ def _costs_so_far(model: Model, start: Ints, moves: int, timed: Floats) -> Float
         for t in range(moves):
             for row in range(first, last):
                 if value[t, row] < np.inf and (t == 0 or model.allowed[row]):
-                    for e in range(model.indptr[row], model.indptr[row + 1]):
-                        target = first + model.targets[e]
+                    for e in range(np.uint64(model.indptr[row]), np.uint64(model.indptr[row + 1])):
+                        target = np.uint64(first) + np.uint64(model.targets[e])
                         cost = value[t, row] + model.costs[e] + model.alone[target]
                         value[t + 1, target] = min(value[t + 1, target], cost)
             if len(timed) > 0:
@@ -250,8 +250,8 @@ def _domains(
             led_to[start[chain]] = True
         for row in range(first, model.starts[chain + 1]):
             if t > 0 and place[t - 1, row] >= 0:
-                for e in range(model.indptr[row], model.indptr[row + 1]):
-                    led_to[model.targets[e]] = True
+                for e in range(np.uint64(model.indptr[row]), np.uint64(model.indptr[row + 1])):
+                    led_to[np.uint64(model.targets[e])] = True
         for state in range(len(led_to)):
             if led_to[state] and (t in (0, moves) or model.allowed[first + state]):
                 through = so_far[t, first + state] + to_go[moves - t, first + state]

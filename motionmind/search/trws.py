@@ -127,46 +127,52 @@ def forward(trellis: Trellis, messages: Messages) -> None:
     chains = trellis.chains
     for i in range(len(trellis.dom_ptr) - 1):
         chain = i % chains
-        first, last = trellis.dom_ptr[i], trellis.dom_ptr[i + 1]
         theta = _gamma(trellis, i) * _theta(trellis, messages, i)
         messages.before[i] = messages.constants[i]
         if i < chains * trellis.moves:
-            begin, end = trellis.dom_ptr[i + chains], trellis.dom_ptr[i + chains + 1]
-            for x in range(begin, end):
-                messages.down_row[x] = np.inf
-            for p in range(first, last):
-                value = theta[p - first] - messages.up_row[p]
-                for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1]):
-                    x = trellis.row_to[e]
-                    messages.down_row[x] = min(messages.down_row[x], value + trellis.row_cost[e])
-            messages.before[i] += _normalise(messages.down_row, begin, end)
+            messages.before[i] += _send_ahead(trellis, messages, i, theta)
         if i >= chains:
             for child in range(chain + 1, chains):
                 if trellis.parents[child] == chain:
-                    below = i - chain + child
-                    begin, end, base = trellis.dom_ptr[below], trellis.dom_ptr[below + 1], trellis.up_ptr[below]
-                    values = theta - messages.up_col[base : base + last - first]
-                    best = np.argmin(values)
-                    messages.down_col[begin:end] = values[best]
-                    order = np.empty(0, np.int64)
-                    for q in range(trellis.col_ptr[base + best], trellis.col_ptr[base + best + 1]):
-                        if (
-                            trellis.col_cost[q] > 0.0
-                        ):  # the best of all costs more here: go on to those that may do better
-                            x = trellis.col_to[q]
-                            order = np.argsort(values) if len(order) == 0 else order
-                            messages.down_col[x] = np.inf
-                            for other in order:
-                                if values[other] >= messages.down_col[x]:
-                                    break
-                                messages.down_col[x] = min(
-                                    messages.down_col[x], values[other] + correction(trellis, base + other, x)
-                                )
-                    for k in range(last - first):
-                        for q in range(trellis.col_ptr[base + k], trellis.col_ptr[base + k + 1]):
-                            x = trellis.col_to[q]
-                            messages.down_col[x] = min(messages.down_col[x], values[k] + trellis.col_cost[q])
-                    messages.before[i] += _normalise(messages.down_col, begin, end)
+                    messages.before[i] += _send_down(trellis, messages, i - chain + child, theta)
+
+
+@jit
+def _send_ahead(trellis: Trellis, messages: Messages, i: int, theta: Floats) -> float:
+    """Send from variable i, whose share is theta, to its chain's next move; return what is subtracted.
+
+    Here and below positions are unsigned numbers, of which numba need not ask whether they count from the end: half of
+    the time of the innermost loops.
+    """
+    first, begin, end = trellis.dom_ptr[i], trellis.dom_ptr[i + trellis.chains], trellis.dom_ptr[i + trellis.chains + 1]
+    messages.down_row[begin:end] = np.inf
+    for p in range(first, trellis.dom_ptr[i + 1]):
+        value = theta[p - first] - messages.up_row[p]
+        for e in range(np.uint64(trellis.row_ptr[p]), np.uint64(trellis.row_ptr[p + 1])):
+            x = np.uint64(trellis.row_to[e])
+            messages.down_row[x] = min(messages.down_row[x], value + trellis.row_cost[e])
+    return _normalise(messages.down_row, begin, end)
+
+
+@jit
+def _send_down(trellis: Trellis, messages: Messages, child: int, theta: Floats) -> float:
+    """Send to variable `child` from its parent, whose share is theta; return what is subtracted."""
+    begin, end, base = trellis.dom_ptr[child], trellis.dom_ptr[child + 1], trellis.up_ptr[child]
+    values = theta - messages.up_col[base : base + len(theta)]
+    best = np.argmin(values)
+    messages.down_col[begin:end] = values[best]
+    for q in range(trellis.col_ptr[base + best], trellis.col_ptr[base + best + 1]):
+        if trellis.col_cost[q] > 0.0:  # the best of all costs more here: others may do better
+            x, least = trellis.col_to[q], np.inf
+            for k in range(len(values)):
+                if values[k] < least:
+                    least = min(least, values[k] + correction(trellis, base + k, x))
+            messages.down_col[x] = least
+    for k in range(len(values)):
+        for q in range(np.uint64(trellis.col_ptr[base + k]), np.uint64(trellis.col_ptr[base + k + 1])):
+            x = np.uint64(trellis.col_to[q])
+            messages.down_col[x] = min(messages.down_col[x], values[k] + trellis.col_cost[q])
+    return _normalise(messages.down_col, begin, end)
 
 
 @jit
@@ -185,38 +191,55 @@ def backward(trellis: Trellis, messages: Messages) -> float:
             messages.through[p] = earlier + theta[p - first] + later
         theta *= _gamma(trellis, i)
         if i >= chains:
-            before = i - chains
-            for p in range(trellis.dom_ptr[before], trellis.dom_ptr[before + 1]):
-                least = np.inf
-                for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1]):
-                    x = trellis.row_to[e]
-                    least = min(least, trellis.row_cost[e] + theta[x - first] - messages.down_row[x])
-                messages.up_row[p] = least
-            least = _normalise(messages.up_row, trellis.dom_ptr[before], trellis.dom_ptr[before + 1])
+            least = _send_back(trellis, messages, i, theta)
             messages.constants[i] += least
-            sent[before] += least
+            sent[i - chains] += least
             if trellis.parents[chain] >= 0:
-                values = theta - messages.down_col[first:last]
-                best, order = np.argmin(values), np.empty(0, np.int64)
-                for u in range(trellis.up_ptr[i], trellis.up_ptr[i + 1]):
-                    value = values[best]
-                    if correction(trellis, u, first + best) > 0.0:
-                        order = np.argsort(values) if len(order) == 0 else order
-                        value = np.inf
-                        for other in order:
-                            if values[other] >= value:
-                                break
-                            value = min(value, values[other] + correction(trellis, u, first + other))
-                    for q in range(trellis.col_ptr[u], trellis.col_ptr[u + 1]):
-                        value = min(value, values[trellis.col_to[q] - first] + trellis.col_cost[q])
-                    messages.up_col[u] = value
-                least = _normalise(messages.up_col, trellis.up_ptr[i], trellis.up_ptr[i + 1])
+                least = _send_up(trellis, messages, i, theta)
                 messages.constants[i] += least
                 sent[i - chain + trellis.parents[chain]] += least
         for p in range(first, last):
             messages.ahead[p] -= messages.constants[i]
         bound += messages.constants[i]
     return bound
+
+
+@jit
+def _send_back(trellis: Trellis, messages: Messages, i: int, theta: Floats) -> float:
+    """Send from variable i, whose share is theta, to its chain's move before; return what is subtracted."""
+    first, begin, end = (
+        np.uint64(trellis.dom_ptr[i]), trellis.dom_ptr[i - trellis.chains], trellis.dom_ptr[i - trellis.chains + 1],
+    )  # fmt: skip
+    for p in range(begin, end):
+        least = np.inf
+        for e in range(np.uint64(trellis.row_ptr[p]), np.uint64(trellis.row_ptr[p + 1])):
+            x = np.uint64(trellis.row_to[e])
+            least = min(least, trellis.row_cost[e] + theta[x - first] - messages.down_row[x])
+        messages.up_row[p] = least
+    return _normalise(messages.up_row, begin, end)
+
+
+@jit
+def _send_up(trellis: Trellis, messages: Messages, i: int, theta: Floats) -> float:
+    """Send from variable i, whose share is theta, to its parent; return what is subtracted."""
+    first, begin, end = np.uint64(trellis.dom_ptr[i]), trellis.up_ptr[i], trellis.up_ptr[i + 1]
+    values = theta - messages.down_col[trellis.dom_ptr[i] : trellis.dom_ptr[i + 1]]
+    best = np.uint64(np.argmin(values))
+    for u in range(begin, end):
+        least, more = np.inf, 0.0  # what the best of all costs more here
+        for q in range(np.uint64(trellis.col_ptr[u]), np.uint64(trellis.col_ptr[u + 1])):
+            k = np.uint64(trellis.col_to[q]) - first
+            least = min(least, values[k] + trellis.col_cost[q])
+            if k == best:
+                more = trellis.col_cost[q]
+        if more > 0.0:  # others may do better
+            for other in range(len(values)):
+                if values[other] < least:
+                    least = min(least, values[other] + correction(trellis, u, trellis.dom_ptr[i] + other))
+        else:
+            least = min(least, values[best])
+        messages.up_col[u] = least
+    return _normalise(messages.up_col, begin, end)
 
 
 @jit
@@ -268,15 +291,36 @@ def descend(trellis: Trellis, messages: Messages, path: Ints, start: int) -> flo
     chains = trellis.chains
     grown = 0.0
     for i in range(start, len(trellis.dom_ptr) - 1):
-        parent, before = trellis.parents[i % chains], path[i - chains]
-        above = path[i - i % chains + parent] if parent >= 0 else -1
-        least = np.inf
-        for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
-            value = step(trellis, messages, i, before, above, e)
-            if value < least:
-                least, path[i] = value, trellis.row_to[e]
+        parent = trellis.parents[i % chains]
+        above = path[i - i % chains + parent] - trellis.dom_ptr[i - i % chains + parent] if parent >= 0 else -1
+        least, path[i] = _least_step(trellis, messages, i, path[i - chains], above)
         grown += least
     return grown
+
+
+@jit
+def _least_step(trellis: Trellis, messages: Messages, i: int, before: int, above: int) -> tuple[float, int]:
+    """Return the least that f grows by with variable i, as `step` has it, and the position where it does.
+
+    Args:
+        trellis: the problem.
+        messages: those after a backward sweep.
+        i: the variable.
+        before: position of its chain one move earlier.
+        above: index of its parent variable's position in its domain, -1 without one.
+    """
+    least, best, u = np.inf, -1, trellis.up_ptr[i] + above
+    q, last = (trellis.col_ptr[u], trellis.col_ptr[u + 1]) if above >= 0 else (0, 0)
+    for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
+        x = trellis.row_to[e]
+        grown = float(trellis.row_cost[e] + messages.ahead[x] - messages.up_row[before])
+        while q < last and trellis.col_to[q] < x:  # both rise: no search for each
+            q += 1
+        if above >= 0:
+            grown += (trellis.col_cost[q] if q < last and trellis.col_to[q] == x else 0.0) - messages.up_col[u]
+        if grown < least:
+            least, best = grown, x
+    return least, best
 
 
 @jit

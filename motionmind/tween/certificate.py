@@ -66,10 +66,10 @@ def break_down_cost(
     """
     held, graph = problem.model_with_waits(), grammar.transitions
     at = places(problem.model, path)
-    probability = np.exp(-graph.weights("conditional"))
     shape = (len(path) - 1, len(grammar.chains))
-    moves, together, likelihood, guide = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    moves, together, guide = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     edges, timed = graph.edges(at), problem.timed_costs(len(path) - 1)
+    likelihood = np.where(edges >= 0, np.exp(-graph.weights("conditional")[edges]), 0.0)
     if timed is not None:
         guide[:] = np.take_along_axis(timed[1:], problem.model.starts[:-1] + path[1:], axis=1)
     for t, chain in np.ndindex(*shape):
@@ -79,7 +79,6 @@ def break_down_cost(
         moves[t, chain] = held.costs[first + np.searchsorted(held.targets[first:last], after)]
         if parent >= 0:
             together[t, chain] = factor * network.cost(chain, int(path[t + 1, parent]), after, held.starts)
-        likelihood[t, chain] = probability[edges[t, chain]] if edges[t, chain] >= 0 else 0.0
     orientations = space.decode(at)
     degrees = np.degrees(rot.angle(orientations[:-1], orientations[1:]))
     names = tuple(tuple(space.label(chain, int(state)) for chain, state in enumerate(row)) for row in at)

@@ -30,7 +30,7 @@ from motionmind.walks.likelihood import (
     write_likelihood,
 )
 from motionmind.walks.marginals import posterior_marginals
-from motionmind.walks.means import COUNTS, add_rotations, mean_rotations, means
+from motionmind.walks.means import COUNTS, add_rotations, counted, mean_rotations, means
 from motionmind.walks.minimal import LASTS, departure, minimal_movement, trust
 from motionmind.walks.sparse import Chosen, all_of, choose, steps_on
 from motionmind.walks.stops import Rates, Stop
@@ -123,6 +123,7 @@ class _PartWalk(NamedTuple):
         shown: what these show of the part [n, p, 4]; of a corpus without trees, all chains in all moments.
         marginals: their probabilities [S + 1, n].
         counts: of a corpus with trees, those of them that may count in a mean.
+        counted: their probabilities by the part's size, as `add_rotations` takes them, once for all joints of the part.
         trust: how far the part is trusted to the walks.
         left_out: as in `MeanWalk`.
     """
@@ -131,6 +132,7 @@ class _PartWalk(NamedTuple):
     shown: Floats
     marginals: Floats
     counts: Ints
+    counted: Floats
     trust: float
     left_out: float
 
@@ -153,8 +155,16 @@ def _joined(segments: Mapping[int, _Walk], count: int, moments: int) -> tuple[Fl
             if isinstance(of, slice) or isinstance(chosen, slice):
                 rows += 0.5 * share
             else:
-                rows[:, np.searchsorted(chosen, of)] += 0.5 * share
+                _add_half(rows, np.searchsorted(chosen, of), share)
     return out, chosen
+
+
+@jit
+def _add_half(rows: Floats, columns: Ints, shares: Floats) -> None:
+    """Add half of shares [S, n] to some columns [n] of rows."""
+    for t in range(len(rows)):
+        for k in range(len(columns)):
+            rows[t, columns[k]] += 0.5 * shares[t, k]
 
 
 def _mean_between(
@@ -214,7 +224,8 @@ def _mean_between(
                 own = squared_distances(here, np.zeros((len(part), 1), dtype=np.int64), 1, to)[0]
             marginals, trust_in_part, left_out = _part_marginals(part, chosen, rates, ends, times, own)
             counts = np.flatnonzero(marginals.max(axis=0) >= COUNTS) if trees is not None else np.zeros(0, np.int64)
-            return _PartWalk(chosen, here, marginals, counts, trust_in_part, left_out)
+            weights = counted(float(np.dot((members == number).any(axis=0), SIZES)), marginals, counts)
+            return _PartWalk(chosen, here, marginals, counts, weights, trust_in_part, left_out)
 
         known = dict(zip(larger, each(walk, larger), strict=True))
 
@@ -313,9 +324,9 @@ def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
 def _mean_of_few(walks: Sequence[_PartWalk], parts: Sequence[Ints], joints: Sequence[int], about: Floats) -> Floats:
     """Return `mean_rotations` of some joints [m] over the walks of the parts of all three sizes that they are in."""
     sums = np.zeros((len(joints), 4, len(about)))
-    for size, part, walk in zip(SIZES, parts, walks, strict=True):
+    for part, walk in zip(parts, walks, strict=True):
         columns = np.array([np.flatnonzero(part == joint)[0] for joint in joints])
-        add_rotations(sums, size, walk.marginals, walk.counts, walk.shown, columns, about)
+        add_rotations(sums, walk.counted, walk.counts, walk.shown, columns, about)
     return means(sums, about)
 
 

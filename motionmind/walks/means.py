@@ -24,33 +24,48 @@ def mean_rotations(weights: Floats, orientations: Floats, joints: Ints, about: F
         about: orientations that choose each quaternion's sign, and stand in for a mean of length 0 [S, m, 4].
     """
     sums = np.zeros((len(joints), 4, len(about)))
-    add_rotations(sums, 1.0, weights, np.arange(weights.shape[1]), orientations, joints, about)
+    counts = np.arange(weights.shape[1])
+    add_rotations(sums, counted(1.0, weights, counts), counts, orientations, joints, about)
     return means(sums, about)
 
 
 @jit
+def counted(size: float, weights: Floats, counts: Ints) -> Floats:
+    """Return the weights of some orientations, times a factor, as `add_rotations` takes them [m, S].
+
+    They lie side by side for all means, which are then added to at once, four moments at a time: so there are rows of 0
+    beyond the last. A weight of 0 changes no sum.
+
+    Args:
+        size: the factor.
+        weights: of the orientations in each mean [S, N].
+        counts: which of them to add [n].
+    """
+    out = np.zeros((len(counts) + -len(counts) % 4, len(weights)))
+    for t in range(len(weights)):
+        for i in range(len(counts)):
+            weight = size * weights[t, counts[i]]
+            out[i, t] = weight if weight >= COUNTS else 0.0
+    return out
+
+
+@jit
 def add_rotations(
-    sums: Floats, size: float, weights: Floats, counts: Ints, orientations: Floats, joints: Ints, about: Floats
+    sums: Floats, weights: Floats, counts: Ints, orientations: Floats, joints: Ints, about: Floats
 ) -> None:
     """Add some orientations, those of one sign with `about`, to the sums of all means [m, 4, S].
 
-    Arguments are those of `mean_rotations`, but for `size`, a factor of the weights, and `counts`, which orientations
+    Arguments are those of `mean_rotations`, but for the weights, which are `counted`, and `counts`, which orientations
     to add [n].
     """
     count, moments = len(about), len(counts)
-    # Side by side for all means, which are then added to at once, four moments at a time. A weight of 0 changes no sum.
-    counted = np.zeros((moments + -moments % 4, count))
-    for i in range(moments):
-        for t in range(count):
-            weight = size * weights[t, counts[i]]
-            counted[i, t] = weight if weight >= COUNTS else 0.0
     near, signed, shown = np.empty((4, count)), np.empty((4, count)), np.empty((4, 4))
     for j in range(len(joints)):
         near[:] = about[:, j].T
         middle, added_up = about[count // 2, j], sums[j]
         alike = _spread(near, middle)
-        for first in range(0, len(counted), 4):
-            added, mixed = counted[first : first + 4], False
+        for first in range(0, len(weights), 4):
+            added, mixed = weights[first : first + 4], False
             for k in range(4):
                 x, y, z, w = orientations[counts[min(first + k, moments - 1)], joints[j]]
                 cosine = middle[0] * x + middle[1] * y + middle[2] * z + middle[3] * w

@@ -90,13 +90,9 @@ def choose(trees: Neighbours, number: int, carriage: Carriage, ends: Floats, pat
     weights, stands = _shares(moments, singles, starts, trees.weights[number][nodes], ranks, carriage.weights)
     begins, leads, numbers = steps_at(moments, True, *chain)
     goals = _goals(moments, leads, starts, stands, ranks)
-    clusters = _numbered(carriage.clusters[moments, number])
-    of_ends = np.zeros((2, len(moments)), dtype=np.bool_)
-    for one, end in zip(of_ends, near, strict=True):
-        one[np.searchsorted(moments, end)] = True
-    return Chosen(
-        moments, weights, begins, goals, np.asarray(carriage.shares[numbers]), clusters, (of_ends[0], of_ends[1])
-    )
+    clusters = _numbered(carriage.clusters, moments, number)
+    of_ends = _among(moments, near[0]), _among(moments, near[1])
+    return Chosen(moments, weights, begins, goals, np.asarray(carriage.shares[numbers]), clusters, of_ends)
 
 
 def steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
@@ -180,11 +176,29 @@ def _rising(numbers: Ints) -> Ints:
     return np.asarray(numbers[np.append(True, numbers[1:] != numbers[:-1])])
 
 
-def _numbered(clusters: Int32s) -> Int32s:
-    """Return clusters by numbers that rise as theirs do, from 0 and without gaps."""
-    seen = np.zeros(int(clusters.max()) + 1, dtype=np.int32)
-    seen[clusters] = 1
-    return np.asarray(np.cumsum(seen, dtype=np.int32)[clusters] - 1, dtype=np.int32)
+@jit
+def _numbered(clusters: Int32s, moments: Ints, number: int) -> Int32s:
+    """Return the clusters of moments in one part, of those of all [N, P], by numbers that rise as theirs do, from 0 and
+    without gaps [n]."""
+    own, most = np.empty(len(moments), np.int32), 0
+    for k in range(len(moments)):
+        own[k] = clusters[moments[k], number]
+        most = max(most, own[k])
+    new = np.zeros(most + 1, np.int32)
+    new[own] = 1
+    count = 0
+    for cluster in range(most + 1):
+        count += new[cluster]
+        new[cluster] = count - 1
+    return new[own]
+
+
+@jit
+def _among(moments: Ints, some: Ints) -> Bools:
+    """Return which of moments, that rise, are among some of them [n]."""
+    out = np.zeros(len(moments), np.bool_)
+    out[np.searchsorted(moments, some)] = True
+    return out
 
 
 @jit
@@ -201,8 +215,7 @@ def _shares(
         ranks: of the tree [N].
         counts: weights of all moments [N].
     """
-    ball, alone = _balls_of(moments, starts, ranks), np.zeros(len(moments), np.bool_)
-    alone[np.searchsorted(moments, singles)] = True
+    ball, alone = _balls_of(moments, starts, ranks), _among(moments, singles)
     shared, rest = np.zeros(len(balls)), balls.copy()
     for k in range(len(moments)):
         if not alone[k]:

@@ -50,25 +50,30 @@ def follow(moments: Ints, ahead: bool, steps: int, begins: Ints, ends: Ints, pos
     """Return moments and those to which so many steps lead from them; or from which they lead there, if not `ahead`."""
     moves = len(begins) // 2
     turns = _backward(begins, ends, moves)
+    leaves, arrives = (begins[:moves], ends[moves:]) if ahead else (ends[moves:], begins[:moves])
     out, found = [0][:0], np.zeros(2, np.int64)
+    # After k steps there are at most k + 1 postures to be in, and twice as many middles.
+    here, on = np.empty((2, 2 * (steps + 2)), np.int64)
     for moment in moments:
-        here = [int(moment)]
+        here[0], many = moment, 1
         for _ in range(steps):
-            on = [0][:0]
-            for one in here:
+            more = 0
+            for one in here[:many]:
                 if one >= postures:
-                    there = ends[moves + one - postures] if ahead else begins[one - postures]
-                    if there not in on:  # where clips are gone both ways, ways there double with each move
-                        on.append(there)
+                    there = arrives[one - postures]
+                    if there not in on[:more]:  # where clips are gone both ways, ways there double with each move
+                        on[more] = there
+                        more += 1
                     continue
-                numbers = begins[:moves] if ahead else ends[moves:]
                 for way, (first, last) in enumerate(((0, turns), (turns, moves))):
-                    move = index_of(numbers, first, last, one, found[way])
+                    move = index_of(leaves, first, last, one, found[way])
                     if move >= 0:
                         found[way] = move
-                        on.append(postures + move)
-            here = on
-            out.extend(on)
+                        on[more] = postures + move
+                        more += 1
+            for one in on[:more]:
+                out.append(one)
+            here, on, many = on, here, more
     return np.array(out, np.int64)
 
 

@@ -189,6 +189,13 @@ def test_novelty_weighs_the_moves_of_a_state_ever_more_alike(seed: int, scheme: 
             assert weight == pytest.approx(mixed, abs=1e-12)
 
 
+def test_weights_are_the_callers_own(seed: int) -> None:
+    graph = grammar(seed).transitions
+    before = graph.weights("conditional")
+    graph.weights("conditional")[:] = -1.0
+    np.testing.assert_array_equal(graph.weights("conditional"), before)
+
+
 def test_a_facing_is_visited_as_often_as_any_other(seed: int) -> None:
     body, graph = corpus(seed), grammar(seed).transitions
     np.testing.assert_allclose(graph.visits[body.slice(body.joints)], len(body.states) / TURNS)
