@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 import platformdirs
 from numba.core import bytecode, ccallback, codegen, compiler, serialize, sigutils
 from numba.core.registry import cpu_target
@@ -27,6 +28,7 @@ from numba.extending import register_jitable
 from motionmind.files import make_folder, replace_file
 
 _F = TypeVar("_F", bound=Callable[..., object])
+_Array = TypeVar("_Array", bound=np.ndarray[Any, Any])
 _HERE = Path(__file__).parent
 _HASH = 32  # bytes of a hash
 _MONTH = 30 * 86400.0  # seconds
@@ -68,6 +70,16 @@ def either(function: _F) -> _F:
     """Return `function` for calls from compiled code, where it is compiled, and from Python, where it is not."""
     registered: _F = register_jitable(function)
     return registered
+
+
+def read_only(array: _Array) -> _Array:
+    """Return a view of an array that cannot be written to, as the arrays of a corpus that was loaded.
+
+    For arrays that can be written to, a loop would be compiled once more.
+    """
+    view = array.view()
+    view.setflags(write=False)
+    return view
 
 
 def pointer(function: Callable[..., object], signature: Any, *, keep: bool) -> Any:

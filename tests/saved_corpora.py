@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import atexit
+import ctypes
 import json
 import os
 import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ from motionmind.corpus.entries import Packed
 MANIFEST = {"name": "arms", "clips": []}
 # What changes the disk, as Python reports it before it asks the system.
 CHANGES = {"open", "os.rename", "os.remove", "os.rmdir", "os.mkdir", "os.truncate", "os.chmod"}
+_LET_TRACE, _ANYBODY = 0x59616D61, ctypes.c_ulong(-1)  # PR_SET_PTRACER and PR_SET_PTRACER_ANY of Linux
 
 
 def arrays(seed: int) -> dict[str, NDArray[Any]]:
@@ -86,10 +88,19 @@ def kill_before(change: int) -> None:
     sys.addaudithook(watch)
 
 
+def wait_for_tracer() -> None:
+    """Let any process trace this one, tell its number, and wait for a line."""
+    ctypes.CDLL(None).prctl(_LET_TRACE, _ANYBODY, 0, 0, 0)
+    print(os.getpid(), flush=True)
+    sys.stdin.readline()
+
+
 def main(words: Mapping[str, str]) -> None:
     """Save a corpus in a folder, or rename or delete the one there, and be killed before a change if one is given."""
     if change := int(words.get("change", 0)):
         kill_before(change)
+    if "traced" in words:
+        wait_for_tracer()
     folder, home = Path(words["folder"]), Path(words["folder"]).parents[1]
     match words.get("do", "save"):
         case "save":
@@ -102,12 +113,36 @@ def main(words: Mapping[str, str]) -> None:
 
 def changed(**words: object) -> int:
     """Run `main` in a process that begins with what another one has imported; its exit code, or minus a signal."""
+    starter = _start(**words)
+    return int(starter.readline())
+
+
+def traced(tracer: Sequence[str], **words: object) -> int:
+    """Run `main` as `changed` does, in a process that strace is attached to with these words of its own."""
+    told = _start(traced=True, **words)
+    command = ["strace", "-o", os.devnull, *tracer, "-p", told.readline().strip()]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as strace:
+        assert strace.stderr is not None
+        said = strace.stderr.readline()
+        _say("")
+        code = int(told.readline())
+    assert said.endswith("attached\n"), said
+    return code
+
+
+def _start(**words: object) -> IO[str]:
+    """Start a process that runs `main`; return where it, and the one that it was forked from, print."""
+    _say(json.dumps({name: str(value) for name, value in words.items()}))
+    told = _starter().stdout
+    assert told is not None
+    return told
+
+
+def _say(line: str) -> None:
     starter = _starter()
     assert starter.stdin is not None
-    assert starter.stdout is not None
-    starter.stdin.write(json.dumps({name: str(value) for name, value in words.items()}) + "\n")
+    starter.stdin.write(f"{line}\n")
     starter.stdin.flush()
-    return int(starter.stdout.readline())
 
 
 @cache

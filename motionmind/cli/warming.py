@@ -245,8 +245,6 @@ def learn() -> None:
     engine = Engine.load("ballet")
     clip = engine.corpus.motion(engine.corpus.clips[0])
     trees = build_neighbours(engine.corpus.skeleton, engine.carriage.orientations, engine.carriage.weights)
-    for array in trees.arrays.values():
-        array.setflags(write=False)  # as those of a corpus that was loaded
     _realise(engine, replace(engine.carriage, trees=trees))
     likest_moves(engine.corpus.moves, engine.corpus.rotations, clip.rotations)
     Engine.fit([clip], discretization=make_discretization("codebook", 15.0)).check()

@@ -52,6 +52,7 @@ def balance_rows(
         gravity: metres a second squared.
         fps: frames a second.
     """
+    centre = np.ascontiguousarray(centre)
     lever = np.maximum(height, 0.1)[1:-1] / gravity * fps**2
     pressure = centre.copy()
     pressure[1:-1] -= lever[:, None] * np.diff(centre, 2, axis=0)
@@ -144,7 +145,6 @@ def falls_without(points: Floats, low: Bools, feet: Bools, centre: Floats, overh
     return out
 
 
-@jit
 def nearest_in_support(points: Floats, touches: Bools, wanted: Floats) -> Floats:
     """Return the point [N, 2] of each support that is nearest to a wanted one [N, 2]; that itself where none bears.
 
@@ -156,6 +156,12 @@ def nearest_in_support(points: Floats, touches: Bools, wanted: Floats) -> Floats
         touches: which of them bear the body [N, P].
         wanted: level places [N, 2], metres.
     """
+    # The same order in memory, whoever asks, or it would be compiled for each.
+    return _nearest_in_support(np.ascontiguousarray(points), touches, np.ascontiguousarray(wanted))
+
+
+@jit
+def _nearest_in_support(points: Floats, touches: Bools, wanted: Floats) -> Floats:
     out = wanted.copy()
     angles = np.empty(points.shape[1])
     for t in range(len(points)):

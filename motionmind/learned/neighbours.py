@@ -30,7 +30,7 @@ from motionmind.body.limbs import parts_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.executors.workshop import Workshop
 from motionmind.geometry.distances import squared_distance, squared_turn
-from motionmind.jit import jit
+from motionmind.jit import jit, read_only
 
 MANY = 8000  # moments of a corpus that has no trees, at most: all of them are looked at
 BLOCK = 2048  # moments that are copied at a time
@@ -121,6 +121,8 @@ def build_neighbours(
         sums[number] = total[bounds[:, 1]] - total[bounds[:, 0]]
 
     workshop.do(grow, range(len(parts)))
+    for array in trees.arrays.values():
+        array.setflags(write=False)  # as those that are loaded (see `read_only`)
     return trees
 
 
@@ -141,10 +143,10 @@ def find_near(
     """
     part = trees.parts[number]
     return _find(
-        orientations,
+        read_only(orientations),
         part,
         np.ascontiguousarray(postures[:, part]),
-        trees.codes_of(number),
+        read_only(trees.codes_of(number)),
         trees.order[number],
         trees.bounds,
         trees.centres_of(number),

@@ -16,7 +16,7 @@ from motionmind.body.limbs import parts_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.distances import squared_distance
-from motionmind.jit import jit
+from motionmind.jit import jit, read_only
 from motionmind.learned.carriage import Carriage
 from motionmind.walks.likelihood import (
     FOLLOWS_WITHIN,
@@ -287,7 +287,9 @@ def _part_marginals(
             mass = chosen.weights @ near[-k]
             near[-k] *= chosen.near[k]
             left_out = max(left_out, 1.0 - float(chosen.weights @ near[-k] / mass))
-    marginals = posterior_marginals(*steps_on(chosen, near[0]), chosen.clusters, chosen.weights, near)
+    begins, goals, shares = steps_on(chosen, near[0])
+    steps, weights = (read_only(begins), read_only(goals), read_only(shares)), read_only(chosen.weights)
+    marginals = posterior_marginals(*steps, chosen.clusters, weights, near)
     return marginals, trust(nearest, _way(part, ends, float(times[-1] - times[0]))), left_out
 
 

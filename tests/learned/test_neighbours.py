@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import pytest
 from motionmind.corpus import store
 from motionmind.errors import FormatError
 from motionmind.geometry import rotations as rot
-from motionmind.learned import persistence
+from motionmind.learned import neighbours, persistence
 from motionmind.learned.neighbours import LEAF, Neighbours, build_neighbours, find_near, node_bounds, postures_near
 from motionmind.tween.engine import Engine
 
@@ -95,6 +96,19 @@ def test_postures_near_one_are_no_middles_of_moves(engine: Engine, trees: Neighb
     assert found[0] == 7
     assert len(found) == 5
     assert found.max() < count
+
+
+def test_what_was_learned_just_now_is_searched_by_the_loop_for_what_was_loaded(
+    engine: Engine, trees: Neighbours
+) -> None:
+    shown, loop = engine.carriage.orientations.copy(), cast(Any, neighbours._find)
+    loaded = shown.view()
+    loaded.setflags(write=False)
+    find_near(trees, 0, loaded, shown[:1], 5)
+    known = len(loop.signatures)
+    find_near(replace(trees, codes=trees.codes.copy()), 0, shown, shown[:1], 5)
+    assert len(loop.signatures) == known
+    assert not any(array.flags.writeable for array in trees.arrays.values())
 
 
 def test_trees_are_kept_with_the_corpus_and_checked(engine: Engine, trees: Neighbours, tmp_path: Path) -> None:

@@ -194,6 +194,8 @@ def test_posterior_marginals_are_sums_over_all_walks(seed: int) -> None:
         weight *= np.prod([move[p] for p in pairwise(walked)])
         expected[np.arange(steps + 1), walked] += weight
     expected /= expected.sum(axis=1, keepdims=True)
+    for array in (begins, ends, shares, weights):
+        array.setflags(write=False)  # as a corpus's: for others it would be compiled once more
     np.testing.assert_allclose(posterior_marginals(begins, ends, shares, clusters, weights, near), expected, atol=1e-12)
 
 
@@ -223,7 +225,8 @@ def test_the_mean_of_rotations_takes_each_in_the_hemisphere_of_what_it_is_about(
 
 def test_parts_are_as_far_from_postures_as_their_joints_are_in_the_mean() -> None:
     rng = np.random.default_rng(5)
-    shown, postures = rot.normalise(rng.normal(size=(7, 3, 4))), rot.normalise(rng.normal(size=(2, 3, 4)))
+    shown, postures = rot.normalise(rng.normal(size=(7, 4, 4))), rot.normalise(rng.normal(size=(2, 3, 4)))
+    shown = shown[:, :3]  # of a joint more, as in the corpus: for arrays without gaps it would be compiled once more
     far = squared_distances(shown, np.array([[0, 1], [0, 1], [0, 2]]), 3, postures)
     turns = 4.0 * np.sin(0.5 * rot.angle(shown, postures[:, None])) ** 2
     expected = [turns.mean(axis=-1), turns[..., :2].mean(axis=-1), turns[..., 2]]

@@ -72,7 +72,7 @@ def seen_by_a_browser(browser: Any, path: Path) -> dict[str, Any]:
 def test_a_film_lasts_as_long_as_the_movement_and_has_all_of_it(
     show: Callable[..., Opened], browser: Any, tmp_path: Path
 ) -> None:
-    seconds = 0.777
+    seconds = 0.377  # each frame is drawn for a third of a second
     motion = briefly("the adagio", seconds)
     tab = show(motion, **FINE)
     tab.click("front")

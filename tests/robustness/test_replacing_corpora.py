@@ -66,16 +66,6 @@ def check(folder: Path, before: Callable[[Path], None]) -> None:
     assert sorted(Path(name).name for name in names(folder.parent)) == WHOLE
 
 
-def run(folder: Path, tracer: tuple[str, ...]) -> int:
-    words = [f"folder={folder}", "seed=2"]
-    environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": str(Path(files.__file__).parents[1])}
-    done = subprocess.run(
-        [*tracer, sys.executable, str(PROGRAM), *words], env=environment, capture_output=True, check=False
-    )
-    assert done.returncode in (0, -9, 137), done.stderr.decode()
-    return done.returncode
-
-
 @pytest.mark.parametrize("before", [nothing, saved, saved_by_0_1])
 def test_a_kill_before_any_change_of_the_disk_leaves_old_or_new(mine: Path, before: Callable[[Path], None]) -> None:
     for change in count(1):
@@ -99,17 +89,10 @@ def test_a_kill_at_any_call_of_the_system_leaves_old_or_new(
     for number in count(1):
         shutil.rmtree(mine.parent, ignore_errors=True)
         before(mine)
-        kill = (
-            "strace",
-            "-f",
-            "-o",
-            os.devnull,
-            "-e",
-            f"trace={call}",
-            "-e",
-            f"inject={call}:signal=KILL:when={number}",
-        )
-        ended = run(mine, kill) == 0
+        kill = ("-e", f"trace={call}", "-e", f"inject={call}:signal=KILL:when={number}")
+        code = saved_corpora.traced(kill, folder=mine, seed=2)
+        assert code in (0, -9)
+        ended = code == 0
         check(mine, before)
         if ended:
             break

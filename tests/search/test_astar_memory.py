@@ -171,13 +171,13 @@ def test_when_memory_is_full_a_quarter_of_it_is_forgotten_and_what_is_proven_sta
         for _ in range(300):
             if nodes.tally[astar._HEAPED] == 0 or nodes.tally[astar._FREE] < 8:
                 break
-            node = int(nodes.heap[0])
+            node = nodes.heap[0]  # no integer of Python, for which all of this would be compiled once more
             astar._close(nodes, node)
             astar._expand(case.trellis, case.heuristic, nodes, node, np.inf, astar.SAME, path)
             astar._release(nodes, node)
         if nodes.tally[astar._FREE] >= 8 or nodes.tally[astar._HEAPED] == 0:
             continue
-        current = int(nodes.heap[0])
+        current = nodes.heap[0]
         astar._close(nodes, current)
         before = {float(nodes.key[node]) for node in nodes.heap[: nodes.tally[astar._HEAPED]]}
         assert astar._forget(nodes, current)
@@ -205,11 +205,11 @@ def test_so_many_nodes_as_are_said_to_fit_into_memory_do(count: int) -> None:
 def test_the_open_list_stays_in_order_whatever_is_taken_from_its_middle() -> None:
     rng, count = np.random.default_rng(0), 200
     nodes = astar._root(cases()[0].trellis, 0.0, count)
-    for node in range(1, count):
+    for node in np.arange(1, count, dtype=np.int32):
         nodes.key[node], nodes.f[node], nodes.var[node] = rng.integers(0, 60), rng.integers(0, 5), rng.integers(0, 5)
         astar._open(nodes, node)
     place = {node: (nodes.key[node], -nodes.var[node], nodes.f[node], node) for node in range(count)}
-    for node in rng.permutation(count)[: count - 1]:
+    for node in rng.permutation(count)[: count - 1].astype(np.int32):
         astar._close(nodes, node)
         heap = nodes.heap[: nodes.tally[astar._HEAPED]].tolist()
         assert all(place[heap[(k - 1) // 2]] < place[heap[k]] for k in range(1, len(heap)))
@@ -221,16 +221,16 @@ def test_nodes_are_told_apart_in_whatever_bucket_they_are() -> None:
     """By variable and whole frontier: half of all frontiers are added, and those are found and no others."""
     rng = np.random.default_rng(0)
     trellis = next(case.trellis for case in cases() if case.trellis.chains > 2)
-    nodes, added = astar._root(trellis, 0.0, 2000), set()
+    nodes, added, root = astar._root(trellis, 0.0, 2000), set(), np.int32(0)
     asked = [(var, frontier) for var in range(2 * trellis.chains) for frontier in np.ndindex(*[3] * trellis.chains)]
     for var, frontier in asked:
         if rng.random() < 0.5:
             chain, nodes.frontier[0] = var % trellis.chains, frontier
-            astar._add(nodes, 0, var, frontier[chain], chain, 0.0, 0.0)
+            astar._add(nodes, root, var, frontier[chain], chain, 0.0, 0.0)
             added.add((var, frontier))
     for var, frontier in asked:
         chain, nodes.frontier[0] = var % trellis.chains, frontier
-        found = astar._find(nodes, 0, var, frontier[chain], chain)
+        found = astar._find(nodes, root, var, frontier[chain], chain)
         assert (found >= 0) == ((var, frontier) in added)
         if found >= 0:
             assert (nodes.var[found], tuple(nodes.frontier[found])) == (var, frontier)
