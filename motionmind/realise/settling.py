@@ -132,12 +132,12 @@ def _lowered(skeleton: Skeleton, rotations: Floats, root: Floats, floor: Floats,
         given: frames that must not change [N].
         fps: frames a second.
     """
-    stops, out = np.flatnonzero(given), root.copy()
-    stands = lowest_height(skeleton, rotations[stops], root[stops]) - floor[stops] < TIPTOE * size_of(skeleton)
+    stops, out, low = np.flatnonzero(given), root.copy(), lowest_height(skeleton, rotations, root)
+    stands = (low - floor)[stops] < TIPTOE * size_of(skeleton)
     for (start, end), stand in zip(pairwise(stops), stands[:-1] & stands[1:], strict=True):
         part = slice(start, end + 1)
-        rises = standing_rises(skeleton, rotations[part], root[part]) if stand else None
-        if rises is not None:
+        if stand and standing_rises(skeleton, rotations[part], root[part]) is not None:
+            rises = low[part] - np.linspace(low[start], low[end], end + 1 - start)
             lowered = smoothed(rises, FOLLOWS, fps)
             lowered += cover(np.maximum(rises - lowered - RISES, 0.0), fps)
             out[part, 1] -= np.where(given[part], 0.0, lowered)

@@ -11,7 +11,9 @@ from motionmind.body.limbs import limbs_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import find_support
 from motionmind.footing.balance import ROOM, WALKS, balance_rows, falls_without, is_beyond, walks
-from motionmind.footing.leaning import shift_weight
+from motionmind.footing.feet import bend_legs, find_free_feet, pose
+from motionmind.footing.leaning import STILL, shift_weight
+from motionmind.footing.legs import SOFT
 from motionmind.footing.root import stand
 from motionmind.geometry import rotations as rot
 
@@ -55,6 +57,42 @@ def test_weight_comes_over_the_standing_foot_which_stays(degrees: float) -> None
     np.testing.assert_array_equal(went[ENDS], root[ENDS])
 
 
+@pytest.mark.parametrize("cycles", [1.0, 1.5, 2.0, 3.0])
+@pytest.mark.parametrize("sways", [0.03, 0.05, 0.08])
+def test_nothing_leans_at_rest_though_the_shift_itself_changes_where_it_rests(sways: float, cycles: float) -> None:
+    skeleton, (q, root) = human23(), leg_lifted_aside(30.0)
+    seconds = np.arange(FRAMES) / 30.0
+    sway = sways * np.sin(np.pi * seconds / seconds[-1]) ** 2 * np.sin(2.0 * np.pi * cycles * seconds)
+    feet, off = find_free_feet(skeleton, FREE), np.zeros((FRAMES, 2, 3))
+    off[..., 0] = -sway[:, None]
+    bent = bend_legs(skeleton, pose(skeleton, q), feet, off, np.full((FRAMES, 2), SOFT))
+    bent[ENDS] = q[ENDS]
+    root[:, 0] += sway
+    assert leaning_at_rest(bent, root) > 0
+    assert leaning_at_rest(*shifted(bent, root)) == 0
+
+
+def leaning_at_rest(q: Floats, root: Floats) -> int:
+    """In how many frames between the ends the body leans on one limb, and nothing accelerates."""
+    support = find_support(human23(), q, root, 30.0)
+    assert support.mass is not None
+    assert support.overhang is not None
+    rests = np.zeros(FRAMES, dtype=np.bool_)
+    rests[1:-1] = 900.0 * np.linalg.norm(np.diff(support.mass[:, [0, 2]], 2, axis=0), axis=1) < STILL
+    alone = support.bears.sum(axis=1) == 1
+    return int(np.sum(rests & alone & (support.overhang > ALLOWED + 0.005)))
+
+
+def test_weight_is_shifted_on_the_way_to_elsewhere_too() -> None:
+    """It leans on one leg, and then leaps away: faster by far, in the mean, than who is about to stand."""
+    q, root = leg_lifted_aside(40.0)
+    root[FRAMES * 2 // 3 :, 2] += np.linspace(0.0, 3.0, FRAMES - FRAMES * 2 // 3)
+    assert walks(root, 30.0)
+    before, after = (leaning_at_rest(*each) for each in ((q, root), shifted(q, root)))
+    assert before > 10
+    assert after == 0
+
+
 def test_a_leg_that_is_too_fast_anyhow_does_not_keep_the_weight_where_it_is() -> None:
     """Its joints may turn a tenth faster than they did, and no more."""
     skeleton, (q, root) = human23(), leg_lifted_aside(25.0)
@@ -78,7 +116,7 @@ def test_it_shifts_alike_whatever_the_size() -> None:
     assert np.degrees(rot.angle(same, found).max()) < 3.0
 
 
-def test_a_body_in_balance_or_walking_or_with_a_leg_that_must_not_change_is_let_be() -> None:
+def test_a_body_in_balance_or_on_feet_that_slide_or_with_a_leg_that_must_not_change_is_let_be() -> None:
     for q, root in (
         leg_lifted_aside(0.0),
         (leg_lifted_aside(30.0)[0], leg_lifted_aside(30.0)[1] + np.linspace(0, 3.0, FRAMES)[:, None] * [0, 0, 1]),

@@ -141,6 +141,18 @@ def test_from_one_jump_into_a_higher_one_the_body_lands(ballet: Engine) -> None:
         assert low.max() < max(low[0], low[-1]) + 0.15
 
 
+def test_a_body_whose_floor_is_lower_jumps_from_there_and_does_not_float_up(ballet: Engine) -> None:
+    """As in a recording whose zero is off: the other end, in the air, shows nothing of the floor."""
+    flying = leap(ballet, 1)
+    up = float(lowest_height(BODY, flying.rotations, flying.root)) - 0.03
+    for stands in standing(ballet, 0):
+        a = replace(stands, root=stands.root - [0.0, 0.12, 0.0])
+        b = in_place(replace(flying, root=flying.root - [0.0, up, 0.0]), a)
+        motion = ballet.tween(a, b, fps=FPS).motion
+        low = lowest_height(BODY, motion.rotations, motion.root)
+        assert np.abs(low[: len(low) // 2] - low[0]).max() < 0.03
+
+
 @pytest.mark.parametrize(("seconds", "fps"), [(1.05, 30.0), (2.05, 30.0), (2.0, 7.3)])
 def test_a_given_duration_is_exact_in_the_air_too(ballet: Engine, seconds: float, fps: float) -> None:
     a = posture(ballet, 0)

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionmind.body.contact import lowest_height
+from motionmind.body.contact import contact_points, lowest_height
 from motionmind.body.motion import Motion, Posture
-from motionmind.body.support import find_support
+from motionmind.body.support import find_support, standing_rise, stands_alone
 from motionmind.formats import read_motion
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.retarget import own_skeleton
@@ -187,6 +187,21 @@ def test_from_one_posture_to_the_next_a_body_turns_the_near_way_round(facings: l
     times = tween.motion.insertions[0].times[[0, *tween.passed, tween.moves]]
     np.testing.assert_allclose(np.diff(np.interp(times, tween.motion.times, headings)), turns, atol=3.0)
     assert np.ptp(headings) < np.ptp(np.cumsum([0.0, *turns])) + 40.0
+
+
+def test_a_body_that_stands_on_the_same_leg_at_both_ends_does_not_leave_the_floor() -> None:
+    """It may put down the other foot to turn."""
+    engine = engine_of("ballet")
+    corpus, rng = engine.corpus, np.random.default_rng(0)
+    legs = stands_alone(corpus.skeleton, corpus.rotations, corpus.root)
+    for _ in range(60):
+        ends = []
+        for row in rng.choice(np.flatnonzero(legs == rng.integers(2)), 2, replace=False):
+            places, _ = contact_points(corpus.skeleton, corpus.rotations[row], corpus.root[row])
+            ends.append(replace(posture(engine, row), root=corpus.root[row] - places[places[:, 1].argmin()]))
+        motion = engine.tween(*ends, fps=30.0).motion
+        if not np.isnan(standing_rise(motion.skeleton, motion.rotations, motion.root)):  # nor a step
+            assert lowest_height(motion.skeleton, motion.rotations, motion.root).max() < 0.02
 
 
 @pytest.mark.parametrize(("name", "row"), [("ballet", 0), ("ballet", 500), ("karate", 334)])
