@@ -177,7 +177,7 @@ class _Balls(NamedTuple):
 
     starts: Int32s
     weights: Floats
-    middles: Int32s
+    middles: Ints
     first: Int32s
 
 
@@ -187,7 +187,7 @@ def _balls(trees: Neighbours, number: int) -> _Balls:
     nodes = _cut(trees.bounds, trees.radii[number], trees.weights[number])
     starts, order = np.ascontiguousarray(trees.bounds[nodes, 0]), trees.order[number]
     first = np.searchsorted(starts, np.arange(0, len(order), COARSE), side="right") - 1
-    middles = order[trees.bounds[nodes].sum(axis=1) // 2]
+    middles = order[trees.bounds[nodes].sum(axis=1) // 2].astype(np.int64)
     return _Balls(starts, trees.weights[number][nodes], middles, first.astype(np.int32))
 
 
@@ -278,11 +278,13 @@ def _balls_of(moments: Ints, starts: Int32s, first: Int32s, ranks: Int32s) -> In
         starts, first: of the balls.
         ranks: of the tree [N].
     """
+    places = ranks[
+        moments
+    ]  # all at once, so that memory is waited for once: no look-up begins before the last has ended
     out = np.empty(len(moments), np.int64)
     for k in range(len(moments)):
-        rank = ranks[moments[k]]
-        ball = first[rank // COARSE]
-        while ball + 1 < len(starts) and starts[ball + 1] <= rank:
+        ball = first[places[k] // COARSE]
+        while ball + 1 < len(starts) and starts[ball + 1] <= places[k]:
             ball += 1
         out[k] = ball
     return out
