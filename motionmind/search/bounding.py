@@ -19,6 +19,7 @@ from motionmind.search.polish import polish
 from motionmind.search.trellis import Trellis, states_of
 
 SWEEPS_AT_ONCE = 2  # few, since pruning pays at once: 2 is fastest of 1 to 8 on real ballet
+SWEEPS_AT_FIRST = 3  # of the whole trellis: what one more prunes of it is worth more than polishing the path there
 STALLED = (
     0.9  # message sweeps that leave more than this share of the gap, and of the positions, give way to pair chains
 )
@@ -60,18 +61,20 @@ class Bounded:
         """Cost in nats below which paths are of interest, the best path found among them."""
         return self.cost + HAIR if self.found else self.cost - HAIR
 
-    def update(self, lower_bound: float, chosen: Ints, through: Floats) -> None:
+    def update(self, lower_bound: float, chosen: Ints, through: Floats | None) -> None:
         """Take in a bound, and a path of positions [n], which is polished if it is near the best.
 
         Args:
             lower_bound: of all paths, nats.
             chosen: the path.
-            through: lower bounds on the cost of every path through each position, nats [P].
+            through: lower bounds on the cost of every path through each position, nats [P]; None to leave the path as
+                it is.
         """
-        if path_cost(self.trellis, chosen) <= self.cost + WORTH_POLISHING * abs(self.cost):
+        cost = path_cost(self.trellis, chosen)
+        if through is not None and cost <= self.cost + WORTH_POLISHING * abs(self.cost):
             cost = polish(self.trellis, chosen, through)
-            if cost < self.cost:
-                self.cost, self.states = cost, states_of(self.trellis, chosen)
+        if cost < self.cost:
+            self.cost, self.states = cost, states_of(self.trellis, chosen)
         self.lower_bound = min(max(self.lower_bound, lower_bound), self.cost)
 
     def take(self, cost: float, states: Int32s, lower_bound: float) -> None:
@@ -110,17 +113,21 @@ def tighten(state: Bounded, sweeps: int, attention: Attention) -> None:
 
 def _tighten_by_messages(state: Bounded, sweeps: int, attention: Attention) -> None:
     """Tighten by messages until bound and path meet, the gap between them hardly shrinks, or the search is to end."""
-    messages = trws.no_messages(state.trellis)
-    for done in range(0, sweeps, SWEEPS_AT_ONCE):
-        gap, size = state.cost - state.lower_bound, len(state.trellis.dom)
+    messages, done = trws.no_messages(state.trellis), 0
+    while done < sweeps:
+        first, gap, size = done == 0, state.cost - state.lower_bound, len(state.trellis.dom)
+        at_once = min(SWEEPS_AT_FIRST if first else SWEEPS_AT_ONCE, sweeps - done)
         chosen = np.zeros(len(state.trellis.dom_ptr) - 1, dtype=np.int64)
-        lower_bound, _ = trws.tighten(state.trellis, messages, chosen, min(SWEEPS_AT_ONCE, sweeps - done), state.cost)
-        state.update(lower_bound, chosen, messages.through)
+        lower_bound, _ = trws.tighten(state.trellis, messages, chosen, at_once, state.cost)
+        done += at_once
+        last = done >= sweeps or attention.ends()
+        # The first path only has to prune; it is polished where there will be no other.
+        state.update(lower_bound, chosen, messages.through if last or not first else None)
         if state.closed and not state.found:
             break
         trellis, messages = trws.prune(state.trellis, messages, state.limit)
         state.replace(trellis, Heuristic.of_messages(messages))
-        if state.closed or attention.ends() or (done and state.stalls(gap, size, STALLED)):
+        if state.closed or last or (not first and state.stalls(gap, size, STALLED)):
             break
 
 

@@ -35,6 +35,7 @@ ALONG = 8  # steps for which these are followed
 NEAREST = 24  # of those at the ends, that are followed half the way
 BY_PATH = 16  # moments near every other posture of a path, that are followed to the next
 PATH_LEAVES = 12  # of a tree that are searched for these
+COARSE = 32  # places in a tree's order for which one ball is kept
 KEPT = 32  # look-ups of parts that are kept: of a body of 16 parts those of a guide, and of its motion
 HARDLY = 1e-200  # of the likeliest moment: sums of such chances might be 0
 
@@ -80,16 +81,16 @@ def choose(trees: Neighbours, number: int, carriage: Carriage, ends: Floats, pat
         steps: of a walk.
     """
     near, moments = _near_ends(carriage, number, ends.tobytes(), steps)
-    singles, nodes, ranks = near.ravel(), _balls(trees, number), trees.ranks[number]
+    singles, balls, ranks = near.ravel(), _balls(trees, number), trees.ranks[number]
     chain = carriage.begins, carriage.ends, len(carriage.orientations) - len(carriage.turn)
     if path is not None:
         by_path = find_near(trees, number, carriage.orientations, path[::2], BY_PATH, PATH_LEAVES).ravel()
         singles = np.concatenate([singles, by_path])
         moments = _rising(np.concatenate([moments, by_path, follow(by_path, True, 2, *chain)]))
-    starts = np.ascontiguousarray(trees.bounds[nodes, 0])
-    weights, stands = _shares(moments, singles, starts, trees.weights[number][nodes], ranks, carriage.weights)
+    where = balls.starts, balls.first, ranks
+    weights, stands = _shares(moments, singles, balls.weights, carriage.weights, *where)
     begins, leads, numbers = steps_at(moments, True, *chain)
-    goals = _goals(moments, leads, starts, stands, ranks)
+    goals = _goals(moments, leads, stands, *where)
     clusters = _numbered(carriage.clusters, moments, number)
     of_ends = _among(moments, near[0]), _among(moments, near[1])
     return Chosen(moments, weights, begins, goals, np.asarray(carriage.shares[numbers]), clusters, of_ends)
@@ -157,17 +158,37 @@ def _near_ends(carriage: Carriage, number: int, ends: bytes, steps: int) -> tupl
     postures = np.frombuffer(ends).reshape(2, -1, 4)
     near = find_near(trees, number, carriage.orientations, postures, ENDS)
     chain = carriage.begins, carriage.ends, len(carriage.orientations) - len(carriage.turn)
-    found = [near.ravel(), trees.order[number][trees.bounds[_balls(trees, number)].sum(axis=1) // 2]]
+    found = [near.ravel(), _balls(trees, number).middles]
     for end, ahead in zip(near, (True, False), strict=True):
         found.append(follow(end, ahead, ALONG, *chain))
         found.append(follow(end[:NEAREST], ahead, steps // 2 + 1, *chain))
     return near, _rising(np.concatenate(found))
 
 
+class _Balls(NamedTuple):
+    """The balls that a part's tree is cut into, in its order.
+
+    Attributes:
+        starts: where they begin in that order [B].
+        weights: sums of their moments' weights [B].
+        middles: a moment of each [B].
+        first: the ball that each COARSE-th moment of that order is in: the ball of any is that or soon after.
+    """
+
+    starts: Int32s
+    weights: Floats
+    middles: Ints
+    first: Int32s
+
+
 @_Kept
-def _balls(trees: Neighbours, number: int) -> Ints:
-    """Return the nodes of the balls that a part's tree is cut into, in its order [B]."""
-    return _cut(trees.bounds, trees.radii[number], trees.weights[number])
+def _balls(trees: Neighbours, number: int) -> _Balls:
+    """Return the balls that a part's tree is cut into."""
+    nodes = _cut(trees.bounds, trees.radii[number], trees.weights[number])
+    starts, order = np.ascontiguousarray(trees.bounds[nodes, 0]), trees.order[number]
+    first = np.searchsorted(starts, np.arange(0, len(order), COARSE), side="right") - 1
+    middles = order[trees.bounds[nodes].sum(axis=1) // 2].astype(np.int64)
+    return _Balls(starts, trees.weights[number][nodes], middles, first.astype(np.int32))
 
 
 def _rising(numbers: Ints) -> Ints:
@@ -203,19 +224,18 @@ def _among(moments: Ints, some: Ints) -> Bools:
 
 @jit
 def _shares(
-    moments: Ints, singles: Ints, starts: Int32s, balls: Floats, ranks: Int32s, counts: Floats
+    moments: Ints, singles: Ints, balls: Floats, counts: Floats, starts: Int32s, first: Int32s, ranks: Int32s
 ) -> tuple[Floats, Ints]:
     """Return the weights of chosen moments [n], and the first of them that stands for each ball [B].
 
     Args:
         moments: their numbers, rising [n].
         singles: those of them that stand for themselves.
-        starts: where the balls begin in the tree's order [B], rising.
-        balls: their weights [B].
-        ranks: of the tree [N].
+        balls: weights of the balls [B].
         counts: weights of all moments [N].
+        starts, first, ranks: of `_balls_of`.
     """
-    ball, alone = _balls_of(moments, starts, ranks), _among(moments, singles)
+    ball, alone = _balls_of(moments, starts, first, ranks), _among(moments, singles)
     shared, rest = np.zeros(len(balls)), balls.copy()
     for k in range(len(moments)):
         if not alone[k]:
@@ -238,21 +258,36 @@ def _shares(
 
 
 @jit
-def _goals(moments: Ints, leads: Ints, starts: Int32s, stands: Ints, ranks: Int32s) -> Ints:
+def _goals(moments: Ints, leads: Ints, stands: Ints, starts: Int32s, first: Int32s, ranks: Int32s) -> Ints:
     """Return which of the chosen moments [n] each step leads to [m]: its own, or what stands for the ball of that."""
     out, at = np.empty(len(leads), np.int64), -1
     for k in range(len(leads)):
         out[k] = index_of(moments, 0, len(moments), leads[k], at)
         at = max(at, out[k])
     others = np.flatnonzero(out < 0)
-    out[others] = stands[_balls_of(leads[others], starts, ranks)]
+    out[others] = stands[_balls_of(leads[others], starts, first, ranks)]
     return out
 
 
 @jit
-def _balls_of(moments: Ints, starts: Int32s, ranks: Int32s) -> Ints:
-    """Return the ball that each moment is in [n], of those that begin at some places in the tree's order [B]."""
-    return np.asarray(np.searchsorted(starts, ranks[moments], side="right") - 1)
+def _balls_of(moments: Ints, starts: Int32s, first: Int32s, ranks: Int32s) -> Ints:
+    """Return the ball that each moment is in [n].
+
+    Args:
+        moments: their numbers.
+        starts, first: of the balls.
+        ranks: of the tree [N].
+    """
+    places = ranks[
+        moments
+    ]  # all at once, so that memory is waited for once: no look-up begins before the last has ended
+    out = np.empty(len(moments), np.int64)
+    for k in range(len(moments)):
+        ball = first[places[k] // COARSE]
+        while ball + 1 < len(starts) and starts[ball + 1] <= places[k]:
+            ball += 1
+        out[k] = ball
+    return out
 
 
 @jit

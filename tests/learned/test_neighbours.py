@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 from motionmind.corpus import store
 from motionmind.errors import FormatError
 from motionmind.geometry import rotations as rot
+from motionmind.geometry.distances import squared_distance
 from motionmind.learned import neighbours, persistence
 from motionmind.learned.neighbours import LEAF, Neighbours, build_neighbours, find_near, node_bounds, postures_near
 from motionmind.tween.engine import Engine
@@ -78,6 +80,43 @@ def test_in_all_leaves_the_nearest_are_found_and_in_a_few_nearly(
             nearly.append(off[few[0, 0]] / off.min())
     assert np.median(nearly) < 1.01
     assert np.quantile(nearly, 0.9) < 1.5
+
+
+@pytest.mark.parametrize("alike", [False, True])
+def test_leaves_are_searched_in_the_order_of_what_they_promise(trees: Neighbours, alike: bool) -> None:
+    """As by a heap of pairs, where many promise the same, too."""
+    rng, bounds = np.random.default_rng(1), trees.bounds
+    for number, part in enumerate(trees.parts):
+        centres, radii = trees.centres_apart[number], trees.radii[number]
+        if alike:
+            centres, radii = centres.copy()[rng.integers(2, size=len(bounds))], np.full(len(bounds), 0.1)
+        posture = rot.exp(rng.normal(0.0, 0.5, (len(part), 3)))
+        heap, expected = [(0.0, 0)], []
+        while heap:
+            _, node = heapq.heappop(heap)
+            if 2 * node + 2 >= len(bounds):
+                expected.append(node)
+                continue
+            for child in (2 * node + 1, 2 * node + 2):
+                away = np.sqrt(squared_distance(centres[child], posture) / len(part))
+                heapq.heappush(heap, (away - neighbours.INSIDE * radii[child], child))
+        for leaves in (1, 5, len(expected)):
+            assert neighbours._search(posture, bounds, centres, radii, leaves).tolist() == expected[:leaves]
+
+
+def test_centres_are_copied_for_searches_unless_they_are_large(
+    engine: Engine, trees: Neighbours, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copied, large, shown = replace(trees), replace(trees), engine.carriage.orientations
+    assert len(copied.centres_apart) == len(trees.parts)
+    monkeypatch.setattr(neighbours, "COPIED", 0)
+    for number in range(len(trees.parts)):
+        np.testing.assert_array_equal(copied.centres_apart[number], trees.centres_of(number))
+        assert not np.shares_memory(copied.centres_apart[number], trees.centres)
+        assert np.shares_memory(large.centres_apart[number], trees.centres)
+        for posture in shown[:3]:
+            found = [find_near(one, number, shown, posture[None], 9, 4).tolist() for one in (copied, large)]
+            assert found[0] == found[1]
 
 
 def test_codes_are_of_what_the_moments_of_each_leaf_show(engine: Engine, trees: Neighbours) -> None:

@@ -230,6 +230,18 @@ def test_the_best_path_stays_in_what_is_left_of_its_trellis(kind: dict[str, bool
     assert pruned > 20
 
 
+@pytest.mark.parametrize(("sweeps", "ends"), [(20, True), (1, False), (bounding.SWEEPS_AT_FIRST, False), (20, False)])
+def test_whenever_bounding_ends_no_chain_or_moment_of_its_path_can_be_bettered(
+    kind: dict[str, bool], sweeps: int, ends: bool
+) -> None:
+    """That of the first round, too, which is polished only if it is the last."""
+    for trellis, _, seed in bodies(60, kind):
+        state = bounding.Bounded(trellis, Heuristic.of_messages(trws.no_messages(trellis)), np.inf)
+        bounding.tighten(state, sweeps, Attention(lambda: ends))
+        path = locate(trellis, state.states)
+        assert polish(trellis, path, np.full(len(trellis.dom), -np.inf)) >= state.cost - ROUNDING, seed
+
+
 @pytest.mark.parametrize("sweeps", [1, 5])
 def test_under_messages_alone_the_search_finds_the_optimum_too(sweeps: int, kind: dict[str, bool]) -> None:
     for trellis, optimum, seed in bodies(60, kind):

@@ -109,6 +109,17 @@ def test_what_is_chosen_stands_for_the_whole_corpus(engine: Engine, carriage: Ca
         assert all(len(np.unique(same[chosen.clusters == k])) == 1 for k in range(chosen.clusters.max() + 1))
 
 
+def test_each_moment_is_in_the_ball_of_its_place(carriage: Carriage) -> None:
+    trees, moments = carriage.trees, np.arange(len(carriage.weights))
+    assert trees is not None
+    for number in range(len(trees.parts)):
+        balls = sparse._balls(trees, number)
+        found = sparse._balls_of(moments, balls.starts, balls.first, trees.ranks[number])
+        assert set(found) == set(range(len(balls.starts)))
+        np.testing.assert_allclose(np.bincount(found, carriage.weights), balls.weights)
+        np.testing.assert_array_equal(found[balls.middles], np.arange(len(balls.starts)))
+
+
 def test_walks_lead_on_from_where_all_performances_of_a_dance_end(
     engine: Engine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
