@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,19 +157,8 @@ def find_near(
         count: how many moments for each posture.
         leaves: how many to search.
     """
-    part = trees.parts[number]
-    return _find(
-        read_only(orientations),
-        part,
-        np.ascontiguousarray(postures[:, part]),
-        read_only(trees.codes_of(number)),
-        trees.order[number],
-        trees.bounds,
-        trees.centres_apart[number],
-        trees.radii[number],
-        count,
-        leaves,
-    )
+    tree = _tree_of(trees, number)
+    return _find(read_only(orientations), tree, np.ascontiguousarray(postures[:, tree.part]), count, leaves)
 
 
 def postures_near(
@@ -185,19 +174,35 @@ def postures_near(
         below: number of the corpus's postures.
         leaves: how many to search.
     """
-    part = trees.parts[0]
-    return _find_below(
-        orientations,
-        part,
-        np.ascontiguousarray(posture[part]),
-        trees.codes_of(0),
-        trees.order[0],
+    tree = _tree_of(trees, 0)
+    return _find_below(read_only(orientations), tree, np.ascontiguousarray(posture[tree.part]), count, below, leaves)
+
+
+class _Tree(NamedTuple):
+    """The tree of one part, as loops take it.
+
+    Attributes:
+        part: the chains of the part [m].
+        codes, order, bounds, centres, radii: of `Neighbours`, those of the part.
+    """
+
+    part: Ints
+    codes: Int8s
+    order: Int32s
+    bounds: Int32s
+    centres: Singles
+    radii: Floats
+
+
+def _tree_of(trees: Neighbours, number: int) -> _Tree:
+    """Return the tree of one part."""
+    return _Tree(
+        trees.parts[number],
+        read_only(trees.codes_of(number)),
+        trees.order[number],
         trees.bounds,
-        trees.centres_apart[0],
-        trees.radii[0],
-        count,
-        leaves,
-        below,
+        trees.centres_apart[number],
+        trees.radii[number],
     )
 
 
@@ -279,47 +284,21 @@ def _encode(shown: Singles, bounds: Int32s, codes: Int8s) -> None:
 
 
 @jit
-def _find(
-    orientations: Floats,
-    part: Ints,
-    postures: Floats,
-    codes: Int8s,
-    order: Int32s,
-    bounds: Int32s,
-    centres: Singles,
-    radii: Floats,
-    count: int,
-    leaves: int,
-) -> Ints:
+def _find(orientations: Floats, tree: _Tree, postures: Floats, count: int, leaves: int) -> Ints:
     """Return moments near each posture of a part [K, m, 4]: [K, n]."""
-    leaf = (len(bounds) + 1) // 2
-    least = (bounds[-leaf:, 1] - bounds[-leaf:, 0]).min()  # so that each posture has as many
-    count = min(count, leaves * least if leaves < leaf else len(order))
+    leaf = (len(tree.bounds) + 1) // 2
+    least = (tree.bounds[-leaf:, 1] - tree.bounds[-leaf:, 0]).min()  # so that each posture has as many
+    count = min(count, leaves * least if leaves < leaf else len(tree.order))
     found = np.empty((len(postures), count), np.int64)
     for k in range(len(postures)):
-        near = _search(postures[k], bounds, centres, radii, leaves)
-        moments, off = _leaves(orientations, part, postures[k], codes, order, bounds, near)
-        found[k] = _nearest(moments, off, count)
+        found[k] = _nearest(*_leaves(orientations, tree, postures[k], leaves), count)
     return found
 
 
 @jit
-def _find_below(
-    orientations: Floats,
-    part: Ints,
-    posture: Floats,
-    codes: Int8s,
-    order: Int32s,
-    bounds: Int32s,
-    centres: Singles,
-    radii: Floats,
-    count: int,
-    leaves: int,
-    below: int,
-) -> Ints:
+def _find_below(orientations: Floats, tree: _Tree, posture: Floats, count: int, below: int, leaves: int) -> Ints:
     """Return moments near a posture of a part [m, 4] whose numbers are below one, so many or all that are found [n]."""
-    near = _search(posture, bounds, centres, radii, leaves)
-    moments, off = _leaves(orientations, part, posture, codes, order, bounds, near)
+    moments, off = _leaves(orientations, tree, posture, leaves)
     some = np.flatnonzero(moments < below)
     return _nearest(moments[some], off[some], min(count, len(some)))
 
@@ -392,20 +371,20 @@ def _is_before(promise: float, node: int, other: float, its: int) -> bool:
 
 
 @jit
-def _leaves(
-    orientations: Floats, part: Ints, posture: Floats, codes: Int8s, order: Int32s, bounds: Int32s, leaves: Ints
-) -> tuple[Int32s, Singles]:
-    """Return the moments of some leaves, and their squared distances from a posture of the part [m, 4], in any unit."""
-    found, squared, many = np.empty(len(leaves) * LEAF, np.int32), np.empty(len(leaves) * LEAF, np.float32), 0
-    sought, width = (_WHOLE * posture).astype(np.float32), 4 * len(part)
-    for node in leaves:
-        start, stop = bounds[node]
+def _leaves(orientations: Floats, tree: _Tree, posture: Floats, leaves: int) -> tuple[Int32s, Singles]:
+    """Return the moments of so many leaves, those that promise most for a posture of the part [m, 4], and their squared
+    distances from it, in any unit."""
+    best, many = _search(posture, tree.bounds, tree.centres, tree.radii, leaves), 0
+    found, squared = np.empty(len(best) * LEAF, np.int32), np.empty(len(best) * LEAF, np.float32)
+    sought, width = (_WHOLE * posture).astype(np.float32), 4 * len(tree.part)
+    for node in best:
+        start, stop = tree.bounds[node]
         off = squared[many : many + stop - start]
-        if len(codes):
-            _measure(codes[width * start : width * stop].reshape(width, stop - start), sought, off)
+        if len(tree.codes):
+            _measure(tree.codes[width * start : width * stop].reshape(width, stop - start), sought, off)
         else:
-            _measure_apart(orientations, part, posture, order[start:stop], off)
-        found[many : many + stop - start] = order[start:stop]
+            _measure_apart(orientations, tree.part, posture, tree.order[start:stop], off)
+        found[many : many + stop - start] = tree.order[start:stop]
         many += stop - start
     return found[:many], squared[:many]
 
