@@ -1,4 +1,5 @@
-"""Settling: limbs that passed through each other are kept apart, and the weight is shifted over what bears it.
+"""Settling: limbs that passed through each other are kept apart, the weight is shifted over what bears it, and what has
+risen or sunk by that is put back on the floor.
 
 It is done to a movement whose feet have their places, and again where its clock has slowed: its frames fall elsewhere.
 """

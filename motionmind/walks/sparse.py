@@ -278,9 +278,7 @@ def _balls_of(moments: Ints, starts: Int32s, first: Int32s, ranks: Int32s) -> In
         starts, first: of the balls.
         ranks: of the tree [N].
     """
-    places = ranks[
-        moments
-    ]  # all at once, so that memory is waited for once: no look-up begins before the last has ended
+    places = ranks[moments]  # all at once: in the loop, each look-up would wait for the one before
     out = np.empty(len(moments), np.int64)
     for k in range(len(moments)):
         ball = first[places[k] // COARSE]
