@@ -7,6 +7,7 @@ import random
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -80,6 +81,23 @@ def pytest_sessionstart(session: pytest.Session) -> None:
         environment = os.environ | {"PYTHONDONTWRITEBYTECODE": ""}
         with subprocess.Popen(collect, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL):
             subprocess.run([sys.executable, "-m", "motionmind", "warm"], capture_output=True, check=False)
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """Start half as many workers again as there are processors, for tests of pages wait half of their time."""
+    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return processors + (processors + 1) // 2
+
+
+@pytest.hookimpl(trylast=True)  # when the order is a random one
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Let workers begin with the files that wait for pages, and go on with those of most tests: they end together."""
+    if hasattr(config, "workerinput"):
+        pages, sizes = set(), Counter(item.path for item in items)
+        for item in items:
+            if "browser" in getattr(item, "fixturenames", ()):
+                pages.add(item.path)
+        items.sort(key=lambda item: (item.path not in pages, -sizes[item.path]))
 
 
 def pytest_collection_finish() -> None:
