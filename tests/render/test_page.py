@@ -759,6 +759,31 @@ def test_keys_turn_the_camera_as_dragging_does(show: Callable[..., Opened]) -> N
     assert tab.get("document.querySelectorAll('#views [aria-pressed=true]').length") == 0
 
 
+def test_pictures_are_drawn_while_it_plays_and_none_while_it_rests(show: Callable[..., Opened]) -> None:
+    tab = show(still(3))
+    tab.get(
+        "window.asked = 0; const ask = requestAnimationFrame; "
+        "window.requestAnimationFrame = (draw) => { asked++; return ask(draw) }; 0"
+    )
+
+    def asked_at_rest() -> int:
+        seen, before = int(tab.get("asked")), -1
+        for _ in range(50):
+            if seen == before:
+                return seen
+            tab.page.wait_for_timeout(200)
+            seen, before = int(tab.get("asked")), seen
+        raise AssertionError("it never rests")
+
+    before = asked_at_rest()
+    tab.press("1")
+    assert asked_at_rest() > before
+    tab.press("Space")
+    tab.wait(f"asked > {before + 20}")
+    tab.press("Space")
+    asked_at_rest()
+
+
 def test_a_part_has_only_the_ghosts_that_it_holds(show: Callable[..., Opened]) -> None:
     motion = bridged()
     for part, ends in ((motion, 2), (motion.slice(3, 12), 1), (motion.slice(3, 6), 0)):

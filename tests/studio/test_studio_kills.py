@@ -70,7 +70,7 @@ def test_a_kill_loses_at_most_the_edit_in_flight(tmp_path: Path) -> None:
             writers.stdin.write("another\n")
             writers.stdin.flush()
             writer, *said = [writers.stdout.readline() for _ in range(5)]  # what was there, and three edits more
-            time.sleep(0.2 * rng.random())
+            time.sleep(0.05 * rng.random())  # dozens of edits: more only make the file long to read
             os.kill(int(writer), signal.SIGKILL)
             while (line := writers.stdout.readline()) != "ended\n":
                 said.append(line)
@@ -85,7 +85,7 @@ def test_a_kill_loses_at_most_the_edit_in_flight(tmp_path: Path) -> None:
 
 def test_a_server_that_is_killed_has_all_that_it_answered(tmp_path: Path) -> None:
     path, answered = tmp_path / "piece.motionmind", 0
-    for _ in range(3):
+    for _ in range(2):
         with running(path, home=tmp_path) as (process, client):
             assert len(client.project()["piece"]["blocks"]) in (answered, answered + 1)
             answered = len(client.project()["piece"]["blocks"])

@@ -216,7 +216,7 @@ def zeros(count: int) -> bytes:
 
 
 HOSTILE: dict[str, tuple[str, Callable[[], bytes]]] = {
-    "garbage": ("noise.bvh", lambda: np.random.default_rng(0).bytes(50 * 2**20)),
+    "garbage": ("noise.bvh", lambda: np.random.default_rng(0).bytes(10 * 2**20)),
     "garbage in an archive": ("noise.npz", lambda: np.random.default_rng(0).bytes(2**20)),
     "an array of gigabytes": ("bomb.npz", lambda: zeros(2**28)),
     "JSON nested deep": ("deep.json", lambda: b"[" * 10**6),

@@ -6,12 +6,12 @@ import { Filming } from "motionmind/filming";
 import { listen, writeKeys } from "motionmind/keys";
 import { writeLegend } from "motionmind/legend";
 import { MOMENT, Motion } from "motionmind/motion";
+import { Pictures } from "motionmind/pictures";
 import { Player } from "motionmind/player";
 import { Stage } from "motionmind/stage";
 import { Theme } from "motionmind/theme";
 import { Timeline } from "motionmind/timeline";
 
-const LONGEST = 0.25; // seconds between pictures; a page that was hidden goes on where it was
 const VIEWS = ["front", "side", "top", "quarter"];
 const ROOMY = { width: 680, height: 380 }; // CSS pixels of a stage on which the legend is open at first
 
@@ -21,10 +21,14 @@ function start() {
   const data = JSON.parse($("data").textContent);
   const motion = new Motion(data);
   const body = new Body(data.skeleton, data.body);
-  let stale = true; // the picture is not that of now
-  const stage = makeStage(motion, body, data.colours, () => (stale = true));
-  if (!stage) return;
   const player = new Player(motion);
+  const pictures = new Pictures(player, () => {
+    if (filming.running) return;
+    stage.show(player.time, ghosts());
+    stage.render(player.playing);
+  });
+  const stage = makeStage(motion, body, data.colours, () => pictures.ask());
+  if (!stage) return;
   const timeline = new Timeline($("timeline"), player, data.colours);
   const moving = motion.length > 1;
   for (const element of document.querySelectorAll(".moving")) element.hidden = !moving;
@@ -35,7 +39,7 @@ function start() {
   writeKeys($("sheet").querySelector("dl"), motion);
 
   const refresh = () => {
-    stale = true;
+    pictures.ask();
     describe(player);
   };
   player.addEventListener("change", refresh);
@@ -44,7 +48,7 @@ function start() {
     stage.dark = theme.dark;
     timeline.draw();
     $("dark").setAttribute("aria-pressed", String(theme.dark));
-    stale = true;
+    pictures.ask();
   };
   theme.addEventListener("change", colour);
   colour();
@@ -52,21 +56,9 @@ function start() {
   const ghosts = () => ({ ends: pressed("ends"), onion: pressed("onion") ? Number($("apart").value) : 0 });
   const filming = new Filming($("film"), $("filming"), stage, player, ghosts);
 
-  let last = performance.now();
-  const draw = (now) => {
-    player.advance(Math.min((now - last) / 1000, LONGEST));
-    last = now;
-    if (stale && !filming.running) {
-      stale = false;
-      stage.show(player.time, ghosts());
-      stage.render(player.playing);
-    }
-    requestAnimationFrame(draw);
-  };
   timeline.update();
   refresh();
   if (!matchMedia("(prefers-reduced-motion: reduce)").matches) player.play();
-  requestAnimationFrame(draw);
 
   window.motionmind = { motion, body, player, stage, theme, timeline, solids: (frame) => solids(motion, body, frame) };
 }

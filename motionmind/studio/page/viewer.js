@@ -1,10 +1,10 @@
 /** The viewer: a movement, or two beside each other, from where the camera is. It knows no edits. */
 
+import { Pictures } from "motionmind/pictures";
 import { Player } from "motionmind/player";
 import { Stage } from "motionmind/stage";
 import { Theme } from "motionmind/theme";
 
-const LONGEST = 0.25; // seconds between pictures; a page that was hidden goes on where it was
 const STRAYED = 0.1; // share of its reach by which a movement may lead elsewhere before the camera follows
 const STILL = { length: 1, start: 0, end: 0, times: [0], frameAt: () => 0 }; // as long as there is nothing to show
 
@@ -20,6 +20,8 @@ function stageIn(half, motion, changed) {
 
 /** Fires "show" when another movement is shown, and "change" when something beside the time has changed. */
 export class Viewer extends EventTarget {
+  #covered = false;
+
   constructor() {
     super();
     this.theme = new Theme();
@@ -31,7 +33,6 @@ export class Viewer extends EventTarget {
     this.title = "";
     this.ghosts = { ends: true, onion: 0 };
     this.isHome = true;
-    this.covered = false; // whether something else is shown over it
     /** @type {any} */
     this.motion = undefined;
     /** @type {any} */
@@ -44,12 +45,19 @@ export class Viewer extends EventTarget {
     this.other = undefined;
     /** @type {{middle: any, reach: number} | undefined} where the movement led when the camera was set up */
     this.framed = undefined;
-    this.fresh = false;
-    this.player.addEventListener("change", () => this.stale());
+    this.pictures = new Pictures(this.player, () => this.#draw());
     this.theme.addEventListener("change", () => this.#colour());
     this.#colour();
-    this.last = performance.now();
-    requestAnimationFrame((now) => this.#draw(now));
+  }
+
+  /** Whether something else is shown over it. */
+  get covered() {
+    return this.#covered;
+  }
+
+  set covered(value) {
+    this.#covered = value;
+    this.stale();
   }
 
   /**
@@ -95,7 +103,7 @@ export class Viewer extends EventTarget {
 
   /** Have another picture drawn. */
   stale() {
-    this.fresh = false;
+    this.pictures.ask();
   }
 
   /** Look from "front", "side", "top" or "quarter". @param {string} from */
@@ -187,21 +195,15 @@ export class Viewer extends EventTarget {
     this.stale();
   }
 
-  /** @param {number} now */
-  #draw(now) {
-    this.player.advance(Math.min((now - this.last) / 1000, LONGEST));
-    this.last = now;
-    if (!this.fresh && this.stage && this.motion && !this.covered) {
-      this.fresh = true;
-      this.stage.show(this.player.time, this.ghosts);
-      this.stage.render(this.player.playing);
-      if (this.beside) {
-        this.other.show(this.player.time, this.ghosts);
-        this.other.render(this.player.playing);
-      }
-      this.dispatchEvent(new Event("draw"));
+  #draw() {
+    if (!this.stage || !this.motion || this.covered) return;
+    this.stage.show(this.player.time, this.ghosts);
+    this.stage.render(this.player.playing);
+    if (this.beside) {
+      this.other.show(this.player.time, this.ghosts);
+      this.other.render(this.player.playing);
     }
-    requestAnimationFrame((next) => this.#draw(next));
+    this.dispatchEvent(new Event("draw"));
   }
 }
 

@@ -71,7 +71,7 @@ class Attractor {
     this.camera.position.set(0, 0, AWAY);
     this.half = [0, 1].map((i) => sheets.array.reduce((most, value, at) => (at % 3 === i ? Math.max(most, Math.abs(value)) : most), 0));
     this.controls = new OrbitControls(this.camera, $("space"));
-    this.controls.addEventListener("change", () => (this.stale = true));
+    this.controls.addEventListener("change", () => this.#ask());
     player.addEventListener("change", () => this.follow());
     const colour = () => {
       const { paper } = theme.dark ? PAPERS.dark : PAPERS.light;
@@ -81,7 +81,7 @@ class Attractor {
         inked(ink, colour);
         $("attractor").style.setProperty(`--${name}`, `rgb(${colour.join()})`);
       }
-      this.stale = true;
+      this.#ask();
     };
     theme.addEventListener("change", colour);
     colour();
@@ -90,11 +90,6 @@ class Attractor {
       if (orbit(event, this.controls)) event.stopPropagation(); // or the body would turn too
     });
     this.follow();
-    const draw = () => {
-      if (this.stale) this.#draw();
-      requestAnimationFrame(draw);
-    };
-    requestAnimationFrame(draw);
   }
 
   /** The point of the variation that was last reached, and how far the movement has come to the next one, 0 to 1. */
@@ -141,11 +136,16 @@ class Attractor {
     }
     const jump = this.jumps.has(n) ? ` · jumped from ${this.order[n - 1]}` : "";
     $("reading").textContent = `posture ${posture}, at ${n} of ${this.order.length - 1}${jump}`;
-    this.stale = true;
+    this.#ask();
+  }
+
+  /** Have the next picture drawn. */
+  #ask() {
+    this.asked ||= requestAnimationFrame(() => this.#draw());
   }
 
   #draw() {
-    this.stale = false;
+    this.asked = 0;
     this.renderer.render(this.scene, this.camera);
     const { clientWidth: width, clientHeight: height } = $("room");
     const seen = new Vector3().fromArray(this.site.geometry.attributes.position.array).project(this.camera);
@@ -161,7 +161,7 @@ class Attractor {
     const needed = AIR * Math.max(this.half[1], (this.half[0] * height) / width);
     this.camera.zoom = (AWAY * Math.tan((FIELD * Math.PI) / 360)) / needed;
     this.camera.updateProjectionMatrix();
-    this.stale = true;
+    this.#ask();
   }
 }
 

@@ -19,7 +19,6 @@ export function Centre({ studio }) {
   const shown = useChange(desk, () => desk.shown);
   useEffect(() => {
     studio.viewer.covered = shown;
-    if (!shown) studio.viewer.stale();
     return () => (studio.viewer.covered = false);
   }, [shown]);
   return shown && html`<${Alternatives} studio=${studio} />`;

@@ -1,6 +1,7 @@
 /** Up to four movements in step, drawn by one renderer: a browser has few, and they are seen from one camera. */
 
 import { MOMENT } from "motionmind/motion";
+import { Pictures } from "motionmind/pictures";
 import { Player } from "motionmind/player";
 import { Stage } from "motionmind/stage";
 import { Vector3 } from "three";
@@ -47,11 +48,8 @@ export class Quartet {
     this.marked = [];
     /** @type {any} */
     this.player = new Player(/** @type {any} */ ({ length: 1, start: 0, end: 0, times: [0], frameAt: () => 0 }));
-    this.player.addEventListener("change", () => (this.fresh = false));
-    this.fresh = false;
-    this.last = performance.now();
+    this.pictures = new Pictures(this.player, () => this.#draw());
     this.ended = false;
-    requestAnimationFrame((now) => this.#draw(now));
   }
 
   /** Play these movements. @param {any[]} motions @param {boolean} still whether they wait to be played */
@@ -65,27 +63,27 @@ export class Quartet {
     else {
       const canvas = document.createElement("canvas");
       this.room.append(canvas);
-      this.stage = new Stage(canvas, /** @type {any} */ (all), body, colours, () => (this.fresh = false));
+      this.stage = new Stage(canvas, /** @type {any} */ (all), body, colours, () => this.pictures.ask());
       this.stage.dark = this.dark;
     }
     this.stage.look(this.stage.view ?? "quarter");
     this.player.motion = motions.reduce((one, other) => (other.end > one.end ? other : one));
     if (first) this.player.seek(0);
     if (first && !still) this.player.play();
-    this.fresh = false;
+    this.pictures.ask();
   }
 
   /** @param {boolean} dark */
   colour(dark) {
     this.dark = dark;
     if (this.stage) this.stage.dark = dark;
-    this.fresh = false;
+    this.pictures.ask();
   }
 
   /** Draw onto a canvas, and let it turn all of them. @param {number} index @param {HTMLCanvasElement} canvas */
   onto(index, canvas) {
     this.pens[index] = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", { alpha: false }));
-    this.fresh = false;
+    this.pictures.ask();
   }
 
   /** Turn all pictures. @param {number} across share of a picture's width @param {number} along share of its height */
@@ -130,11 +128,12 @@ export class Quartet {
   /** Mark a joint of one of them, or none. @param {number} index @param {number | null} joint */
   mark(index, joint) {
     this.marked[index] = joint;
-    this.fresh = false;
+    this.pictures.ask();
   }
 
   end() {
     this.ended = true;
+    this.player.pause();
     this.stage?.renderer.dispose();
     this.stage?.renderer.forceContextLoss();
   }
@@ -144,16 +143,9 @@ export class Quartet {
     return Math.min(this.player.time, motion.end - MOMENT / 10);
   }
 
-  /** @param {number} now */
-  #draw(now) {
-    if (this.ended) return;
-    this.player.advance(Math.min((now - this.last) / 1000, 0.25));
-    this.last = now;
-    if (!this.fresh && this.stage && this.room.clientWidth > 0) {
-      this.fresh = true;
-      this.motions.forEach((motion, i) => this.#picture(motion, i));
-    }
-    requestAnimationFrame((next) => this.#draw(next));
+  #draw() {
+    if (this.ended || !this.stage || this.room.clientWidth === 0) return;
+    this.motions.forEach((motion, i) => this.#picture(motion, i));
   }
 
   /** @param {any} motion @param {number} index */

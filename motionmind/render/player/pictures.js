@@ -1,0 +1,37 @@
+/** When pictures are drawn: one after another while time goes on, one when something has changed, none while all rests. */
+
+const LONGEST = 0.25; // seconds between pictures; a page that was hidden goes on where it was
+
+export class Pictures {
+  #asked = false;
+  /** @type {number | undefined} when the picture before was drawn, if another was to follow at once */
+  #last;
+
+  /**
+   * @param {Player} player goes on by the time from one picture to the next; whenever it changes, another is drawn
+   * @param {() => void} draw
+   */
+  constructor(player, draw) {
+    this.player = player;
+    this.draw = draw;
+    player.addEventListener("change", () => this.ask());
+  }
+
+  /** Have another picture drawn. */
+  ask() {
+    if (this.#asked) return;
+    this.#asked = true;
+    this.#last ??= performance.now(); // whoever rested begins now
+    requestAnimationFrame((now) => this.#next(now));
+  }
+
+  /** @param {number} now */
+  #next(now) {
+    const { player } = this;
+    player.advance(Math.min(Math.max((now - /** @type {number} */ (this.#last)) / 1000, 0), LONGEST));
+    this.#asked = false; // what changes by going on is in this picture
+    this.#last = player.playing ? now : undefined;
+    this.draw();
+    if (player.playing) this.ask();
+  }
+}
