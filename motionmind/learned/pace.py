@@ -350,7 +350,7 @@ def find_still(steps: Floats) -> Ints:
     starts = np.flatnonzero(np.diff(speeds, prepend=np.inf))
     ends = np.append(starts[1:], len(speeds)) - 1
     sinks_and_rises = np.diff(np.sign(np.diff(speeds[starts]))) > 0.0
-    return (starts + ends)[1:-1][sinks_and_rises] // 2
+    return np.asarray((starts + ends)[1:-1][sinks_and_rises] // 2, dtype=np.int64)
 
 
 def _smooth(steps: Floats) -> Floats:
