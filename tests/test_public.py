@@ -7,6 +7,7 @@ import inspect
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,11 @@ import motionmind
 
 PACKAGE = Path(motionmind.__file__).parent
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if "_bundled" not in path.parts)
+
+
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text("utf-8"))
 
 
 @pytest.mark.parametrize("name", motionmind.__all__)
@@ -56,7 +62,7 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_everything_that_is_not_private_has_a_docstring(path: Path) -> None:
-    tree = ast.parse(path.read_text("utf-8"))
+    tree = parsed(path)
     assert len(ast.get_docstring(tree) or "") > 3
     undocumented = [node.name for node in _public(tree) if not ast.get_docstring(node)]
     assert not undocumented
@@ -64,7 +70,7 @@ def test_everything_that_is_not_private_has_a_docstring(path: Path) -> None:
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_docstrings_begin_with_a_verb_or_a_noun(path: Path) -> None:
-    tree = ast.parse(path.read_text("utf-8"))
+    tree = parsed(path)
     documented = (ast.Module, ast.ClassDef, ast.FunctionDef)
     nodes = [node for node in ast.walk(tree) if isinstance(node, documented)]
     first = {getattr(node, "name", path.stem): (ast.get_docstring(node) or "").split(" ")[0] for node in nodes}

@@ -344,11 +344,13 @@ def find_still(steps: Floats) -> Ints:
     Args:
         steps: angle that the mean joint turns by from each frame to the next [T - 1], at FPS frames a second.
     """
-    from scipy.signal import find_peaks  # takes a second, which only learning needs
-
     # Keyframed joints turn evenly: their speeds are equal but for rounding, on any machine. A level stretch of them is
     # still once, in its middle.
-    return np.asarray(find_peaks(-np.round(_smooth(steps), 9))[0], dtype=np.int64)
+    speeds = np.round(_smooth(steps), 9)
+    starts = np.flatnonzero(np.diff(speeds, prepend=np.inf))
+    ends = np.append(starts[1:], len(speeds)) - 1
+    sinks_and_rises = np.diff(np.sign(np.diff(speeds[starts]))) > 0.0
+    return np.asarray((starts + ends)[1:-1][sinks_and_rises] // 2, dtype=np.int64)
 
 
 def _smooth(steps: Floats) -> Floats:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
@@ -101,6 +100,20 @@ def test_compiling_beside_other_work_tells_how_far_it_is(monkeypatch: pytest.Mon
     assert noted == [True]
 
 
+@pytest.fixture
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder with a copy of what is compiled, of which a test may take away what others would compile again."""
+    place = jit.place_of_code()
+    assert place is not None
+    folder = tmp_path / "cache"
+    shutil.copytree(place, folder / place.name)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
+    jit._folder.cache_clear()
+    yield folder / place.name
+    jit._folder.cache_clear()
+
+
+@pytest.mark.usefixtures("own_cache")
 def test_warm_says_what_it_did_and_does_nothing_a_second_time(run: Run) -> None:
     note = jit._note()
     assert note is not None
@@ -114,20 +127,15 @@ def test_warm_says_what_it_did_and_does_nothing_a_second_time(run: Run) -> None:
 
 
 @pytest.mark.parametrize("is_first", [True, False])
-def test_the_first_search_alone_says_what_it_waits_for(is_first: bool, tmp_path: Path) -> None:
+def test_the_first_search_alone_says_what_it_waits_for(is_first: bool, tmp_path: Path, own_cache: Path) -> None:
     # From a posture to itself there is no move to search for, and so nothing is compiled while the test waits.
     command = [sys.executable, "-m", "motionmind", "tween", "ballet/fifth", "ballet/fifth", "-o", "still.json"]
-    environment = dict(os.environ)
     warming.search()
     if is_first:  # all is there but what is compiled last, and so compiling takes the test no time
-        place = jit.place_of_code()
-        assert place is not None
-        shutil.copytree(place, tmp_path / place.name)
         package, _, name = warming._LAST.partition("/")
-        for file in [*tmp_path.rglob("all-*"), *tmp_path.glob(f"{place.name}/{package}-*/{name}-*.nbc")]:
+        for file in [*own_cache.glob("all-*"), *own_cache.glob(f"{package}-*/{name}-*.nbc")]:
             file.unlink()
-        environment["NUMBA_CACHE_DIR"] = str(tmp_path)
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert ("compiling" in done.stderr) == is_first
     assert done.stderr.count("\n") <= 1
 

@@ -87,6 +87,12 @@ def test_still_moments_are_found_where_moves_meet() -> None:
     np.testing.assert_allclose(find_still(way_of(clip).joints.mean(axis=1)), np.cumsum([24, 36, 18]), atol=4)
 
 
+@pytest.mark.parametrize("length", [20, 21, 60])
+def test_a_level_stretch_is_still_once_in_its_middle_and_only_where_it_is_slower_on_both_sides(length: int) -> None:
+    levels = {0.05: 40, 0.03: 40, 0.002: length, 0.06: 40}
+    assert find_still(np.repeat([*levels], [*levels.values()])).tolist() == [80 + (length - 1) // 2]
+
+
 @given(seed=st.integers(0, 2**32 - 1))
 def test_still_moments_do_not_hang_on_rounding(seed: int) -> None:
     """Joints of keyframed movement turn evenly from key to key: whether one step is less than the next is chance."""

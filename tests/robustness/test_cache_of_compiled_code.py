@@ -36,13 +36,22 @@ print(sum(sum(one._cache_misses.values()) for one in (squared_distance, radius_a
 
 
 # Runs programs, each in a process of its own that begins with what this one has imported and with a compiler that has
-# compiled something, which is most of what a program takes. No function of the package is compiled or looked for yet.
+# compiled something like what they compile, and ends without a search for garbage among it: most of what a program
+# takes. No function of the package is compiled or looked for yet.
 _STARTER = """
-import json, os, sys, tempfile
-import numba
+import atexit, gc, json, os, sys, tempfile
+import numba, numpy as np
 import motionmind.body.capsules, motionmind.geometry.distances
 
-numba.njit(lambda x: x + 1.0)(1.0)
+@numba.njit
+def alike(x, share):
+    total = 0.0
+    for j in range(len(x)):
+        total += x[j][0] - share * x[j][1]
+    return float(total)
+
+alike(np.ones((2, 4)), 0.5)
+atexit.register(gc.freeze)
 for line in sys.stdin:
     if (child := os.fork()) == 0:
         program, environment, out, error = json.loads(line)

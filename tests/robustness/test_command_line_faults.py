@@ -48,7 +48,7 @@ def motion(name: str = "clip", frames: int = 12) -> Motion:
 # takes: with the words that the system gave, and the streams that Python opened.
 _CALLER = """
 import os, sys
-import motionmind.tween.engine
+import motionmind.corpus.shards, motionmind.formats.papers, motionmind.names.ends, motionmind.tween.engine
 from motionmind.cli import main
 lines = sys.argv[1:]
 while lines:
