@@ -141,7 +141,7 @@ def test_a_restriction_never_lowers_the_cost_and_one_that_the_best_path_keeps_ch
     rng = np.random.default_rng(seed)
     allowed = np.ones(sum(toy.sizes), dtype=bool)
     on_it = np.zeros(sum(toy.sizes), dtype=bool)
-    on_it[toy.model().starts[:-1] + found.path[1:-1]] = True
+    on_it[toy.model.starts[:-1] + found.path[1:-1]] = True
     cost = found.cost
     for _ in range(4):
         allowed &= rng.random(len(allowed)) > 0.2
