@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from itertools import pairwise, product
 from typing import Any
 
@@ -22,9 +23,9 @@ from motionmind.search.trellis import Trellis, build_trellis
 from motionmind.search.trws import Messages, no_messages
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Toy:
-    """A body of a few chains, dense.
+    """A body of a few chains, dense; one is itself alone, so that what many tests ask of it is kept.
 
     Attributes:
         parents: parent chain [L], or -1.
@@ -59,6 +60,7 @@ class Toy:
         costs[goal, goal] = min(costs[goal, goal], self.wait)
         return costs
 
+    @cached_property
     def model(self) -> Model:
         """The same as the search reads it."""
         starts = np.concatenate([[0], np.cumsum(self.sizes)]).astype(np.int64)
@@ -101,7 +103,7 @@ class Toy:
         self, rules: Rules, vias: Sequence[Via] = (), guide: Callable[[int], Floats] | None = None, **changes: Any
     ) -> Problem:
         """The problem from start to goal; `changes` are made to the model, such as in what is allowed."""
-        return Problem(self.model()._replace(**changes), *self.ends(), rules, vias, guide)
+        return Problem(self.model._replace(**changes), *self.ends(), rules, vias, guide)
 
     def cost(self, path: Int32s, guide: Floats | None = None) -> float:
         """Cost of a path of states [T + 1, L], summed as it is defined; infinite where it breaks a rule.
@@ -157,8 +159,7 @@ class Toy:
 
     def optima(self, longest: int) -> Floats:
         """Least cost of exactly T moves, for T = 0 .. longest, over all joint states [longest + 1]."""
-        at_goal = (self.joint_states() == self.goal).all(axis=1)
-        return self.so_far(longest)[:, at_goal][:, 0] + self.per_move * np.arange(longest + 1)
+        return _optima(self, longest)
 
     def scaled(self, factor: float) -> Toy:
         """The same body with all costs multiplied."""
@@ -177,6 +178,13 @@ class Toy:
         )
 
 
+@lru_cache(maxsize=2_000)
+def _optima(toy: Toy, longest: int) -> Floats:
+    at_goal = (toy.joint_states() == toy.goal).all(axis=1)
+    return toy.so_far(longest)[:, at_goal][:, 0] + toy.per_move * np.arange(longest + 1)
+
+
+@lru_cache(maxsize=2_000)
 def random_toy(
     seed: int, *, most: int = 5, states: int = 4, frustrated: bool = False, even: bool = False, dear: bool = False
 ) -> Toy:

@@ -27,7 +27,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.realise.timeline import usual
 from motionmind.tween.engine import Engine
 
-PAIRS = 10
+PAIRS = 6
 
 
 def learn(facing: Facing, *recorded: Motion) -> Engine:

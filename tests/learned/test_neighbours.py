@@ -44,8 +44,9 @@ def test_each_ball_holds_its_moments_and_their_weights(engine: Engine, trees: Ne
         order = trees.order[number]
         np.testing.assert_array_equal(np.sort(order), np.arange(count))
         np.testing.assert_array_equal(trees.ranks[number][order], np.arange(count))
+        centres = trees.centres_of(number).astype(np.float64)
         for node, (start, stop) in enumerate(trees.bounds):
-            off = distances(engine, part, trees.centres_of(number)[node].astype(np.float64))[order[start:stop]]
+            off = distances(engine, part, centres[node])[order[start:stop]]
             assert np.sqrt(off.max()) <= trees.radii[number, node] + 1e-3  # of single precision
             assert trees.weights[number, node] == pytest.approx(engine.carriage.weights[order[start:stop]].sum())
 

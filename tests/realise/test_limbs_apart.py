@@ -220,7 +220,7 @@ def test_tweens_keep_their_legs_apart_unless_told_otherwise() -> None:
     engine = Engine.load("ballet")
     corpus, body = engine.corpus, engine.corpus.skeleton
     kept, left = [], []
-    for ends in np.random.default_rng(3).integers(len(corpus), size=(12, 2)):
+    for ends in np.random.default_rng(3).integers(len(corpus), size=(8, 2)):
         a, b = (Posture(body, corpus.rotations[end], corpus.root[end]) for end in ends)
         own = legs_depth(body, np.stack([a.rotations, b.rotations])).max()
         kept.append(legs_depth(body, engine.tween(a, b).motion.rotations).max() - own)

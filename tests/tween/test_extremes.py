@@ -53,7 +53,7 @@ def assert_sound(tween: Tween, a: Posture, b: Posture) -> None:
         {"moves": 20, "duration": 0.5},
         {"duration": 0.1},
         {"duration": 1.0 / 30.0},
-        {"duration": 30.0},
+        {"duration": 12.0},
         {"moves": 1},
         {"moves": 1, "duration": 6.0},
         {"moves": 40, "duration": 0.1},
@@ -67,7 +67,7 @@ def assert_sound(tween: Tween, a: Posture, b: Posture) -> None:
 @pytest.mark.parametrize("name", ["ballet", "karate", "walk-hexapod", "hands"])
 def test_ends_are_exact_and_numbers_finite_however_hasty_or_slow(name: str, options: dict[str, Any]) -> None:
     engine = engine_of(name)
-    for a, b in np.random.default_rng(2).integers(0, len(engine.corpus), (3, 2)).tolist():
+    for a, b in np.random.default_rng(2).integers(0, len(engine.corpus), (2, 2)).tolist():
         ends = posture(engine, a), posture(engine, b)
         try:
             tween = engine.tween(*ends, **options)
@@ -105,7 +105,7 @@ def chain(joints: int, rng: np.random.Generator) -> Skeleton:
     return Skeleton("any", tuple(f"joint{k}" for k in range(joints)), parents, offsets)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000), st.sampled_from(["free", "stage"]))
 def test_any_body_moves_in_any_corpus_from_any_end(seed: int, facing: Facing) -> None:
     """Corpora made at random, and ends of any velocity that are not in them."""

@@ -54,7 +54,7 @@ def test_a_held_joint_stays_where_it_would_have_moved(name: str) -> None:
     """Of any joint that starts and ends in one state, and that the free movement takes away from it, legs and all."""
     engine = engine_of(name)
     tolerances, held, legs = engine.space.tolerances, 0, 0
-    for a, b in pairs(engine, 12 if name == "ballet" else 24):
+    for a, b in pairs(engine, 6 if name == "ballet" else 12):
         states = engine.space.assign(engine.corpus.to_chains(np.stack([a.rotations, b.rotations])))
         try:
             free = engine.tween(a, b, moves=8)
@@ -83,7 +83,7 @@ def test_a_held_joint_stays_where_it_would_have_moved(name: str) -> None:
 @pytest.mark.parametrize("end", ["A", "B"])
 def test_a_pinned_joint_is_where_it_is_pinned(ballet: Engine, end: str) -> None:
     pinned = 0
-    for a, b in pairs(ballet, 9, seed=3):
+    for a, b in pairs(ballet, 4, seed=3):
         states = ballet.space.assign(ballet.corpus.to_chains(np.stack([a.rotations, b.rotations])))
         for joint in ("right_elbow", "left_knee", "cervical"):
             chain = ballet.corpus.chains.index(joint)
@@ -124,7 +124,7 @@ def test_wishes_of_the_whole_path_are_seen_in_all_of_the_body_but_planted_legs(o
     engine = engine_of("karate")
     legs = ("hip", "knee", "ankle", "toes")
     carried = [k for k, joint in enumerate(engine.corpus.chains) if not joint.endswith(legs)]
-    for a, b in pairs(engine, 4, seed=5):
+    for a, b in pairs(engine, 2, seed=5):
         tween = engine.tween(a, b, **options)
         assert tween.followed[1:-1, carried].all()
 
@@ -187,7 +187,7 @@ def test_coordination_is_in_the_path_and_in_the_motion(ballet: Engine) -> None:
 def test_followed_is_what_the_motion_does_and_sources_are_shown_by_it(name: str) -> None:
     engine = engine_of(name)
     shown, passed_by = 0, 0
-    for a, b in pairs(engine, 5, seed=9):
+    for a, b in pairs(engine, 2, seed=9):
         tween = engine.tween(a, b, fps=120.0)
         off = degrees_from(engine, tween, tween.path)
         np.testing.assert_allclose(off, tween.path_degrees, atol=0.4)  # an arc between two of 120 frames a second

@@ -70,7 +70,7 @@ def check_leap(motion: Motion) -> None:
 @pytest.mark.parametrize("number", [0, 1, 2])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_leap_is_from_stretched_legs_and_lands_on_them(ballet: Engine, number: int, seed: int) -> None:
-    for stands in standing(ballet, seed):
+    for stands in standing(ballet, seed)[:2]:
         into = leap(ballet, number)
         check_leap(ballet.tween(stands, in_place(into, stands), fps=FPS).motion)
         check_leap(ballet.tween(into, in_place(stands, into), fps=FPS).motion)

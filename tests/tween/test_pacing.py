@@ -91,7 +91,7 @@ def test_the_farther_the_longer(engine: Engine, by: tuple[float, float]) -> None
     here = Posture(b.skeleton, b.rotations, a.root)
     heading = float(rot.heading(here.rotations[0]) - rot.heading(a.rotations[0]))
     here = moved(here, 0.0, -heading)  # so that every turn is a longer one
-    taken = [seconds(engine.tween(a, moved(here, by[0] * far, by[1] * far))) for far in (0.0, 0.7, 1.5, 3.0)]
+    taken = [seconds(engine.tween(a, moved(here, by[0] * far, by[1] * far))) for far in (0.0, 1.0, 3.0)]
     # Moves take as long as the corpus takes for those that a path makes, which is another one each time.
     assert all(after > 0.9 * before for before, after in pairwise(taken))
     assert taken[-1] > 1.2 * taken[0]
@@ -99,7 +99,7 @@ def test_the_farther_the_longer(engine: Engine, by: tuple[float, float]) -> None
 
 def test_it_takes_about_as_long_as_the_corpus_does(engine: Engine) -> None:
     off = []
-    for seed in range(12):
+    for seed in range(8):
         tween = tween_of(engine, *ends(engine, seed))
         (time,) = tween.times
         off.append(np.log(seconds(tween) / max(time.median, time.least)))
@@ -107,8 +107,8 @@ def test_it_takes_about_as_long_as_the_corpus_does(engine: Engine) -> None:
 
 
 def test_without_pace_fewer_moves_are_made(engine: Engine) -> None:
-    own = [tween_of(engine, *ends(engine, seed)).moves for seed in range(8)]
-    fewer = [engine.tween(*ends(engine, seed), without=["pace"]).moves for seed in range(8)]
+    own = [tween_of(engine, *ends(engine, seed)).moves for seed in range(4)]
+    fewer = [engine.tween(*ends(engine, seed), without=["pace"]).moves for seed in range(4)]
     assert np.mean(fewer) < np.mean(own)
 
 
@@ -159,7 +159,7 @@ def test_pace_scales_the_time_and_not_the_moves(engine: Engine, pace: float) -> 
 def test_who_is_slower_takes_no_longer_than_in_proportion(name: str, pace: float) -> None:
     """Feet, falls and the weight are as quick at any pace: they do not make a slow movement slower still."""
     known = Engine.load(name)
-    drawn = np.random.default_rng(3).integers(len(known.corpus), size=(4, 2))
+    drawn = np.random.default_rng(3).integers(len(known.corpus), size=(2, 2))
     for pair in drawn:
         a, b = (Posture(known.corpus.skeleton, known.corpus.rotations[k], known.corpus.root[k]) for k in pair)
         own, other = (seconds(tween_of(known, a, b, pace=one)) for one in (1.0, pace))
@@ -176,7 +176,7 @@ def test_nothing_sinks_into_the_floor_before_the_end() -> None:
         assert low.min() > min(low[0], low[-1], 0.0) - 0.0035
 
 
-@pytest.mark.parametrize("long", [7.0, 12.0, 20.0, 30.0, 60.0])
+@pytest.mark.parametrize("long", [7.0, 12.0, 30.0])
 def test_who_has_time_is_nowhere_faster_than_the_corpus(ballet: Engine, long: float) -> None:
     tween = ballet.tween(*ENDS, duration=long)
     assert tween.motion.times[-1] == pytest.approx(long)
@@ -218,7 +218,7 @@ def test_the_command_line_takes_it(run: Run) -> None:
 def test_a_duration_that_its_moves_cannot_make_is_made_from_the_fewest_that_can(engine: Engine) -> None:
     usual = float(np.median(engine.corpus.moves.seconds))
     more = 0
-    for seed in range(10):
+    for seed in range(6):
         a, b = ends(engine, seed)
         tween = engine.tween(a, b, duration=usual)
         assert seconds(tween) == pytest.approx(usual)
@@ -256,7 +256,7 @@ def test_what_takes_its_own_time_is_not_faster_than_the_corpus(engine: Engine) -
         fast = []
         with warnings.catch_warnings():
             warnings.simplefilter("error", MotionMindWarning)
-            for seed in range(12):
+            for seed in range(6):
                 motion = engine.tween(*ends(engine, seed), without=without).motion
                 speeds = way_of(motion).parts / np.diff(motion.times)[:, None]
                 fast.append(speeds[:, : len(motion.skeleton)] > engine.pace.fastest[: len(motion.skeleton)])

@@ -125,7 +125,7 @@ def test_walks_lead_on_from_where_all_performances_of_a_dance_end(
 ) -> None:
     monkeypatch.setattr(sparse, "ENDS", 12)
     motion = engine.corpus.motion(engine.corpus.clips[0]).slice(0, 2 * MOVES + 1)
-    corpus = gather("many", [replace(motion, name=f"{number}") for number in range(40)])
+    corpus = gather("many", [replace(motion, name=f"{number}") for number in range(14)])
     carriage = grown(corpus.skeleton, learn_carriage(corpus))
     stops = {0: stop_at(corpus, motion.posture(-1)), MOVES: stop_at(corpus, motion.posture(MOVES))}
     found = expect(corpus, carriage, stops, np.linspace(0.0, 1.8, 2 * MOVES + 1))
