@@ -353,6 +353,8 @@ def test_paths_are_drawn_as_often_as_they_are_likely() -> None:
         chance = 0.5 * sum(np.sqrt(2.0 * p * (1.0 - p) / (np.pi * draws)) for p in likely.values())
         assert apart < 2.5 * chance + 0.01, (seed, apart, chance)
         tried += 1
+        if tried == 12:
+            break
     assert tried >= 10
 
 
