@@ -45,9 +45,9 @@ def to_number(token: str, path: FilePath, line: int) -> float:
 def to_numbers(tokens: Sequence[str], path: FilePath, line: int) -> list[float]:
     """Parse all tokens as finite floats; FormatError names file and line."""
     try:
-        values = [float(token) for token in tokens]
+        values = list(map(float, tokens))
     except ValueError:
         values = [math.nan]
-    if all(-LARGEST <= value <= LARGEST for value in values) and "_" not in "".join(tokens):
+    if sum(map(abs, values)) <= LARGEST and "_" not in "".join(tokens):  # then none is greater, nor NaN
         return values
-    return [to_number(token, path, line) for token in tokens]  # names the faulty token
+    return [to_number(token, path, line) for token in tokens]  # one by one; names the faulty token

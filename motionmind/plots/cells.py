@@ -18,6 +18,7 @@ from motionmind.plots.portrait import Portrait
 from motionmind.plots.scene import Room
 from motionmind.plots.symbols import LETTERS, SMALL
 from motionmind.render.body_shape import shape_of
+from motionmind.render.body_solids import BodyShape
 from motionmind.render.camera import SMOOTH
 from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.figure import colour, draw, halved
@@ -84,7 +85,7 @@ class Field:
         regions = smooth(outlines(self.cells))
         areas = regions.areas()
         for n in np.argsort(-np.abs(areas), kind="stable"):  # regions in a hole lie over it
-            outline, posture = regions.only(np.arange(len(areas)) == n), int(regions.labels[n])
+            outline, posture = regions.one(n), int(regions.labels[n])
             hole = areas[n] < 0.0
             yield Region(
                 outline,
@@ -172,8 +173,10 @@ class Field:
         room.trace(self.at(portrait.piece))
         room.trace(self.at(portrait.other))
         marked: set[int] = set()
+        piece = portrait.variation.piece
+        body = shape_of(piece.motion.skeleton)
         for posture in self._far_apart():
-            pixels = _figure(portrait.variation.piece.ends(posture, posture)[0])
+            pixels = _figure(body, piece.ends(posture, posture)[0])
             figure = Inset((0.0, 0.0), pixels, self._describe_posture(posture))
             wide, high = figure.size
             place = room.near(posture, sites[posture], wide + 2 * _CLEAR, high + 1.6 * LETTERS)
@@ -226,9 +229,8 @@ class Field:
                     break
 
 
-def _figure(posture: Posture) -> Pixels:
+def _figure(body: BodyShape, posture: Posture) -> Pixels:
     """Draw a posture as a small picture [FINE h, FINE w, 4], RGBA, three quarters from the front."""
-    body = shape_of(posture.skeleton)
     cones, balls = to_view(*body.solids(posture.rotations, posture.root), VIEWS["quarter"], posture.root)
     low, high = np.concatenate([cones.reach(), balls.reach()], axis=-2)[..., :2]
     (left, bottom), (right, top) = low.min(axis=0), high.max(axis=0)

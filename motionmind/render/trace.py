@@ -50,6 +50,12 @@ class Lines:
         """Count the points of each line [K]."""
         return np.diff(self.starts)
 
+    def one(self, number: int) -> Lines:
+        """Select one line by its number."""
+        first, end = self.starts[number : number + 2]
+        alone = slice(number, number + 1)
+        return Lines(self.points[first:end], np.array([0, end - first]), self.labels[alone], self.closed[alone])
+
     def only(self, which: Bools) -> Lines:
         """Select the lines flagged in `which` [K]."""
         lengths = self.lengths()

@@ -11,13 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from command_line import Run
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pgmpy.models import DiscreteBayesianNetwork
-from pgmpy.parameter_estimator import DiscreteBayesianEstimator
 from toys import solution
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
@@ -177,6 +174,10 @@ def ends_of(seed: int) -> tuple[Ints, Ints]:
 @pytest.mark.parametrize("seed", range(12))
 def test_the_tables_are_those_of_a_network_over_two_postures(seed: int) -> None:
     """pgmpy's, with the same counts and pseudo-counts; whatever is not attested is one state more."""
+    import pandas as pd  # here: every worker would wait for it, and for pgmpy, before its first test
+    from pgmpy.models import DiscreteBayesianNetwork
+    from pgmpy.parameter_estimator import DiscreteBayesianEstimator
+
     toy = body(seed)
     for chain, parent in enumerate(toy.parents):
         if parent < 0:
@@ -352,6 +353,8 @@ def test_paths_are_drawn_as_often_as_they_are_likely() -> None:
         chance = 0.5 * sum(np.sqrt(2.0 * p * (1.0 - p) / (np.pi * draws)) for p in likely.values())
         assert apart < 2.5 * chance + 0.01, (seed, apart, chance)
         tried += 1
+        if tried == 12:
+            break
     assert tried >= 10
 
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import cache
 from io import BytesIO
 from itertools import combinations
 from pathlib import Path
@@ -22,6 +23,7 @@ from PIL import Image
 from scipy.spatial import cKDTree
 
 from motionmind._typing import Floats, Ints
+from motionmind.body.motion import Motion
 from motionmind.chaos.flows import FLOWS, Flow
 from motionmind.errors import MotionMindError
 from motionmind.notation.compose import motions
@@ -45,13 +47,22 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 def varied(flow: str, count: int = 131, **options: Any) -> Variation:
     """The first postures of the macarena, varied, nothing smoothed."""
-    piece = motions(score := read_score(MACARENA), score.clips)[0]
-    return vary(piece.slice(0, count), flow=FLOWS[flow], **options)
+    return vary(macarena().slice(0, count), flow=FLOWS[flow], **options)
+
+
+@cache
+def macarena() -> Motion:
+    """The dance, which no test changes."""
+    return motions(score := read_score(MACARENA), score.clips)[0]
 
 
 @pytest.fixture(scope="module", params=["lorenz", "rossler"])
 def portrait(request: pytest.FixtureRequest) -> Portrait:
-    return portrait_of(varied(request.param, length=180))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(portraits, "SHEETS", 500_000)  # which fill the attractor, too
+        found = portrait_of(varied(request.param, length=180))
+        assert len(found.sheets) == 500_000
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -239,30 +250,26 @@ def test_a_figure_is_solid_within_and_nothing_around() -> None:
 # --- laws of what draws it --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("flow", sorted(FLOWS))
+@pytest.mark.parametrize(("flow", "count", "length"), [("rossler", 1, 1), *((flow, 4, 12) for flow in sorted(FLOWS))])
 @pytest.mark.usefixtures("sketchy")
-def test_every_flow_can_be_drawn(flow: str) -> None:
-    for count, length in ((1, 1), (9, 20)):
-        plate = attractor(portrait_of(varied(flow, count, length=length)))
-        assert sorted(dots(plate, "posture")) == list(range(count))
-        assert sorted(dots(plate, "at")) == list(range(length))
-        root = ElementTree.fromstring(svg(plate))
-        assert len(root.findall(f"{SVG}circle")) == sum(isinstance(mark, Dot) for mark in plate.marks)
-        assert len(root.findall(f"{SVG}polyline")) == sum(isinstance(mark, Line) for mark in plate.marks)
-        assert len(root.findall(f"{SVG}path")) == sum(isinstance(mark, Region) for mark in plate.marks)
+def test_every_flow_can_be_drawn(flow: str, count: int, length: int) -> None:
+    plate = attractor(portrait_of(varied(flow, count, length=length)))
+    assert sorted(dots(plate, "posture")) == list(range(count))
+    assert sorted(dots(plate, "at")) == list(range(length))
+    root = ElementTree.fromstring(svg(plate))
+    assert len(root.findall(f"{SVG}circle")) == sum(isinstance(mark, Dot) for mark in plate.marks)
+    assert len(root.findall(f"{SVG}polyline")) == sum(isinstance(mark, Line) for mark in plate.marks)
+    assert len(root.findall(f"{SVG}path")) == sum(isinstance(mark, Region) for mark in plate.marks)
 
 
 def test_png_shows_what_svg_does(plate: Plate) -> None:
     image = Image.open(BytesIO(png(plate))).convert("RGB")
     assert image.size == (plate.width, plate.height)
-    found = 0
+    found, places = 0, np.array([mark.at for mark in plate.marks if isinstance(mark, Dot)])
     for title, ink in (("posture", PIECE), ("at", VARIATION)):
         for dot in dots(plate, title).values():
-            alone = not any(
-                mark is not dot and isinstance(mark, Dot) and np.hypot(*np.subtract(mark.at, dot.at)) < 8.0
-                for mark in plate.marks
-            )
-            if alone and dot.fill == ink:
+            around = np.hypot(*(places - dot.at).T) < 8.0
+            if around.sum() == 1 and dot.fill == ink:
                 pixel = image.getpixel((int(dot.at[0]), int(dot.at[1])))
                 found += bool(np.abs(np.subtract(pixel, ink)).max() < 90)
     assert found > 20
@@ -304,10 +311,10 @@ def test_ticks_are_round_and_about_six(low: float, high: float) -> None:
 @pytest.mark.parametrize("suffix", ATTRACTORS)
 @pytest.mark.usefixtures("sketchy")
 def test_the_command_writes_the_same_bytes_again(suffix: str, run: Run) -> None:
-    write_variation("variation.json", varied("rossler", 30))
+    write_variation("variation.json", varied("rossler", 6))
     for name in ("one", "two"):
         ran = run("attractor", "--of", "variation.json", "-o", f"{name}{suffix}")
-        assert (ran.code, ran.out, ran.err) == (0, f"{name}{suffix}: rossler, 30 sites, 30 points\n", "")
+        assert (ran.code, ran.out, ran.err) == (0, f"{name}{suffix}: rossler, 6 sites, 6 points\n", "")
     assert Path(f"one{suffix}").read_bytes() == Path(f"two{suffix}").read_bytes()
 
 
@@ -358,6 +365,12 @@ def danced() -> Variation:
     return varied("rossler", 40, length=60)
 
 
+@pytest.fixture(scope="module")
+def page(danced: Variation, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    write_attractor(path := tmp_path_factory.mktemp("page") / "page.html", danced)
+    return path
+
+
 @pytest.fixture
 def said() -> list[str]:
     """What pages complained of."""
@@ -365,20 +378,19 @@ def said() -> list[str]:
 
 
 @pytest.fixture
-def show(tabs: Tabs, tmp_path: Path, danced: Variation, said: list[str]) -> Iterator[Callable[..., Any]]:
-    """A function that opens the page of `danced`; afterwards, that it neither complained nor asked for anything."""
+def show(tabs: Tabs, page: Path, said: list[str]) -> Iterator[Callable[..., Any]]:
+    """A function that opens the page; afterwards, that it neither complained nor asked for anything."""
     asked: list[str] = []
     hearing = {
         "console": lambda message: said.append(message.text),
         "pageerror": lambda error: said.append(str(error)),
         "request": lambda request: asked.append(request.url),
     }
-    write_attractor(tmp_path / "page.html", danced)
 
     def show(ready: str = "window.motionmind?.attractor", script: str = "", **options: Any) -> Any:
         usual = {"viewport": {"width": 900, "height": 500}, "reduced_motion": "reduce", "device_scale_factor": 0.5}
         tab = using.enter_context(tabs.tab(hearing, script=script, **(usual | options)))
-        tab.goto((tmp_path / "page.html").as_uri())
+        tab.goto(page.as_uri())
         for _ in range(500):
             if tab.evaluate(f"!!({ready})"):
                 break

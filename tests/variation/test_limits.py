@@ -44,6 +44,12 @@ def kata(karate: Engine) -> Piece:
 
 
 @pytest.fixture(scope="module")
+def short(kata: Piece) -> Piece:
+    """The first half of it."""
+    return Piece.of(kata.motion.slice(0, 56), facing=kata.facing)
+
+
+@pytest.fixture(scope="module")
 def within(kata: Piece, karate: Engine) -> Variation:
     """A variation of the kata of which insertions take 0.3 of the time at most."""
     return vary(kata, karate, inserted=0.3, alternatives=1)
@@ -118,11 +124,11 @@ def test_without_price_and_stretches_it_is_the_trajectorys_own_order(flow: str, 
 
 @pytest.mark.parametrize("posturewise", [False, True])
 def test_seams_that_a_corpus_knows_are_estimated_to_insert_nothing_and_no_others(
-    kata: Piece, karate: Engine, posturewise: bool
+    short: Piece, karate: Engine, posturewise: bool
 ) -> None:
-    seconds = estimate_insertions(kata, TransitionTest(karate, posturewise))
-    pairs = [(i, k) for i in range(0, len(kata), 8) for k in range(len(kata))]
-    for one in judge_transitions(kata, pairs, karate, posturewise):
+    seconds = estimate_insertions(short, TransitionTest(karate, posturewise))
+    pairs = [(i, k) for i in range(0, len(short), 8) for k in range(len(short))]
+    for one in judge_transitions(short, pairs, karate, posturewise):
         assert one.is_abrupt == (seconds[one.start, one.end] > 0.0), (one.start, one.end)
     assert 0.0 < (seconds == 0.0).mean() < 0.5
 
@@ -132,8 +138,8 @@ def test_seams_that_a_corpus_knows_are_estimated_to_insert_nothing_and_no_others
 
 @pytest.mark.parametrize("flow", ["lorenz", "rossler"])
 @pytest.mark.parametrize(("share", "stretch"), [(0.3, None), (0.3, 1), (0.1, 2), (0.0, 4), (1.0, 8)])
-def test_limits_hold(kata: Piece, karate: Engine, flow: str, share: float, stretch: int | None) -> None:
-    found = vary(kata, karate, flow=flow_of(flow), inserted=share, stretch=stretch, alternatives=1)
+def test_limits_hold(short: Piece, karate: Engine, flow: str, share: float, stretch: int | None) -> None:
+    found = vary(short, karate, flow=flow_of(flow), inserted=share, stretch=stretch, alternatives=1)
     assert min(stretches(found.postures)) >= (stretch or 4)
     inserted = sum(seam.insertion.motion.times[-1] for seam in found.seams if seam.insertion)
     seconds = found.motion().times[-1]
@@ -146,20 +152,21 @@ def test_limits_hold(kata: Piece, karate: Engine, flow: str, share: float, stret
 
 
 def test_of_insertions_no_more_is_given_up_than_needed(kata: Piece, karate: Engine) -> None:
-    free = vary(kata, karate, nudge=0.3, stretch=2, alternatives=1)
+    def varied(**options: float) -> Variation:
+        return vary(kata, karate, nudge=0.3, stretch=2, alternatives=1, length=70, **options)  # type: ignore[arg-type]
+
+    free = varied()
     share = free.report()["counts"]["inserted_share"]
     assert share > 0.3
-    np.testing.assert_array_equal(
-        vary(kata, karate, nudge=0.3, stretch=2, inserted=share + 0.01, alternatives=1).postures, free.postures
-    )
-    some, few = (vary(kata, karate, nudge=0.3, stretch=2, inserted=one, alternatives=1) for one in (0.3, 0.1))
+    np.testing.assert_array_equal(varied(inserted=share + 0.01).postures, free.postures)
+    some, few = (varied(inserted=one) for one in (0.3, 0.1))
     numbers = [sum(seam.insertion is not None for seam in one.seams) for one in (few, some, free)]
     assert numbers == sorted(set(numbers))
     assert len(few.seams) > 0.5 * len(free.seams)  # those that need no insertion stay
 
 
-def test_whoever_ends_the_smoothing_gets_an_order_whose_seams_are_smoothed_later(kata: Piece, karate: Engine) -> None:
-    ended = vary(kata, karate, inserted=0.3, alternatives=1, watch=lambda _: True)
+def test_whoever_ends_the_smoothing_gets_an_order_whose_seams_are_smoothed_later(short: Piece, karate: Engine) -> None:
+    ended = vary(short, karate, inserted=0.3, alternatives=1, watch=lambda _: True)
     assert min(stretches(ended.postures)) >= 4
     assert all(seam.transition for seam in ended.seams)
     assert any(seam.transition and seam.transition.is_pending for seam in ended.seams)
@@ -199,16 +206,17 @@ def test_what_cannot_be_reached_is_refused_in_a_line(
     ):
         with pytest.raises(MotionMindError, match=message):
             vary(kata, **options)  # type: ignore[arg-type]
-    ran = run("vary", "ballet/promenade", "--inserted", 0.3, "--alternatives", 1, "-o", "v.json")
+    quick = ("--alternatives", 1, "--length", 20)
+    ran = run("vary", "ballet/promenade", "--inserted", 0.3, *quick, "-o", "v.json")
     assert ran.code == 0
     assert "kept within 30% inserted, in stretches of 4 postures at least" in ran.out
     assert "insertions take" not in ran.err
     cut = run("review", "v.json", "--cut", "1..2", "--paste", 8, "-o", "cut.json", "--list")
     assert "kept within 30% inserted; " in cut.out
-    smoothed = run("review", "cut.json", "--smooth", "ballet", "--list")
+    smoothed = run("review", "cut.json", "--smooth", "ballet", "--alternatives", 1, "--list")
     assert smoothed.code == 0
     assert "kept" not in smoothed.out
-    ran = run("vary", "ballet/promenade", "--alternatives", 1, "-o", "v.json")
+    ran = run("vary", "ballet/promenade", *quick, "-o", "v.json")
     assert " of the time: --inserted 0.3 keeps more of the piece" in ran.err
     assert run("attractor", "--of", "v.json", "-o", "v.svg").code == 0
     other = ("--corpus", "ballet", "--to", 7, "--length", 15, "--alternatives", 1)
