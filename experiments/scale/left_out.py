@@ -17,7 +17,8 @@ from motionmind import Engine
 from motionmind._typing import Bools, Floats
 from motionmind.geometry.distances import squared_distance
 from motionmind.learned.carriage import Carriage
-from motionmind.learned.neighbours import LEAVES, build_neighbours
+from motionmind.learned.nearest import LEAVES
+from motionmind.learned.neighbours import build_neighbours
 from motionmind.walks.likelihood import squared_distances, variance_at_ends
 from motionmind.walks.marginals import posterior_marginals
 from motionmind.walks.sparse import all_of, choose

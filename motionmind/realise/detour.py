@@ -13,7 +13,7 @@ from motionmind._typing import Floats, Ints
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import Carriage
-from motionmind.learned.neighbours import postures_near
+from motionmind.learned.nearest import postures_near
 
 NEAREST = 8  # of the corpus's postures are tried for each end
 SEVERAL = 4  # times as many are looked at of a large corpus, whose trees measure distances in another way

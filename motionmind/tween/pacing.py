@@ -28,7 +28,7 @@ from motionmind._typing import Floats
 from motionmind.body.motion import Motion, Posture
 from motionmind.display import displayed
 from motionmind.learned.model import LearnedCorpus
-from motionmind.learned.neighbours import postures_near
+from motionmind.learned.nearest import postures_near
 from motionmind.learned.pace import ALIKE, over_seconds, way_between, way_of
 from motionmind.realise.timeline import usual
 

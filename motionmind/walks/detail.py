@@ -17,7 +17,7 @@ from motionmind.corpus.moves import Moves
 from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
-from motionmind.learned.neighbours import postures_near
+from motionmind.learned.nearest import postures_near
 from motionmind.walks.steps import steps_at
 
 GOES_OVER = 0.4  # radians a joint, root mean square: how much nearer another posture must be to leave a run for it

@@ -26,7 +26,8 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
-from motionmind.learned.neighbours import Neighbours, find_near
+from motionmind.learned.nearest import find_near
+from motionmind.learned.neighbours import Neighbours
 from motionmind.walks.steps import follow, index_of, steps_at
 
 SPLITS = 384  # balls that are cut in two

@@ -15,8 +15,9 @@ from motionmind.corpus import store
 from motionmind.errors import FormatError
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.distances import squared_distance
-from motionmind.learned import neighbours, persistence
-from motionmind.learned.neighbours import LEAF, Neighbours, build_neighbours, find_near, node_bounds, postures_near
+from motionmind.learned import nearest, neighbours, persistence
+from motionmind.learned.nearest import find_near, postures_near
+from motionmind.learned.neighbours import LEAF, Neighbours, build_neighbours, node_bounds
 from motionmind.tween.engine import Engine
 
 
@@ -99,9 +100,9 @@ def test_leaves_are_searched_in_the_order_of_what_they_promise(trees: Neighbours
                 continue
             for child in (2 * node + 1, 2 * node + 2):
                 away = np.sqrt(squared_distance(centres[child], posture) / len(part))
-                heapq.heappush(heap, (away - neighbours.INSIDE * radii[child], child))
+                heapq.heappush(heap, (away - nearest.INSIDE * radii[child], child))
         for leaves in (1, 5, len(expected)):
-            assert neighbours._search(posture, bounds, centres, radii, leaves).tolist() == expected[:leaves]
+            assert nearest._search(posture, bounds, centres, radii, leaves).tolist() == expected[:leaves]
 
 
 def test_centres_are_copied_for_searches_unless_they_are_large(
@@ -140,7 +141,7 @@ def test_postures_near_one_are_no_middles_of_moves(engine: Engine, trees: Neighb
 def test_what_was_learned_just_now_is_searched_by_the_loop_for_what_was_loaded(
     engine: Engine, trees: Neighbours
 ) -> None:
-    shown, loop = engine.carriage.orientations.copy(), cast(Any, neighbours._find)
+    shown, loop = engine.carriage.orientations.copy(), cast(Any, nearest._find)
     loaded = shown.view()
     loaded.setflags(write=False)
     find_near(trees, 0, loaded, shown[:1], 5)
