@@ -24,13 +24,21 @@ from motionmind.tween.engine import Engine
 Complete = Callable[..., list[str]]
 
 
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A corpus on a body of its own."""
+    folder = tmp_path_factory.mktemp("built") / "mine"
+    Engine.fit([ballet_clip("jump")], name="mine", discretization=Codebook(15.0)).save(folder)
+    return folder
+
+
 @pytest.fixture
-def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A user's folder with one corpus, on a body of its own, and a cache in which the ballet was learned."""
+def home(tmp_path: Path, built: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A user's folder with one corpus, and a cache in which the ballet was learned."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MOTIONMIND_HOME", str(tmp_path / "home"))
     Engine.load("ballet")
-    Engine.fit([ballet_clip("jump")], name="mine", discretization=Codebook(15.0)).save(tmp_path / "home/corpora/mine")
+    shutil.copytree(built, tmp_path / "home/corpora/mine")
     return tmp_path
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
@@ -16,6 +14,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+from executor_jobs import die, die_once, doze, square
 
 from motionmind.errors import MotionMindError
 from motionmind.executors import cluster as clusters
@@ -24,32 +23,6 @@ from motionmind.executors.opening import open_team
 from motionmind.executors.team import Team, UnfinishedError
 
 distributed = pytest.importorskip("distributed")
-
-
-def square(number: int) -> int:
-    if number < 0:
-        raise ValueError(f"no root of {number}")
-    return number * number
-
-
-def die_once(marks: Path, number: int) -> int:
-    """End the worker with every third job, the first time."""
-    mark = marks / str(number)
-    if number % 3 == 1 and not mark.exists():
-        mark.touch()
-        os._exit(1)
-    return number
-
-
-def die(number: int) -> int:
-    if number == 2:
-        os._exit(1)
-    return number
-
-
-def doze(number: int) -> int:
-    time.sleep(0.2)
-    return number
 
 
 @pytest.fixture(scope="module")

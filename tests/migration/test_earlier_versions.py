@@ -38,6 +38,7 @@ def holding(*names: str) -> pytest.MarkDecorator:
 
 
 CORPORA = [path for path in EARLIER if MANIFEST in zipfile.ZipFile(path).namelist()]
+OF_EACH_VERSION = {json.loads(zipfile.ZipFile(path).read(MANIFEST))["version"]: path for path in CORPORA}  # its last
 each_corpus = pytest.mark.parametrize("archive", CORPORA, ids=lambda path: path.stem)
 
 
@@ -90,7 +91,9 @@ def today() -> Engine:
 
 
 @each_corpus
-def test_a_corpus_is_as_if_it_were_built_today(archive: Path, today: Engine, tmp_path: Path) -> None:
+def test_a_corpus_is_as_if_it_were_built_today_and_what_was_learned_again_is_kept(
+    archive: Path, today: Engine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder = unpacked(archive, tmp_path / "home") / "corpora" / "piece"
     before = contents(folder)
     engine = Engine.load("piece", tmp_path / "home")
@@ -104,19 +107,9 @@ def test_a_corpus_is_as_if_it_were_built_today(archive: Path, today: Engine, tmp
     np.testing.assert_array_equal(tween.path, other.path)
     assert tween.status == "optimal"
     assert {path: name for path, name in contents(folder).items() if path.name != "checked"} == before
-
-
-@each_corpus
-def test_what_was_learned_again_is_kept(archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    unpacked(archive, tmp_path / "home")
-    first = Engine.load("piece", tmp_path / "home")
-
-    def learn_no_more(*_: object) -> None:
-        pytest.fail("it was learned once more")
-
-    monkeypatch.setattr(persistence, "learn_from_states", learn_no_more)
+    monkeypatch.setattr(persistence, "learn_from_states", lambda *_: pytest.fail("it was learned once more"))
     again = Engine.load("piece", tmp_path / "home")
-    np.testing.assert_array_equal(again.carriage.orientations, first.carriage.orientations)
+    np.testing.assert_array_equal(again.carriage.orientations, engine.carriage.orientations)
 
 
 @pytest.mark.parametrize("archive", CORPORA[-2:], ids=lambda path: path.stem)
@@ -132,7 +125,7 @@ def test_a_corpus_that_keeps_all_that_is_learned_is_not_learned_again(
     assert not store.cache().exists()
 
 
-@each_corpus
+@pytest.mark.parametrize("archive", OF_EACH_VERSION.values(), ids=lambda path: path.stem)
 def test_a_build_takes_the_place_of_a_corpus(archive: Path, run: Run, tmp_path: Path) -> None:
     folder = unpacked(archive, tmp_path / "home") / "corpora" / "piece"
     assert run("corpus", "build", "piece", PIECE).code == 0
