@@ -51,7 +51,8 @@ def motion(name: str = "clip", frames: int = 12) -> Motion:
 # own that begins with what this one has imported and ends without a search for garbage among it: most of what it takes.
 _CALLER = """
 import atexit, gc, os, sys
-import motionmind.corpus.shards, motionmind.formats.papers, motionmind.names.ends, motionmind.tween.engine
+import motionmind.corpus.shards, motionmind.formats.bvh, motionmind.formats.papers, motionmind.names.finding
+import motionmind.notation.compose, motionmind.render.svg, motionmind.tween.engine
 from motionmind.cli import main
 atexit.register(gc.freeze)
 lines = sys.argv[1:]
