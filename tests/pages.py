@@ -122,7 +122,17 @@ class Tabs:
         context = self._browser.new_context(**options)
         for script in filter(None, scripts):
             context.add_init_script(script)
-        return context.new_page()
+        tab = context.new_page()
+        _fill_screen(tab)
+        return tab
+
+
+def _fill_screen(tab: Any) -> None:
+    """Leave nothing of the window but the page: a wheel that turns while a page loads has all of it composed again."""
+    session = tab.context.new_cdp_session(tab)
+    window = session.send("Browser.getWindowForTarget")["windowId"]
+    session.send("Browser.setWindowBounds", {"windowId": window, "bounds": {"windowState": "fullscreen"}})
+    session.detach()
 
 
 @dataclass
