@@ -129,7 +129,7 @@ def test_a_seam_is_played_with_another_insertion_and_nothing_is_edited(
         assert 0.0 < mark.times[0] - shown.times[0] <= 1.0 + 1e-6
         assert 0.0 < shown.times[-1] - mark.times[-1] <= 1.0 + 1e-6
         words = ("--alternative", alternative) if alternative else ()
-        played = run("review", file, "--play", seam.number, *words, "-o", tmp_path / "seam.svg")
+        played = run("review", file, "--play", seam.number, *words, "-o", tmp_path / "seam.html")
         assert played.code == 0
         assert f"seam {seam.number}, {len(shown)} frames" in played.out
     assert file.read_bytes() == before
