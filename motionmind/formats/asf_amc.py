@@ -18,6 +18,7 @@ from __future__ import annotations
 import re
 import warnings
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
@@ -118,6 +119,7 @@ def _read_frames(lines: list[str], acclaim: Acclaim, path: FilePath) -> tuple[Fl
         if bone.channels:
             columns[bone.name] = slice(column, column + len(bone.channels))
             column += len(bone.channels)
+    widths = {name: len(acclaim.bones[name].channels) for name in columns}
     degrees = acclaim.degrees
     numbers: list[int] = []
     values: list[list[float]] = []
@@ -136,9 +138,11 @@ def _read_frames(lines: list[str], acclaim: Acclaim, path: FilePath) -> tuple[Fl
         else:
             if not numbers:
                 raise FormatError("values before the number of their frame", path=path, line=number)
-            here = _columns_of(words, columns, missing, acclaim=acclaim, path=path, line=number)
-            values[-1][here] = to_numbers(words[1:], path, number)
-            missing.remove(words[0])
+            name, *here = words
+            if name not in missing or len(here) != widths[name]:
+                _refuse_bone(words, columns, acclaim=acclaim, path=path, line=number)
+            values[-1][columns[name]] = to_numbers(here, path, number)
+            missing.remove(name)
     if not numbers:
         raise FormatError("no frames", path=path, line=len(lines))
     _check_complete(missing, numbers, path, len(lines))
@@ -158,10 +162,10 @@ def _frame_number(word: str, before: list[int], path: FilePath, line: int) -> in
     return number
 
 
-def _columns_of(
-    words: list[str], columns: dict[str, slice], missing: set[str], *, acclaim: Acclaim, path: FilePath, line: int
-) -> slice:
-    """Return the columns of its frame that a bone's line fills."""
+def _refuse_bone(
+    words: list[str], columns: dict[str, slice], *, acclaim: Acclaim, path: FilePath, line: int
+) -> NoReturn:
+    """Raise FormatError: a line is not that of a bone which its frame lacks."""
     name = words[0]
     if name not in columns:
         if name in acclaim.bones:
@@ -173,9 +177,7 @@ def _columns_of(
     if len(words) - 1 != len(channels):
         fault = f"{len(words) - 1} values for {name}, which has {len(channels)} ({' '.join(channels).lower()})"
         raise FormatError(fault, path=path, line=line)
-    if name not in missing:
-        raise FormatError(f"a second line for {name} in the same frame", path=path, line=line)
-    return columns[name]
+    raise FormatError(f"a second line for {name} in the same frame", path=path, line=line)
 
 
 def _check_complete(missing: set[str], numbers: list[int], path: FilePath, line: int) -> None:
