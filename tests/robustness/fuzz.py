@@ -133,12 +133,14 @@ def damaged_archive(data: bytes, others: Sequence[bytes], rng: random.Random) ->
     if rng.random() < 0.3:
         return damaged(data, others, rng)
     out = io.BytesIO()
-    with zipfile.ZipFile(io.BytesIO(data)) as archive, zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as made:
+    with zipfile.ZipFile(io.BytesIO(data)) as archive, zipfile.ZipFile(out, "w") as made:
         names = archive.namelist()
         chosen = rng.choice(names)
         for name in names:
             inner = archive.read(name)
-            made.writestr(name, damaged(inner, [inner], rng) if name == chosen else inner)
+            dated_1980 = zipfile.ZipInfo(name)  # and not as late as it is, which would be other bytes each time
+            kind = zipfile.ZIP_DEFLATED
+            made.writestr(dated_1980, damaged(inner, [inner], rng) if name == chosen else inner, kind)
     return out.getvalue()
 
 

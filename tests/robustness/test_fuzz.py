@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import time
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
@@ -100,9 +101,14 @@ def test_a_reader_that_takes_too_much_memory_is_found_out(tmp_path: Path, monkey
     assert fault.endswith(" GB of memory")
 
 
-def test_a_seed_makes_the_same_inputs_again(readers: dict[str, fuzz.Reader]) -> None:
+def test_a_seed_makes_the_same_inputs_again_whenever_that_is(
+    readers: dict[str, fuzz.Reader], monkeypatch: pytest.MonkeyPatch
+) -> None:
     for reader in readers.values():
-        once, again, other = (list(islice(reader.inputs(seed), 20)) for seed in (3, 3, 4))
+        once, other = (list(islice(reader.inputs(seed), 20)) for seed in (3, 4))
+        with monkeypatch.context() as patch:
+            patch.setattr(time, "time", lambda: 1e9)
+            again = list(islice(reader.inputs(3), 20))
         assert once == again != other
 
 
