@@ -32,6 +32,7 @@ _COMPLETE = 6  # the first that keeps all that is learned, and the last whose ma
 MANIFEST = "manifest.json"
 CHECKED_BY = Path(__file__).parents[1] / "learned" / "validity.py"  # when that changes, arrays are checked again
 _COARSEST_CLOCK = 2.0  # seconds to which file systems round the time of a change
+_LOOKS, _BETWEEN = 20, 0.005  # for a version that is missing, and seconds between them
 _ARRAY_NAME = re.compile(r"\w+(\.\w+)*")  # of a file in the folder: no name from a manifest leads out of it
 
 
@@ -324,7 +325,7 @@ def load(folder: Path) -> Stored:
     Raises:
         FormatError: the manifest or an array is missing, damaged, or not the one that was saved.
     """
-    path = folder / MANIFEST
+    path, missing = folder / MANIFEST, 0
     while True:
         data = _read(path)
         manifest = _parse(path, data)
@@ -335,16 +336,24 @@ def load(folder: Path) -> Stored:
             # Only a version that is current while it is held is complete, and stays so.
             if _read(path) == data:
                 if not there:
-                    if place.is_dir():  # made since, under a number that was free again
-                        continue
-                    raise FormatError(f"there is no folder {place.name} beside it; {remedy(folder)}", path=path)
+                    missing += 1
+                    if missing == _LOOKS:
+                        raise FormatError(f"there is no folder {place.name} beside it; {remedy(folder)}", path=path)
+                    time.sleep(_BETWEEN)  # writers may make and remove versions of a number that is free again
+                    continue
                 shapes = manifest.get("arrays")
                 if isinstance(shapes, list) and all(isinstance(name, str) for name in shapes):
                     shapes = dict.fromkeys(shapes)  # as the first corpora of 0.1 listed them, without their shapes
                 if not isinstance(shapes, dict) or not all(map(_ARRAY_NAME.fullmatch, shapes)):
                     raise FormatError(f"does not say which arrays there are; {remedy(folder)}", path=path)
                 identity = _identity(data, [_array_file(place, name) for name in shapes])
-                return Stored(manifest, _open_arrays(folder, place, shapes), place, identity)
+                try:
+                    arrays = _open_arrays(folder, place, shapes)
+                except FormatError:
+                    if _read(path) == data:
+                        raise
+                    continue  # replaced, on a disk without locks
+                return Stored(manifest, arrays, place, identity)
 
 
 def remedy(folder: Path) -> str:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -309,6 +310,35 @@ def test_a_corpus_whose_version_is_gone_is_one_error(mine: Path) -> None:
     shutil.rmtree(mine / "1")
     with pytest.raises(FormatError, match=re.escape("there is no folder 1 beside it; build the corpus again")):
         store.load(mine)
+
+
+def test_a_version_that_is_missing_for_a_moment_is_waited_for(mine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Writers make and remove versions of a number that is free again, whose manifests are the same."""
+    store.save(mine, MANIFEST, arrays(1))
+    (mine / "1").rename(mine / "aside")
+    waits = iter([None, lambda: (mine / "aside").rename(mine / "1")])
+
+    def wait(_: float) -> None:
+        if then := next(waits):
+            then()
+
+    monkeypatch.setattr(time, "sleep", wait)
+    assert seed_of(mine) == 1
+
+
+def test_a_version_that_is_replaced_while_it_is_read_is_read_anew(mine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a disk has no locks a version may be removed under its readers."""
+    store.save(mine, MANIFEST, arrays(1))
+    read = store._open_arrays
+
+    def interrupted(folder: Path, place: Path, shapes: dict[str, Any]) -> dict[str, Any]:
+        monkeypatch.undo()
+        store.save(mine, MANIFEST, arrays(2))
+        shutil.rmtree(place)
+        return read(folder, place, shapes)
+
+    monkeypatch.setattr(store, "_open_arrays", interrupted)
+    assert seed_of(mine) == 2
 
 
 def test_arrays_that_were_loaded_outlive_their_version(mine: Path) -> None:
