@@ -77,7 +77,7 @@ def test_two_paths_differ_by_the_share_of_states_on_the_way() -> None:
     assert difference(path[:2], other[:2]) == 0.0
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(seeds, st.floats(0.0, 1.0), st.integers(1, 3), st.integers(2, 4), st.booleans())
 def test_the_bound_holds_and_the_path_differs_by_enough(
     seed: int, share: float, earlier: int, moves: int, passed: bool
@@ -145,7 +145,7 @@ def test_a_share_of_nothing_asks_nothing(seed: int) -> None:
         assert again.cost == pytest.approx(found.cost, abs=2 * PROVEN)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seeds)
 def test_a_greater_share_has_no_lower_optimum(seed: int) -> None:
     toy = small_toy(seed)
@@ -159,7 +159,7 @@ def test_a_greater_share_has_no_lower_optimum(seed: int) -> None:
     assert all(not isinstance(one, Certificate) for one in by_share[len(known) :])
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(seeds)
 def test_no_chain_or_moment_alone_would_make_an_improved_path_cheaper(seed: int) -> None:
     toy, rng = small_toy(seed), np.random.default_rng(seed)
@@ -201,7 +201,7 @@ def test_a_path_without_a_way_cannot_differ() -> None:
 
 def test_a_watcher_ends_the_search_with_a_path_that_differs_and_a_bound() -> None:
     statuses = set()
-    for seed in range(16):
+    for seed in range(30):
         toy = small_toy(seed)
         guide = random_guide(toy, seed)
         every = listed(toy, 3, np.ones(sum(toy.sizes), dtype=bool), [], guide)
@@ -226,7 +226,7 @@ def test_a_watcher_ends_the_search_with_a_path_that_differs_and_a_bound() -> Non
 
 def test_a_path_that_is_near_enough_ends_the_search_sooner() -> None:
     sooner = 0
-    for seed in range(16):
+    for seed in range(30):
         toy = small_toy(seed)
         guide = random_guide(toy, seed)
         every = listed(toy, 3, np.ones(sum(toy.sizes), dtype=bool), [], guide)

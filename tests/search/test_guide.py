@@ -70,7 +70,7 @@ def keeps(found: Certificate, vias: list[Via]) -> bool:
 # --- the answer -------------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=250, deadline=None)
 @given(seeds, st.booleans(), st.booleans(), st.floats(0.0, 0.5), st.integers(0, 3), st.integers(1, MOVES))
 def test_in_a_given_number_of_moves_the_cost_is_that_of_brute_force(
     seed: int, frustrated: bool, even: bool, share: float, passed: int, moves: int
@@ -92,7 +92,7 @@ def test_in_a_given_number_of_moves_the_cost_is_that_of_brute_force(
     assert keeps(found, vias)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(seeds, st.booleans(), st.integers(0, 2))
 def test_the_number_of_moves_is_the_best_without_the_guide(seed: int, frustrated: bool, passed: int) -> None:
     toy = random_toy(seed, frustrated=frustrated)
@@ -122,7 +122,7 @@ def test_the_number_of_moves_is_the_best_without_the_guide(seed: int, frustrated
     assert keeps(found, vias)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=250, deadline=None)
 @given(
     seeds,
     st.integers(0, 3),
@@ -163,7 +163,7 @@ def test_the_certificate_holds_however_little_effort_is_allowed(
 
 def test_an_interrupted_search_has_a_guided_path_and_a_bound_wherever_it_is_ended() -> None:
     statuses = set()
-    for seed in range(16):
+    for seed in range(40):
         toy = random_toy(seed, frustrated=True)
         vias, guide = random_vias(toy, seed, seed % 3, at=0.0), random_guide(toy, seed)
         for calls in range(8):
