@@ -69,7 +69,7 @@ def a_body(**changes: Any) -> Toy:
 
 
 def test_the_cost_at_every_number_of_moves_is_that_of_brute_force(kind: dict[str, bool]) -> None:
-    for seed in range(60):
+    for seed in range(120):
         toy = random_toy(seed, **kind)
         optima = toy.optima(MOVES)
         for moves in range(MOVES + 1):
@@ -82,7 +82,7 @@ def test_the_cost_at_every_number_of_moves_is_that_of_brute_force(kind: dict[str
 
 
 def test_the_cost_over_all_numbers_of_moves_is_the_least_of_them(kind: dict[str, bool]) -> None:
-    for seed in range(100):
+    for seed in range(200):
         toy = random_toy(seed, **kind)
         least = toy.optima(MOVES)[1:].min()
         found = answer(toy, toy.rules(1, MOVES))
@@ -94,7 +94,7 @@ def test_the_cost_over_all_numbers_of_moves_is_the_least_of_them(kind: dict[str,
 
 
 def test_a_path_keeps_the_rules_and_costs_what_is_stated(kind: dict[str, bool]) -> None:
-    for seed in range(60):
+    for seed in range(100):
         toy = random_toy(seed, **kind)
         for node_budget in (1, 20, 100_000):
             found = answer(toy, toy.rules(1, MOVES, node_budget))
@@ -111,7 +111,7 @@ def test_bound_optimum_and_cost_stand_in_this_order_whatever_effort_is_allowed(
     monkeypatch.setattr(bounding, "PAIR_CHAIN_SWEEPS", 0)
     monkeypatch.setattr(bounding, "SWEEPS_AT_ONCE", sweeps)
     searched = bounded = 0
-    for seed in range(20):
+    for seed in range(60):
         toy = random_toy(seed, frustrated=True)
         optima = toy.optima(MOVES)
         for moves in np.flatnonzero(np.isfinite(optima)):
