@@ -93,10 +93,8 @@ def pytest_xdist_auto_num_workers() -> int:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Let workers begin with the files that wait for pages, and go on with those of most tests: they end together."""
     if hasattr(config, "workerinput"):
-        pages, sizes = set(), Counter(item.path for item in items)
-        for item in items:
-            if "browser" in getattr(item, "fixturenames", ()):
-                pages.add(item.path)
+        sizes = Counter(item.path for item in items)
+        pages = {item.path for item in items if "browser" in getattr(item, "fixturenames", ())}
         items.sort(key=lambda item: (item.path not in pages, -sizes[item.path]))
 
 

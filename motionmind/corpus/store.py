@@ -334,26 +334,23 @@ def load(folder: Path) -> Stored:
         place = _place_of(folder, manifest)
         with versions.hold(place) as there:
             # Only a version that is current while it is held is complete, and stays so.
-            if _read(path) == data:
-                if not there:
-                    missing += 1
-                    if missing == _LOOKS:
-                        raise FormatError(f"there is no folder {place.name} beside it; {remedy(folder)}", path=path)
-                    time.sleep(_BETWEEN)  # writers may make and remove versions of a number that is free again
-                    continue
-                shapes = manifest.get("arrays")
-                if isinstance(shapes, list) and all(isinstance(name, str) for name in shapes):
-                    shapes = dict.fromkeys(shapes)  # as the first corpora of 0.1 listed them, without their shapes
-                if not isinstance(shapes, dict) or not all(map(_ARRAY_NAME.fullmatch, shapes)):
-                    raise FormatError(f"does not say which arrays there are; {remedy(folder)}", path=path)
-                identity = _identity(data, [_array_file(place, name) for name in shapes])
-                try:
-                    arrays = _open_arrays(folder, place, shapes)
-                except FormatError:
-                    if _read(path) == data:
-                        raise
-                    continue  # replaced, on a disk without locks
-                return Stored(manifest, arrays, place, identity)
+            if _read(path) != data:
+                continue
+            if not there:
+                missing += 1
+                if missing == _LOOKS:
+                    raise FormatError(f"there is no folder {place.name} beside it; {remedy(folder)}", path=path)
+                time.sleep(_BETWEEN)  # writers may make and remove versions of a number that is free again
+                continue
+            shapes = _shapes_in(manifest, folder)
+            identity = _identity(data, [_array_file(place, name) for name in shapes])
+            try:
+                arrays = _open_arrays(folder, place, shapes)
+            except FormatError:
+                if _read(path) == data:
+                    raise
+                continue  # replaced, on a disk without locks
+            return Stored(manifest, arrays, place, identity)
 
 
 def remedy(folder: Path) -> str:
@@ -362,6 +359,16 @@ def remedy(folder: Path) -> str:
     if folder.parent != home() / "corpora" and folder.parent.name == "corpora":
         words += ["--home", str(folder.parent.parent)]
     return f"build the corpus again: {shlex.join(words)} FILES"
+
+
+def _shapes_in(manifest: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return what the manifest of a corpus's folder says of each array: [type, *shape], or None."""
+    shapes = manifest.get("arrays")
+    if isinstance(shapes, list) and all(isinstance(name, str) for name in shapes):
+        shapes = dict.fromkeys(shapes)  # as the first corpora of 0.1 listed them, without their shapes
+    if not isinstance(shapes, dict) or not all(map(_ARRAY_NAME.fullmatch, shapes)):
+        raise FormatError(f"does not say which arrays there are; {remedy(folder)}", path=folder / MANIFEST)
+    return shapes
 
 
 def _open_arrays(folder: Path, place: Path, shapes: Mapping[str, Any]) -> dict[str, NDArray[Any]]:

@@ -165,7 +165,7 @@ def _frame_number(word: str, before: list[int], path: FilePath, line: int) -> in
 def _refuse_bone(
     words: list[str], columns: dict[str, slice], *, acclaim: Acclaim, path: FilePath, line: int
 ) -> NoReturn:
-    """Raise FormatError: a line is not that of a bone which its frame lacks."""
+    """Raise FormatError for a line that gives none of the bones that its frame still lacks."""
     name = words[0]
     if name not in columns:
         if name in acclaim.bones:

@@ -9,6 +9,7 @@ import pytest
 from bodies import insect
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.signal import find_peaks
 
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture
@@ -27,6 +28,7 @@ from motionmind.learned.pace import (
     Pace,
     Way,
     _fit,
+    _smooth,
     find_still,
     learn_pace,
     way_between,
@@ -91,6 +93,12 @@ def test_still_moments_are_found_where_moves_meet() -> None:
 def test_a_level_stretch_is_still_once_in_its_middle_and_only_where_it_is_slower_on_both_sides(length: int) -> None:
     levels = {0.05: 40, 0.03: 40, 0.002: length, 0.06: 40}
     assert find_still(np.repeat([*levels], [*levels.values()])).tolist() == [80 + (length - 1) // 2]
+
+
+@given(st.lists(st.sampled_from([0.0, 0.01, 0.02, 0.05]), max_size=60))
+def test_still_moments_are_the_peaks_that_scipy_finds(steps: list[float]) -> None:
+    expected = find_peaks(-np.round(_smooth(np.array(steps)), 9))[0]
+    np.testing.assert_array_equal(find_still(np.array(steps)), expected)
 
 
 @given(seed=st.integers(0, 2**32 - 1))

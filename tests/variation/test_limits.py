@@ -152,8 +152,8 @@ def test_limits_hold(short: Piece, karate: Engine, flow: str, share: float, stre
 
 
 def test_of_insertions_no_more_is_given_up_than_needed(kata: Piece, karate: Engine) -> None:
-    def varied(**options: float) -> Variation:
-        return vary(kata, karate, nudge=0.3, stretch=2, alternatives=1, length=70, **options)  # type: ignore[arg-type]
+    def varied(inserted: float | None = None) -> Variation:
+        return vary(kata, karate, nudge=0.3, stretch=2, alternatives=1, length=70, inserted=inserted)
 
     free = varied()
     share = free.report()["counts"]["inserted_share"]
