@@ -345,8 +345,8 @@ def find_still(steps: Floats) -> Ints:
         steps: angle that the mean joint turns by from each frame to the next [T - 1], at FPS frames a second.
     """
     # Keyframed joints turn evenly: their speeds are equal but for rounding, on any machine. A level stretch of them is
-    # still once, in its middle. These are the peaks that SciPy's `find_peaks` finds upside down; its import takes longer
-    # than learning a few clips.
+    # still once, in its middle. SciPy's `find_peaks` finds the same, upside down; its import takes longer than learning
+    # a few clips.
     speeds = np.round(_smooth(steps), 9)
     starts = np.flatnonzero(np.diff(speeds, prepend=np.inf))
     ends = np.append(starts[1:], len(speeds)) - 1
