@@ -6,7 +6,7 @@ It is done to a movement whose feet have their places, and again where its clock
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -29,6 +29,7 @@ from motionmind.realise.limbs_apart import keep_limbs_apart
 from motionmind.realise.timeline import Timeline
 
 RISES = 0.01  # metres that a limb which stands may rise
+SEEN = 0.018  # metres from which it is seen to
 FOLLOWS = 0.1  # seconds over which a body follows a leg that is turned aside under it
 
 
@@ -133,20 +134,19 @@ def _lowered(skeleton: Skeleton, rotations: Floats, root: Floats, floor: Floats,
         given: frames that must not change [N].
         fps: frames a second.
     """
-    stops, out, low = np.flatnonzero(given), root.copy(), lowest_height(skeleton, rotations, root)
-    stands = (low - floor)[stops] < TIPTOE * size_of(skeleton)
-    for (start, end), stand in zip(pairwise(stops), stands[:-1] & stands[1:], strict=True):
-        part = slice(start, end + 1)
-        if stand and standing_rises(skeleton, rotations[part], root[part]) is not None:
-            rises = low[part] - np.linspace(low[start], low[end], end + 1 - start)
-            lowered = smoothed(rises, FOLLOWS, fps)
-            lowered += cover(np.maximum(rises - lowered - RISES, 0.0), fps)
-            out[part, 1] -= np.where(given[part], 0.0, lowered)
+    out, low = root.copy(), lowest_height(skeleton, rotations, root)
+    for part, _ in _standing(skeleton, rotations, root, low - floor, given):
+        rises = np.maximum(low[part] - np.linspace(*low[[part.start, part.stop - 1]], part.stop - part.start), 0.0)
+        lowered = smoothed(rises, FOLLOWS, fps)
+        lowered += cover(np.maximum(rises - lowered - RISES, 0.0), fps)
+        out[part, 1] -= np.where(given[part], 0.0, lowered)
     return out
 
 
 def _lifted(skeleton: Skeleton, rotations: Floats, root: Floats, floor: Floats, given: Bools, fps: float) -> Floats:
     """Return positions of the root [N, 3], metres, with which nothing is in the floor.
+
+    But a limb that stands alone is not seen to rise with it: millimetres of another foot in the floor show less.
 
     Args:
         skeleton: the body.
@@ -156,12 +156,37 @@ def _lifted(skeleton: Skeleton, rotations: Floats, root: Floats, floor: Floats, 
         given: frames that must not change [N].
         fps: frames a second.
     """
-    sunk = np.where(given, 0.0, np.maximum(floor - lowest_height(skeleton, rotations, root) - SINKS, 0.0))
+    low = lowest_height(skeleton, rotations, root) - floor
+    sunk = np.where(given, 0.0, np.maximum(-low - SINKS, 0.0))
     if not sunk.any():
         return root
-    out = root.copy()
-    out[:, 1] += np.where(given, 0.0, cover(sunk, fps))
+    out, lifted = root.copy(), cover(sunk, fps)
+    for part, rises in _standing(skeleton, rotations, root, low, given):
+        if rises.max() < SEEN:
+            lifted[part] = np.minimum(lifted[part], SEEN - rises)
+    out[:, 1] += np.where(given, 0.0, lifted)
     return out
+
+
+def _standing(
+    skeleton: Skeleton, rotations: Floats, root: Floats, low: Floats, given: Bools
+) -> Iterator[tuple[slice, Floats]]:
+    """Yield the frames from one given posture to the next in which one limb stands alone, and how far it rises there,
+    as `standing_rises` has it.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [N, J, 4].
+        root: positions of the root [N, 3], metres.
+        low: heights of the lowest points above the floor [N], metres.
+        given: frames of given postures [N].
+    """
+    stops = np.flatnonzero(given)
+    stands = low[stops] < TIPTOE * size_of(skeleton)
+    for (start, end), stand in zip(pairwise(stops), stands[:-1] & stands[1:], strict=True):
+        part = slice(start, end + 1)
+        if stand and (rises := standing_rises(skeleton, rotations[part], root[part])) is not None:
+            yield part, rises
 
 
 def _given_frames(clock: Timeline, stops: Sequence[int], moving: tuple[bool, bool]) -> Bools:

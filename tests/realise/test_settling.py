@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,7 @@ from motionmind.body.support import standing_rises
 from motionmind.footing.ground import SINKS
 from motionmind.footing.root import stand
 from motionmind.geometry import rotations as rot
-from motionmind.realise.settling import FOLLOWS, RISES, _lifted, _lowered, _with_its_legs
+from motionmind.realise.settling import FOLLOWS, RISES, SEEN, _lifted, _lowered, _with_its_legs
 
 BODY, FRAMES, FPS = human23(), 46, 30.0
 
@@ -64,6 +66,16 @@ def test_a_limb_that_stands_alone_is_kept_down_between_given_postures(waves: int
     np.testing.assert_array_equal(lowered[GIVEN], raised[GIVEN])
 
 
+@pytest.mark.parametrize("towards", [0.08, -0.08])
+def test_a_foot_that_stays_on_the_floor_until_it_leaves_it_is_not_raised_all_the_way(towards: float) -> None:
+    """As before a spring, or after one: between both ends the body would float."""
+    rotations, root = on_the_right_leg()
+    late = np.clip((np.arange(FRAMES) - FRAMES + 6) / 5.0, 0.0, 1.0)
+    given = np.isin(np.arange(FRAMES), [0, FRAMES - 1])
+    springing = root + up(abs(towards) * (late if towards > 0.0 else late[::-1]))
+    np.testing.assert_array_equal(_lowered(BODY, rotations, springing, FLOOR, given, FPS), springing)
+
+
 @pytest.mark.parametrize("aloft", [0, 20, FRAMES - 1])
 def test_a_body_that_is_given_in_the_air_is_not_kept_down_beside_it(aloft: int) -> None:
     rotations, root = on_the_right_leg()
@@ -72,7 +84,8 @@ def test_a_body_that_is_given_in_the_air_is_not_kept_down_beside_it(aloft: int) 
     lowered = _lowered(BODY, rotations, leaping, FLOOR, GIVEN, FPS)
     np.testing.assert_array_equal(lowered, leaping)
     # What stands on a floor as high as that is.
-    assert np.abs(_lowered(BODY, rotations, leaping, FLOOR + 0.3, GIVEN, FPS) - leaping).max() > 0.1
+    higher = leaping + up(0.4 * np.sin(np.linspace(0.0, np.pi, FRAMES)) * ~GIVEN)
+    assert np.abs(_lowered(BODY, rotations, higher, FLOOR + 0.3, GIVEN, FPS) - higher).max() > 0.1
 
 
 def test_what_is_in_the_floor_is_lifted_out_of_it_and_no_more() -> None:
@@ -86,3 +99,20 @@ def test_what_is_in_the_floor_is_lifted_out_of_it_and_no_more() -> None:
     assert low.min() > -SINKS - 1e-9
     assert low.max() < 0.02
     np.testing.assert_array_equal(lifted[GIVEN], sunk[GIVEN])
+
+
+def test_a_foot_that_stands_does_not_rise_with_one_that_is_a_little_in_the_floor() -> None:
+    rotations, root = on_the_right_leg()
+    bell = np.exp(-(((np.arange(FRAMES) - 33) / 4.0) ** 2)) * ~GIVEN
+    # The other leg reaches down beside the one that stands, and 2 cm farther.
+    rotations[:, BODY.index("left_hip")] = rot.from_axis_angle([1.0, 0.0, 0.0], -1.2 * (1.0 - bell))
+    legs = [BODY.index(f"left_{joint}") for joint in ("knee", "ankle")]
+    offsets = BODY.offsets.copy()
+    offsets[legs] *= 1.0 + 0.02 / np.abs(offsets[legs, 1]).sum()
+    longer = replace(BODY, offsets=offsets)
+    rises = standing_rises(longer, rotations, _lifted(longer, rotations, root, FLOOR, GIVEN, FPS))
+    assert rises is not None
+    assert 0.01 < rises.max() < SEEN + 1e-9
+    # Where both are in it, the body is lifted out all the same.
+    deep = _lifted(longer, rotations, root - up(0.1 * bell), FLOOR, GIVEN, FPS)
+    assert lowest_height(longer, rotations, deep)[~GIVEN].min() > SEEN - 0.02 - SINKS
