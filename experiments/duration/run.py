@@ -11,7 +11,7 @@ from scipy.stats import spearmanr
 from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
 from experiments.material import engine, families, movement, pairs, posture, recorded, without
-from motionmind import Engine, NoPathError, Posture
+from motionmind import Engine, Motion, NoPathError, Posture
 from motionmind.learned.pace import LONGEST, SHORTEST, find_still, way_between, way_of
 from motionmind.learned.sampled import FPS
 
@@ -72,16 +72,21 @@ def _danced(
     data: str | None, by: str, family: int, most: int, seed: int
 ) -> tuple[Engine, list[tuple[Posture, Posture, float]]]:
     """Return an engine without a family of recordings, and pairs of its still moments with the seconds between."""
-    takes = families(data, by)[family]
-    windows = []
-    for take in takes:
+    windows = windows_of(data, by, family)
+    chosen = np.random.default_rng([seed, family]).permutation(len(windows))[:most]
+    ends = [(clip.posture(i), clip.posture(k), (k - i) / FPS) for clip, i, k in (windows[n] for n in chosen)]
+    return without(data, by, families(data, by)[family][0]), ends
+
+
+def windows_of(data: str | None, by: str, family: int) -> list[tuple[Motion, int, int]]:
+    """Return the windows of a family of recordings: a clip, and two frames of it at which it is still."""
+    out = []
+    for take in families(data, by)[family]:
         for piece in movement(data, by, 1).get(take, []):
             clip = piece.resample(FPS)
             still = find_still(way_of(clip).joints.mean(axis=1)) if len(clip) > 1 else []
-            windows += [(clip, i, k) for i, k in combinations(still, 2) if SHORTEST <= (k - i) / FPS <= LONGEST]
-    chosen = np.random.default_rng([seed, family]).permutation(len(windows))[:most]
-    ends = [(clip.posture(i), clip.posture(k), (k - i) / FPS) for clip, i, k in (windows[n] for n in chosen)]
-    return without(data, by, takes[0]), ends
+            out += [(clip, i, k) for i, k in combinations(still, 2) if SHORTEST <= (k - i) / FPS <= LONGEST]
+    return out
 
 
 # --- what is told -----------------------------------------------------------------------------------------------------
