@@ -17,6 +17,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.plausibility import GRAVITY
 from motionmind.body.support import standing_rise
 from motionmind.geometry import rotations as rot
+from motionmind.learned.pace import way_between
 
 PAIRS, ONE_LEG, JUMPS = 120, 100, 90  # of each corpus
 BUDGET = 20_000
@@ -54,15 +55,16 @@ def work(data: str | None, by: str, seed: int, pairs: int, one_leg: int, jumps: 
             b = on_the_same_spot(a, b)
         elif kind == "jump":
             b = nearer(a, b, LEAP)
+        way = float(found.pace.expected(way_between(a, b), (np.ones(()), np.ones(()))))
         try:
             tween = found.tween(a, b, node_budget=BUDGET, fps=float(FPS))
         except NoPathError:
-            rows += [_row(by, kind, number, maker, a, b) for maker in MAKERS]
+            rows += [_row(by, kind, number, maker, a, b, way) for maker in MAKERS]
             continue
         for maker in MAKERS:
             motion = tween.motion if maker == "motionmind" else eased(a, b, len(tween.motion))
             seen = see(motion)
-            rows.append(_row(by, kind, number, maker, a, b, motion, seen, danced))
+            rows.append(_row(by, kind, number, maker, a, b, way, motion, seen, danced))
             if kind == "far":
                 bounces[maker].append(seen.bounce)
     own = {
@@ -94,6 +96,7 @@ def _row(
     maker: str,
     a: Posture,
     b: Posture,
+    way: float,
     motion: Motion | None = None,
     seen: Seen | None = None,
     danced: Dancers | None = None,
@@ -109,6 +112,7 @@ def _row(
         "seconds": float("nan"),
         "travel": float(np.hypot(*(b.root - a.root)[[0, 2]])),
         "turn": float(turns.mean()),
+        "way": way,
         "own": float("nan"),
         "own_leans": float("nan"),
         "own_rests": float("nan"),
@@ -197,7 +201,8 @@ def tell(rows: list[Row]) -> str:
         "10 to 90 %": lambda r: "{:.2f} to {:.2f} s".format(*np.percentile(_all(r["rows"], "seconds"), [10, 90])),
         "with travel": lambda r: f"{_spearman(r['rows'], 'travel'):.2f}",
         "with turn": lambda r: f"{_spearman(r['rows'], 'turn'):.2f}",
-        "with distance": lambda r: f"{_spearman(r['rows'], 'distance'):.2f}",
+        "with both": lambda r: f"{_spearman(r['rows'], 'both'):.2f}",
+        "with both at usual speeds": lambda r: f"{_spearman(r['rows'], 'way'):.2f}",
     }
     groups = _groups(rows, far)
     mine = [group for group in groups if group["maker"] == MAKERS[0]]
@@ -223,7 +228,7 @@ def _groups(rows: list[Row], far: list[Row]) -> list[Row]:
             {
                 "by": by,
                 "maker": maker,
-                "rows": _with_distance([row for row in solved if row["kind"] == "far"]),
+                "rows": _with_both([row for row in solved if row["kind"] == "far"]),
                 "one leg": [row for row in solved if row["kind"] == "one leg"],
                 "jump": [row for row in solved if row["kind"] == "jump"],
                 "solved": len(solved) / len(mine),
@@ -232,10 +237,10 @@ def _groups(rows: list[Row], far: list[Row]) -> list[Row]:
     return out
 
 
-def _with_distance(rows: list[Row]) -> list[Row]:
+def _with_both(rows: list[Row]) -> list[Row]:
     """Rows with how far it is: the sum of travel and turn, each over its mean."""
     travel, turn = (max(_mean(rows, name), 1e-9) for name in ("travel", "turn"))
-    return [row | {"distance": row["travel"] / travel + row["turn"] / turn} for row in rows]
+    return [row | {"both": row["travel"] / travel + row["turn"] / turn} for row in rows]
 
 
 def _all(rows: Iterable[Row], name: str) -> Floats:
