@@ -19,7 +19,7 @@ from motionmind.body.support import centre_of_mass
 from motionmind.footing.balance import balance_rows, falls_without, is_beyond, walks
 from motionmind.footing.bearing import Bearing, Shape, find_bearing, find_staying, lowest, points_of_feet, shape_of
 from motionmind.footing.corrections import Correction
-from motionmind.footing.departures import departure, fade_at_ends
+from motionmind.footing.departures import clear_of_hip, departure, fade_at_ends
 from motionmind.footing.feet import Foot, bend_legs, pose, softness
 from motionmind.footing.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
 from motionmind.footing.knees import cover, smoothed
@@ -196,7 +196,7 @@ def carry(
                 weight = centre[:, level], mass[:, level], centre[:, 1] - floor
                 rows += balance_rows(points, touches, *weight, overhang, gravity, fps)
             start = solve(rows, start, fixed)
-        off = _departures(skeleton, shape, bearing, floor, start, feet, knees, known.moving, fps)
+        off = _departures(skeleton, shape, legs, bearing, floor, start, feet, knees, known.moving, fps)
         if number_of_round < ROUNDS[0] - 1:
             posed = bend_legs(skeleton, own, feet, off, softness(bearing.holds(fps)))
     detailed, falls = shape, np.zeros((count, 3))
@@ -209,6 +209,7 @@ def carry(
 def _departures(
     skeleton: Skeleton,
     shape: Shape,
+    legs: Floats,
     bearing: Bearing,
     floor: Floats,
     root: Floats,
@@ -219,15 +220,16 @@ def _departures(
 ) -> Floats:
     """Return how far feet are to be from where rotations have them [N, feet, 3], metres, by the root's places.
 
-    The corpus's knees bend by `knees` radians a second.
+    Legs [feet, N, 3] are as rotations have them, from hip to end. The corpus's knees bend by `knees` radians a second.
     """
     out = np.empty((len(root), len(feet), 3))
     for number, foot in enumerate(feet):
         height = shape.low[:, number] + root[:, 1] - floor
         tracks = shape.tracks[:, number] + root[:, [0, 2]]
         places = shape.tracks[:, number] + bearing.targets[:, number]
-        stances, leg = bearing.stances[number], foot.length(skeleton)
-        out[:, number] = departure(places, tracks, height, stances, leg, knees[number], fps, moving)
+        stances, length = bearing.stances[number], foot.length(skeleton)
+        off = departure(places, tracks, height, stances, length, knees[number], fps, moving)
+        out[:, number] = clear_of_hip(off, legs[number], length, stances, fps)
     return out
 
 

@@ -6,7 +6,9 @@ import numpy as np
 
 from motionmind._typing import Floats, Ints
 from motionmind.footing.footfalls import Stance
+from motionmind.footing.knees import cover
 from motionmind.footing.least_squares import factorise, substitute
+from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
 
 SETTLES = 0.3  # seconds in which a foot that hovers where it is given comes down to the floor
@@ -16,6 +18,8 @@ SLIDES = 1.85  # seconds: how much a foot that is low in a step is kept from sli
 RISES = 0.33  # share of a step in which it lifts the foot, and in which it lowers it
 LIFT = 0.105  # metres to which a step lifts a foot that the movement does not lift; chosen on cmu-05 and cmu-16
 FLICKS = 1.7, 12.0  # times as fast as the corpus's knees, and radians a second, at which a step bends a knee at most
+NEAREST = 0.4  # of a leg's length: this near to its hip a foot swings past it
+PUSHES = 2.0  # metres a second by which a foot is kept away from its hip, beside where it stands
 FAR = 0.3  # metres that a foot must go to be lifted so far
 
 
@@ -56,6 +60,36 @@ def departure(
         moving,
     )
     return out * fade_at_ends(len(places), moving, fps)[:, None]
+
+
+def clear_of_hip(off: Floats, leg: Floats, length: float, stances: list[Stance], fps: float) -> Floats:
+    """Return a foot's displacement [N, 3], metres, with which it swings past its hip and not through it.
+
+    Beside its hip a leg turns about at once. So it is pushed along as the movement has it, until it is as far as that,
+    or NEAREST.
+
+    Args:
+        off: its displacement before.
+        leg: from hip to foot as the movement has it [N, 3], metres.
+        length: of the leg, metres.
+        stances: when it stands.
+        fps: frames a second.
+    """
+    own, there = rot.norm(leg), leg + off
+    least = np.minimum(NEAREST * length, own)
+    short = rot.norm(there) < least
+    for stance in stances:
+        short[stance.start : stance.end + 1] = False
+    if not short.any():
+        return off
+    along = leg / np.maximum(own, 1e-9)[:, None]
+    ahead = np.einsum("nk,nk->n", there, along)
+    room = np.maximum(ahead**2 + least**2 - np.einsum("nk,nk->n", there, there), 0.0)
+    push, frames = cover(np.where(short, np.sqrt(room) - ahead, 0.0), fps), np.arange(len(off))
+    for stance in stances:
+        away = np.maximum(np.maximum(stance.start - frames, frames - stance.end), 0)
+        push = np.minimum(push, PUSHES * away / fps)
+    return np.asarray(off + push[:, None] * along)
 
 
 @jit
