@@ -136,7 +136,8 @@ def _lowered(skeleton: Skeleton, rotations: Floats, root: Floats, floor: Floats,
     """
     out, low = root.copy(), lowest_height(skeleton, rotations, root)
     for part, _ in _standing(skeleton, rotations, root, low - floor, given):
-        rises = np.maximum(low[part] - np.linspace(*low[[part.start, part.stop - 1]], part.stop - part.start), 0.0)
+        here = low[part]
+        rises = np.maximum(here - np.linspace(here[0], here[-1], len(here)), 0.0)
         lowered = smoothed(rises, FOLLOWS, fps)
         lowered += cover(np.maximum(rises - lowered - RISES, 0.0), fps)
         out[part, 1] -= np.where(given[part], 0.0, lowered)
