@@ -19,7 +19,7 @@ import msgspec
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices, Ints
-from motionmind.body.skeleton import Skeleton
+from motionmind.body.skeleton import Points, Skeleton
 from motionmind.geometry import rotations as rot
 
 SIDES = ("left", "right")
@@ -164,13 +164,17 @@ class Anatomy:
             joints: those whose angles are wanted; the others' are 0. None for all.
         """
         wanted = np.arange(len(self.skeleton)) if joints is None else np.array(joints, dtype=np.intp)
-        turned = rotations[..., wanted, :]
-        for index, frame in self._measured_elsewhere:
-            for place in np.flatnonzero(wanted == index):
-                turned[..., place, :] = rot.mul(self._between(rotations, frame, index), turned[..., place, :])
         out = np.zeros((*rotations.shape[:-1], 3))
-        out[..., wanted, :] = to_degrees(self._conventions.of(wanted), turned)
+        out[..., wanted, :] = self.degrees_of(wanted, rotations)
         return out
+
+    def degrees_of(self, joints: Indices, rotations: Floats) -> Floats:
+        """Return the angles of some joints alone [..., n, 3], by their numbers [n]; see `degrees`."""
+        turned = rotations[..., joints, :]
+        for index, frame in self._measured_elsewhere:
+            for place in np.flatnonzero(joints == index):
+                turned[..., place, :] = rot.mul(self._between(rotations, frame, index), turned[..., place, :])
+        return to_degrees(self._conventions.of(joints), turned)
 
     @cached_property
     def limits(self) -> tuple[Floats, Floats]:
@@ -187,20 +191,15 @@ class Anatomy:
         """Whether the weight of its parts is known."""
         return bool(self._segments[0].any())
 
-    def centre_of_mass(self, rotations: Floats, root: Floats, skeleton: Skeleton | None = None) -> Floats:
-        """Return the centre of mass [..., 3], metres, for local rotations [..., J, 4] and root positions [..., 3].
+    def centre_of_mass(self, rotations: Floats, root: Floats) -> Floats:
+        """Return the centre of mass [..., 3], metres, for local rotations [..., J, 4] and root positions [..., 3]."""
+        return self.masses_of(self.skeleton).centre(self.skeleton, rotations, root)
 
-        Args:
-            rotations: local rotations [..., J, 4].
-            root: positions of the root [..., 3], metres.
-            skeleton: the body, where it has other proportions than the anatomy's own.
-        """
-        body = skeleton or self.skeleton
+    def masses_of(self, skeleton: Skeleton) -> Masses:
+        """Return the masses of a body with this anatomy, in its own proportions or in others."""
         masses, centres = self._segments
-        if skeleton is not None:
-            centres = centres * (skeleton.height / self.skeleton.height)
-        segments = body.positions_with(rotations, root, np.arange(len(body)), centres)[..., len(body) :, :]
-        return np.asarray(np.einsum("j,...jk->...k", masses, segments))
+        centres = centres * (skeleton.height / self.skeleton.height)
+        return Masses(masses, skeleton.points(np.arange(len(skeleton)), centres))
 
     @cached_property
     def _segments(self) -> tuple[Floats, Floats]:
@@ -239,6 +238,27 @@ class Anatomy:
         while above != frame:
             out = rot.mul(rotations[..., above, :], out)
             above = self.skeleton.parents[above]
+        return out
+
+
+class Masses(NamedTuple):
+    """The masses of a body's segments.
+
+    Attributes:
+        shares: of the body's mass [J].
+        points: the joints, then the segments' centres of mass [2 J].
+    """
+
+    shares: Floats
+    points: Points
+
+    def centre(self, skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
+        """Return the centre of mass [..., 3], metres, for local rotations [..., J, 4] and root positions [..., 3]."""
+        from motionmind.body.kinematics import weigh_points  # numba is slow to import
+
+        places = skeleton.positions_of(self.points, rotations, root)
+        out = np.empty((*places.shape[:-2], 3))
+        weigh_points(places.reshape(-1, *places.shape[-2:]), self.shares, out.reshape(-1, 3))
         return out
 
 

@@ -21,7 +21,7 @@ from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.limbs import limb_of_points, limbs_of
-from motionmind.body.skeleton import Skeleton
+from motionmind.body.skeleton import Points, Skeleton, remembered
 
 RATE = 30.0  # frames a second at which feet are measured
 LOW = 0.05  # metres above the floor below which a foot should stand
@@ -91,8 +91,8 @@ def lowest_point(anatomy: Anatomy, rotations: Floats, root: Floats) -> tuple[Flo
         rotations: local rotations [T, J, 4].
         root: positions of the root [T, 3], metres.
     """
-    places, joints = _points(anatomy.skeleton, rotations, root, anatomy)
-    heights = places[..., 1]
+    points, joints = _contacts(anatomy.skeleton, anatomy)
+    heights = anatomy.skeleton.positions_of(points, rotations, root)[..., 1]
     at = heights.argmin(axis=-1)
     return np.take_along_axis(heights, at[..., None], axis=-1)[..., 0], joints[at]
 
@@ -110,19 +110,30 @@ def contact_points(
         root: positions of the root [..., 3], metres.
         heels: whether heels count besides joints and tips (see the module).
     """
-    return _points(skeleton, rotations, root, anatomy_of(skeleton) if heels else None)
+    points, joints = (_with_heels if heels else _without_heels)(skeleton)
+    return skeleton.positions_of(points, rotations, root), joints
 
 
-def _points(skeleton: Skeleton, rotations: Floats, root: Floats, anatomy: Anatomy | None) -> tuple[Floats, Indices]:
-    """Return the places [..., P, 3] of all joints, all tips and, given an anatomy with legs, both heels; and the joint
-    [P] that each point belongs to."""
+@remembered
+def _with_heels(skeleton: Skeleton) -> tuple[Points, Indices]:
+    return _contacts(skeleton, anatomy_of(skeleton))
+
+
+@remembered
+def _without_heels(skeleton: Skeleton) -> tuple[Points, Indices]:
+    return _contacts(skeleton, None)
+
+
+def _contacts(skeleton: Skeleton, anatomy: Anatomy | None) -> tuple[Points, Indices]:
+    """Return all joints, all tips and, given an anatomy with legs, both heels; and the joint [P] that each belongs
+    to."""
     ankles, heels = (
         ((), ()) if anatomy is None else _heel_points(anatomy, skeleton is anatomy.skeleton, skeleton.height)
     )
     own = np.arange(len(skeleton))
     joints = np.concatenate([own, own, np.array(ankles, dtype=np.int64)])
-    points = np.concatenate([skeleton.tips, heels]) if ankles else skeleton.tips
-    return skeleton.positions_with(rotations, root, joints[len(skeleton) :], points), joints
+    places = np.concatenate([skeleton.tips, heels]) if ankles else skeleton.tips
+    return skeleton.points(joints[len(skeleton) :], places), joints
 
 
 def heels_of(skeleton: Skeleton) -> dict[str, Heel]:

@@ -44,3 +44,14 @@ def place_points(places: Floats, turned: Floats, joints: Ints, offsets: Floats) 
             places[t, point, 0] = places[t, joint, 0] + (vx + w * tx + (y * tz - z * ty))
             places[t, point, 1] = places[t, joint, 1] + (vy + w * ty + (z * tx - x * tz))
             places[t, point, 2] = places[t, joint, 2] + (vz + w * tz + (x * ty - y * tx))
+
+
+@jit
+def weigh_points(places: Floats, shares: Floats, out: Floats) -> None:
+    """Write the means [N, 3] of the last J of points [N, P, 3], each with its share [J] of the whole."""
+    first = places.shape[1] - len(shares)
+    for t in range(len(places)):
+        out[t] = 0.0
+        for j in range(len(shares)):
+            for k in range(3):
+                out[t, k] += shares[j] * places[t, first + j, k]

@@ -17,11 +17,12 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Ints
+from motionmind.body.anatomy import Masses
 from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.contact import contact_points, limb_heights
 from motionmind.body.human import human23
 from motionmind.body.limbs import limb_of_points
-from motionmind.body.skeleton import Skeleton
+from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
 
@@ -90,6 +91,7 @@ def find_bearers(
     return bears, airborne, low & bears[:, limb]
 
 
+@remembered
 def size_of(skeleton: Skeleton) -> float:
     """Return how large a body is beside human23, by its greatest extent at rest: legs that spread count as well.
 
@@ -106,10 +108,15 @@ def centre_of_mass(skeleton: Skeleton, rotations: Floats, root: Floats) -> Float
         rotations: local rotations [..., J, 4].
         root: positions of the root [..., 3], metres.
     """
+    masses = _masses_of(skeleton)
+    return None if masses is None else masses.centre(skeleton, rotations, root)
+
+
+@remembered
+def _masses_of(skeleton: Skeleton) -> Masses | None:
+    """Return the masses of a body's segments; None where they are not known."""
     anatomy = anatomy_of(skeleton)
-    if anatomy is None or not anatomy.has_masses:
-        return None
-    return anatomy.centre_of_mass(rotations, root, skeleton)
+    return None if anatomy is None or not anatomy.has_masses else anatomy.masses_of(skeleton)
 
 
 def overhang(points: Floats, supports: Bools, mass: Floats) -> Floats:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices
-from motionmind.body.skeleton import Skeleton
+from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.footing.knees import SHIFTS, bend_of, distance_of, keep_detail, slow_down, smoothed
 from motionmind.footing.legs import SOFT, find_hinge, find_legs, stretched, usual_hinge, write_bent
 from motionmind.geometry import rotations as rot
@@ -66,11 +66,16 @@ def _length(x: float, y: float, z: float) -> float:
 
 def find_free_feet(skeleton: Skeleton, fixed: Bools) -> list[Foot]:
     """Return the feet of a body's legs, but for those with joints that must not change."""
+    return [foot for foot in _find_feet(skeleton) if not fixed[foot.leg].any()]
+
+
+@remembered
+def _find_feet(skeleton: Skeleton) -> list[Foot]:
+    """Return the feet of a body's legs."""
     numbers, legs = find_legs(skeleton)
     return [
         Foot(number, leg, knee, find_hinge(skeleton, leg[knee]))
         for number, (leg, knee) in zip(numbers, legs, strict=True)
-        if not fixed[leg].any()
     ]
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from motionmind._typing import Bools, Floats
 from motionmind.body.contact import lowest_height
 from motionmind.body.limits import within_limits
-from motionmind.body.skeleton import Skeleton
+from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.body.support import size_of
 from motionmind.footing.balance import GRAVITY
 from motionmind.footing.carrying import Allowed, Carried, Ends, carry, foot_heights
@@ -148,10 +148,9 @@ def set_on_floor(
         without: corrections to leave out.
     """
     size = size_of(skeleton)
-    small = replace(skeleton, offsets=skeleton.offsets / size, tips=skeleton.tips / size)
     by = 1.0 / size
     turned, root = _set_down(
-        small,
+        _as_large_as_a_person(skeleton),
         rotations,
         plain,
         times,
@@ -164,6 +163,13 @@ def set_on_floor(
     root *= size
     root[0], root[-1] = given.ends
     return turned, root
+
+
+@remembered
+def _as_large_as_a_person(skeleton: Skeleton) -> Skeleton:
+    """Return a body of the same proportions."""
+    size = size_of(skeleton)
+    return replace(skeleton, offsets=skeleton.offsets / size, tips=skeleton.tips / size)
 
 
 def _set_down(
