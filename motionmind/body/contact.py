@@ -188,6 +188,7 @@ def find_floor(skeleton: Skeleton, rotations: Floats, root: Floats, *, heels: bo
 # --- feet -------------------------------------------------------------------------------------------------------------
 
 
+@remembered
 def find_feet(skeleton: Skeleton) -> list[int]:
     """Return the joints that end in feet: a person's toes, all legs of an insect.
 
@@ -231,7 +232,13 @@ def foot_slides(skeleton: Skeleton, rotations: Floats, root: Floats, floor: floa
         root: positions of the root joint [T, 3], metres.
         floor: height of the floor, or in each frame [T], metres.
     """
-    moved, height = _foot_ends(skeleton, rotations, root, floor)
+    return slides_between(skeleton, skeleton.positions_and_tips(rotations, root), floor)
+
+
+def slides_between(skeleton: Skeleton, places: Floats, floor: float | Floats) -> Floats:
+    """Return what `foot_slides` does, of a body whose joints and tips, and whatever points after them, are at places
+    [T, P, 3], metres."""
+    moved, height = _foot_ends(skeleton, places, floor)
     least = np.where(height < LOW, moved, np.inf).min(axis=-1)
     return np.where(np.isfinite(least), least, 0.0)
 
@@ -247,7 +254,7 @@ def feet_that_stay(skeleton: Skeleton, rotations: Floats, root: Floats, floor: f
         root: positions of the root joint [T, 3], metres.
         floor: height of the floor, metres.
     """
-    moved, height = _foot_ends(skeleton, rotations, root, floor)
+    moved, height = _foot_ends(skeleton, skeleton.positions_and_tips(rotations, root), floor)
     least = np.where(height < LOW, moved, np.inf).min(axis=-1)
     return np.asarray(least.sum(axis=0) <= STAYS)
 
@@ -266,17 +273,17 @@ def foot_slide(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float
         root: positions of the root joint [T, 3], metres.
         floor: height of the floor, metres; for a recording, from `find_floor`.
     """
-    moved, height = _foot_ends(skeleton, rotations, root, floor)
+    moved, height = _foot_ends(skeleton, skeleton.positions_and_tips(rotations, root), floor)
     share = np.clip(2.0 - 2.0 ** (height / _SOFT), 0.0, 1.0)
     least = np.where(share > 0.0, moved * share, np.inf).min(axis=-1)
     return float(100.0 * np.where(np.isfinite(least), least, 0.0).mean()) if least.size else 0.0
 
 
-def _foot_ends(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float | Floats) -> tuple[Floats, Floats]:
+def _foot_ends(skeleton: Skeleton, places: Floats, floor: float | Floats) -> tuple[Floats, Floats]:
     """Return how far both ends of each foot's last bone move, level, to the next frame, and the greater of their
-    heights above the floor in the two frames: [T - 1, feet, 2] each, metres."""
+    heights above the floor in the two frames: [T - 1, feet, 2] each, metres; from places of joints and tips."""
     feet = np.array(find_feet(skeleton), dtype=np.intp)
-    places = skeleton.positions_and_tips(rotations, root)[:, np.stack([feet, feet + len(skeleton)], axis=-1)]
-    moved = np.hypot(np.diff(places[..., 0], axis=0), np.diff(places[..., 2], axis=0))
-    height = places[..., 1] - np.reshape(floor, (-1, 1, 1))
+    ends = places[:, np.stack([feet, feet + len(skeleton)], axis=-1)]
+    moved = np.hypot(np.diff(ends[..., 0], axis=0), np.diff(ends[..., 2], axis=0))
+    height = ends[..., 1] - np.reshape(floor, (-1, 1, 1))
     return moved, np.maximum(height[1:], height[:-1])

@@ -207,7 +207,8 @@ def fall_freely(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bool
         given: frames that must not change, the first and the last among them [N].
         fps: frames a second.
     """
-    mass, falls = find_falls(skeleton, rotations, root, given, fps)
+    low = lowest_height(skeleton, rotations, root)
+    mass, falls = find_falls(skeleton, rotations, root, low, given, fps)
     if not falls:
         return root
     out = root.copy()
@@ -220,13 +221,13 @@ def fall_freely(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bool
 
 
 def find_falls(
-    skeleton: Skeleton, rotations: Floats, root: Floats, given: Bools, fps: float
+    skeleton: Skeleton, rotations: Floats, root: Floats, low: Floats, given: Bools, fps: float
 ) -> tuple[Floats, list[tuple[int, int]]]:
     """Return the centre of mass [N, 3], metres, and the first frame of each fall, and the one after its last.
 
-    Where masses are not known there are no falls. Arguments are those of `fall_freely`.
+    Where masses are not known there are no falls. Arguments are those of `fall_freely`, and heights of the lowest point
+    [N], metres.
     """
-    low = lowest_height(skeleton, rotations, root)
     off_floor = low > low.min() + LOW * size_of(skeleton)
     up = ~given & off_floor
     mass = centre_of_mass(skeleton, rotations, root) if up.any() else None
