@@ -23,7 +23,7 @@ from motionmind.footing.departures import departure, fade_at_ends
 from motionmind.footing.feet import Foot, bend_legs, pose, softness
 from motionmind.footing.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
 from motionmind.footing.knees import cover, smoothed
-from motionmind.footing.least_squares import joined, solve
+from motionmind.footing.least_squares import Rows, joined, solve
 from motionmind.footing.root_rows import (
     hurry_rows,
     jerk_rows,
@@ -165,7 +165,7 @@ def carry(
     own, bones = pose(skeleton, plain), np.array([foot.bones(skeleton) for foot in feet]).reshape(-1, 2)
     legs, knees = legs_of(skeleton, own.places, feet), [float(allowed.fastest[foot.leg[foot.knee]]) for foot in feet]
     start, off, posed = root, np.zeros((count, len(feet), 3)), plain
-    touches = bearing.touching(shape)
+    touches, borne = bearing.touching(shape), _borne_rows(shape, bearing, root, floor, freedom, fps)
     balances = "balance" not in without and bool(mass.any())
     stands = balances and staying is None and "steps" not in without and not walks(root, fps)
     for number_of_round in range(ROUNDS[0]):
@@ -173,15 +173,13 @@ def carry(
             falls = _falls(shape, bearing, touches, start, mass, overhang)
             if falls is not None:
                 bearing = find_bearing(*planned, falls)
-                touches = bearing.touching(shape)
+                touches, borne = bearing.touching(shape), _borne_rows(shape, bearing, root, floor, freedom, fps)
         mass = own_mass if posed is plain else _mass(skeleton, posed)
-        steady = smooth_rows(root, mass, fps, 1e-4 if "bounce" in without else 1.0)
-        steady += prior_rows(root, bearing, fps)
-        steady += standing_rows(shape, bearing, floor, freedom)
-        steady = [joined(steady + flight_rows(flights, mass, standing, gravity, fps))]
+        smooth = smooth_rows(root, mass, fps, 1e-4 if "bounce" in without else 1.0)
+        falling = flight_rows(flights, mass, standing, gravity, fps)
         for _ in range(ROUNDS[1]):
             rows = [
-                *steady,
+                *(smooth, borne, *falling),
                 sunk_rows(shape, floor, start),
                 hurry_rows(start, allowed.travels, freedom, fps),
                 jerk_rows(start, allowed.pushes, freedom, fps),
@@ -194,7 +192,7 @@ def carry(
             if balances:
                 points, centre, level = _points_on_floor(shape, bearing, start), start + mass, [0, 2]
                 weight = centre[:, level], mass[:, level], centre[:, 1] - floor
-                rows += balance_rows(points, touches, *weight, overhang, gravity, fps)
+                rows.append(balance_rows(points, touches, *weight, overhang, gravity, fps))
             start = solve(rows, start, fixed)
         off = _departures(skeleton, shape, bearing, floor, start, feet, knees, known.moving, fps)
         if number_of_round < ROUNDS[0] - 1:
@@ -204,6 +202,11 @@ def carry(
         detailed, falls = shape_of(skeleton, rotations, feet), own_mass - _mass(skeleton, rotations)
     start, off, heights = _with_detail(shape, detailed, bearing, falls, flying, start, off, floor, fps)
     return Carried(start, off, bearing.holds(fps), heights, 1.0 - freedom, staying)
+
+
+def _borne_rows(shape: Shape, bearing: Bearing, prior: Floats, floor: Floats, freedom: Floats, fps: float) -> Rows:
+    """Return rows for what bears the body to bear it, and for the root to move as on its trajectory before [N, 3]."""
+    return joined(prior_rows(prior, bearing, fps) + standing_rows(shape, bearing, floor, freedom))
 
 
 def _departures(

@@ -17,7 +17,7 @@ from motionmind.body.plausibility import GRAVITY
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, size_of
 from motionmind.body.tempo import runs_of
-from motionmind.footing.least_squares import Rows, difference_rows, position_rows
+from motionmind.footing.least_squares import Rows, difference_rows, joined, position_rows
 
 SURELY = 0.5  # share of the corpus's walks that are in the air where a given posture is
 EVER = 0.05  # share of them from which a movement may be
@@ -169,6 +169,8 @@ def flight_rows(flights: list[Flight], own: Floats, standing: Floats, gravity: f
         gravity: metres a second squared.
         fps: frames a second.
     """
+    if not flights:
+        return []
     count = len(own)
     weights, at = np.zeros(count - 2), []
     leaves: list[Rows] = []
@@ -190,7 +192,7 @@ def flight_rows(flights: list[Flight], own: Floats, standing: Floats, gravity: f
     frames = np.array(at, dtype=np.int64)
     up = np.tile([0.0, 1.0, 0.0], (len(frames), 1))
     rows.append(position_rows(frames, up, standing[frames], np.full(len(frames), TOUCHES**-2.0)))
-    return rows + leaves
+    return [joined(rows + leaves)]
 
 
 def fall_freely(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bools, fps: float) -> Floats:

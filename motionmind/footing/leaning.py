@@ -105,14 +105,11 @@ def _shift_once(
         small.append(position_rows(np.arange(len(root)), np.eye(3)[axis], none, none + SHIFTS**-2.0))
         bends = (fps**2, -2.0 * fps**2, fps**2)
         small.append(difference_rows(axis, bends, none[1:-1], none[1:-1] + PUSH**-2.0))
-    small = [joined(small)]
+    steady, every = joined(small), np.tile(calm[1:-1], 4)
     for _ in range(ROUNDS):
         now = mass + shift[:, [0, 2]]
-        rows = [
-            row._replace(weights=row.weights * calm[1:-1])
-            for row in balance_rows(points, touches, now, mass, height, allowed, GRAVITY / size, fps)
-        ]
-        shift = solve(rows + small, shift, given)
+        rows = balance_rows(points, touches, now, mass, height, allowed, GRAVITY / size, fps)
+        shift = solve([rows._replace(weights=rows.weights * every), steady], shift, given)
     shift[given] = 0.0
     legs, posed = [joint for foot in feet for joint in foot.leg], pose(skeleton, rotations)
     for share in LESS:

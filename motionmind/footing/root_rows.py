@@ -103,7 +103,7 @@ def _jerk_rows(root: Floats, pushes: float, freedom: Floats, fps: float) -> tupl
     return coefficients, np.full(len(weights), min(pushes, 1e3)), weights
 
 
-def smooth_rows(prior: Floats, mass: Floats, fps: float, vertical: float) -> list[Rows]:
+def smooth_rows(prior: Floats, mass: Floats, fps: float, vertical: float) -> Rows:
     """Return rows for the accelerations of the centre of mass, `mass` [N, 3] relative to the root.
 
     At the ends the root is to move as on the trajectory that feet have it on by themselves [N, 3].
@@ -118,7 +118,7 @@ def smooth_rows(prior: Floats, mass: Floats, fps: float, vertical: float) -> lis
         targets[axis, :-2] = bends[:, axis]
         targets[axis, -2:] = prior[:3, axis] @ leaves, prior[last:, axis] @ arrives
         weights[axis] = share * PUSH**-2.0
-    return [Rows(first, *of_axis) for of_axis in zip(coefficients, targets, weights, strict=True)]
+    return Rows(np.tile(first, 3), coefficients.reshape(-1, 9), targets.reshape(-1), weights.reshape(-1))
 
 
 def standing_rows(shape: Shape, bearing: Bearing, floor: Floats, freedom: Floats) -> list[Rows]:
