@@ -218,7 +218,7 @@ def find_bearing(
         for stance in own:
             here = slice(stance.start, stance.end + 1)
             places[here, k] = stance.places
-            loads[here, k] = _load(stance, len(root), fps)
+            _write_load(stance.start, stance.end, LOADS * fps, k, loads)
     return Bearing(stances, loads, stands, places - shape.tracks, others)
 
 
@@ -248,10 +248,12 @@ def find_staying(shape: Shape, root: Floats) -> int | None:
     return foot if np.linalg.norm(moved, axis=1).min() < NEAR else None
 
 
-def _load(stance: Stance, count: int, fps: float) -> Floats:
-    """Return how much of the weight a foot may bear in the frames of a stance: 1 well within it, less at its ends."""
-    frames = np.arange(stance.start, stance.end + 1)
-    since = frames - stance.start + 1.0 if stance.start > 0 else np.full(len(frames), np.inf)
-    until = stance.end - frames + 1.0 if stance.end < count - 1 else np.full(len(frames), np.inf)
-    s = np.minimum(np.minimum(since, until) / (LOADS * fps), 1.0)
-    return np.asarray(s * s * (3.0 - 2.0 * s))
+@jit
+def _write_load(start: int, end: int, fades: float, foot: int, out: Floats) -> None:
+    """Write how much of the weight a foot may bear in the frames of a stance [N, feet]: 1 well within it, and less
+    where it begins and ends, within so many frames."""
+    for t in range(start, end + 1):
+        since = t - start + 1.0 if start > 0 else np.inf
+        until = end - t + 1.0 if end < len(out) - 1 else np.inf
+        s = min(min(since, until) / fades, 1.0)
+        out[t, foot] = s * s * (3.0 - 2.0 * s)

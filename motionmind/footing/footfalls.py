@@ -45,6 +45,8 @@ class Stance(NamedTuple):
     @property
     def places(self) -> Floats:
         """The foot's place in each of the frames [frames, 2], metres."""
+        if not self.slip.any():
+            return np.broadcast_to(self.place, (self.end + 1 - self.start, 2))
         return self.place + np.linspace(0.0, 1.0, self.end + 1 - self.start)[:, None] * self.slip
 
 

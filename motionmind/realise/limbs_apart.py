@@ -65,7 +65,7 @@ def keep_limbs_apart(
     if not len(pairs):
         return rotations
     places = skeleton.positions_and_tips(rotations, np.zeros(3))
-    ends = np.ascontiguousarray(capsules.place(places))
+    ends = capsules.place(places)
     frames, fps = np.arange(len(rotations)), 1.0 / (times[1] - times[0])
     held = np.array(sorted({*np.floor(given + 1e-6).tolist(), *np.ceil(given - 1e-6).tolist()}), dtype=np.int64)
     before = np.clip(np.searchsorted(held, frames, side="right") - 1, 0, len(held) - 2)
