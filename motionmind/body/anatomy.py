@@ -19,7 +19,7 @@ import msgspec
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices, Ints
-from motionmind.body.skeleton import Points, Skeleton
+from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 
 SIDES = ("left", "right")
@@ -193,13 +193,13 @@ class Anatomy:
 
     def centre_of_mass(self, rotations: Floats, root: Floats) -> Floats:
         """Return the centre of mass [..., 3], metres, for local rotations [..., J, 4] and root positions [..., 3]."""
-        return self.masses_of(self.skeleton).centre(self.skeleton, rotations, root)
+        turned = self.skeleton.global_rotations(rotations)
+        return self.masses_of(self.skeleton).centre(self.skeleton.positions(rotations, root), turned)
 
     def masses_of(self, skeleton: Skeleton) -> Masses:
         """Return the masses of a body with this anatomy, in its own proportions or in others."""
-        masses, centres = self._segments
-        centres = centres * (skeleton.height / self.skeleton.height)
-        return Masses(masses, skeleton.points(np.arange(len(skeleton)), centres))
+        shares, centres = self._segments
+        return Masses(shares, centres * (skeleton.height / self.skeleton.height))
 
     @cached_property
     def _segments(self) -> tuple[Floats, Floats]:
@@ -246,19 +246,24 @@ class Masses(NamedTuple):
 
     Attributes:
         shares: of the body's mass [J].
-        points: the joints, then the segments' centres of mass [2 J].
+        centres: of mass in the joints' frames [J, 3], metres.
     """
 
     shares: Floats
-    points: Points
+    centres: Floats
 
-    def centre(self, skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
-        """Return the centre of mass [..., 3], metres, for local rotations [..., J, 4] and root positions [..., 3]."""
-        from motionmind.body.kinematics import weigh_points  # numba is slow to import
+    def centre(self, places: Floats, turned: Floats) -> Floats:
+        """Return the body's centre of mass [..., 3], metres.
 
-        places = skeleton.positions_of(self.points, rotations, root)
+        Args:
+            places: of the joints, and whatever points after them [..., P, 3], metres.
+            turned: orientations of the joints in the world [..., J, 4].
+        """
+        from motionmind.body.kinematics import weigh  # numba is slow to import
+
         out = np.empty((*places.shape[:-2], 3))
-        weigh_points(places.reshape(-1, *places.shape[-2:]), self.shares, out.reshape(-1, 3))
+        rows = places.reshape(-1, *places.shape[-2:]), turned.reshape(-1, *turned.shape[-2:])
+        weigh(*rows, self.shares, self.centres, out.reshape(-1, 3))
         return out
 
 

@@ -114,6 +114,44 @@ def contact_points(
     return skeleton.positions_of(points, rotations, root), joints
 
 
+class Posed(NamedTuple):
+    """A movement in the world: what touches the floor, the centre of mass and legs that bend are found from it.
+
+    Attributes:
+        rotations: local rotations [T, J, 4].
+        turned: orientations of the joints in the world [T, J, 4].
+        places: of the points that can touch the floor [T, P, 3], metres: joints, tips and heels.
+        joints: the joint that each point belongs to [P].
+    """
+
+    rotations: Floats
+    turned: Floats
+    places: Floats
+    joints: Indices
+
+    @property
+    def lowest(self) -> Floats:
+        """Height of the lowest point [T], metres."""
+        return np.asarray(self.places[..., 1].min(axis=1))
+
+    def part(self, frames: slice) -> Posed:
+        """Return some of the frames."""
+        return self._replace(rotations=self.rotations[frames], turned=self.turned[frames], places=self.places[frames])
+
+
+def pose(skeleton: Skeleton, rotations: Floats, root: Floats | None = None) -> Posed:
+    """Return a movement of local rotations [T, J, 4] in the world, or about its root.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [T, J, 4].
+        root: positions of the root [T, 3], metres; None for 0.
+    """
+    points, joints = _with_heels(skeleton)
+    turned = skeleton.global_rotations(rotations)
+    return Posed(rotations, turned, skeleton.place(points, turned, np.zeros(3) if root is None else root), joints)
+
+
 @remembered
 def _with_heels(skeleton: Skeleton) -> tuple[Points, Indices]:
     return _contacts(skeleton, anatomy_of(skeleton))

@@ -47,11 +47,23 @@ def place_points(places: Floats, turned: Floats, joints: Ints, offsets: Floats) 
 
 
 @jit
-def weigh_points(places: Floats, shares: Floats, out: Floats) -> None:
-    """Write the means [N, 3] of the last J of points [N, P, 3], each with its share [J] of the whole."""
-    first = places.shape[1] - len(shares)
+def weigh(places: Floats, turned: Floats, shares: Floats, centres: Floats, out: Floats) -> None:
+    """Write the centres of mass [N, 3] of bodies, metres.
+
+    Args:
+        places: of the joints, and whatever points after them [N, P, 3], metres.
+        turned: orientations of the joints in the world [N, J, 4].
+        shares: of the body's mass that the joints' segments have [J].
+        centres: of mass of the segments in the joints' frames [J, 3], metres.
+        out: the centres of mass.
+    """
     for t in range(len(places)):
         out[t] = 0.0
-        for j in range(len(shares)):
-            for k in range(3):
-                out[t, k] += shares[j] * places[t, first + j, k]
+        for joint in range(len(shares)):
+            x, y, z, w = turned[t, joint]
+            vx, vy, vz = centres[joint]
+            # As in `rotations.mul_vec`.
+            tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
+            out[t, 0] += shares[joint] * (places[t, joint, 0] + (vx + w * tx + (y * tz - z * ty)))
+            out[t, 1] += shares[joint] * (places[t, joint, 1] + (vy + w * ty + (z * tx - x * tz)))
+            out[t, 2] += shares[joint] * (places[t, joint, 2] + (vz + w * tz + (x * ty - y * tx)))

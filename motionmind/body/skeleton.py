@@ -220,7 +220,7 @@ class Skeleton:
             rotations: local rotations [..., J, 4].
             root: positions of the root [..., 3], metres.
         """
-        return self.positions_of(_joints(self), rotations, root)
+        return self.positions_of(joints_of(self), rotations, root)
 
     def positions_and_tips(self, rotations: Floats, root: Floats) -> Floats:
         """Return the positions [..., 2 J, 3], metres, of all joints, then of all tips.
@@ -256,17 +256,20 @@ class Skeleton:
 
     def positions_of(self, points: Points, rotations: Floats, root: Floats) -> Floats:
         """Return the positions [..., P, 3], metres, of points of this body; arguments as for `positions`."""
+        return self.place(points, self.global_rotations(rotations), root)
+
+    def place(self, points: Points, turned: Floats, root: Floats) -> Floats:
+        """Return the same, from the orientations of the joints in the world [..., J, 4] (`global_rotations`)."""
         from motionmind.body.kinematics import place_points  # numba is slow to import
 
-        root, turned = as_floats("root", root), self.global_rotations(rotations)
         out = np.empty((*turned.shape[:-2], len(points.joints), 3))
-        out[..., 0, :] = root
+        out[..., 0, :] = as_floats("root", root)
         place_points(out.reshape(-1, *out.shape[-2:]), turned.reshape(-1, len(self), 4), *points)
         return out
 
 
 @remembered
-def _joints(skeleton: Skeleton) -> Points:
+def joints_of(skeleton: Skeleton) -> Points:
     """Return a body's joints."""
     return skeleton.points(np.arange(0), np.zeros((0, 3)))
 

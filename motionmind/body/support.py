@@ -19,10 +19,10 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Ints
 from motionmind.body.anatomy import Masses
 from motionmind.body.anatomy_file import anatomy_of
-from motionmind.body.contact import contact_points, limb_heights
+from motionmind.body.contact import Posed, contact_points, limb_heights, pose
 from motionmind.body.human import human23
 from motionmind.body.limbs import limb_of_points
-from motionmind.body.skeleton import Skeleton, remembered
+from motionmind.body.skeleton import Skeleton, joints_of, remembered
 from motionmind.jit import jit
 
 NEAR = 0.05  # metres above the body's lowest point within which a limb can bear
@@ -62,11 +62,11 @@ def find_support(
         fps: frames a second.
         floor: height of the floor, or in each frame [T], metres.
     """
-    places, joints = contact_points(skeleton, rotations, root)
-    limb = limb_of_points(skeleton)[joints]
-    bears, airborne, touches = find_bearers(places, limb, size_of(skeleton), fps, floor)
-    mass = centre_of_mass(skeleton, rotations, root)
-    over = None if mass is None else overhang(places[..., [0, 2]], touches, mass[:, [0, 2]])
+    posed = pose(skeleton, rotations, root)
+    limb = limb_of_points(skeleton)[posed.joints]
+    bears, airborne, touches = find_bearers(posed.places, limb, size_of(skeleton), fps, floor)
+    mass = mass_of(skeleton, posed)
+    over = None if mass is None else overhang(posed.places[..., [0, 2]], touches, mass[:, [0, 2]])
     return Support(bears, airborne, mass, over)
 
 
@@ -106,7 +106,16 @@ def centre_of_mass(skeleton: Skeleton, rotations: Floats, root: Floats) -> Float
         root: positions of the root [..., 3], metres.
     """
     masses = _masses_of(skeleton)
-    return None if masses is None else masses.centre(skeleton, rotations, root)
+    if masses is None:
+        return None
+    turned = skeleton.global_rotations(rotations)
+    return masses.centre(skeleton.place(joints_of(skeleton), turned, root), turned)
+
+
+def mass_of(skeleton: Skeleton, posed: Posed) -> Floats | None:
+    """Return the same of a movement that is posed [T, 3], metres."""
+    masses = _masses_of(skeleton)
+    return None if masses is None else masses.centre(posed.places, posed.turned)
 
 
 @remembered

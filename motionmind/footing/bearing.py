@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices
-from motionmind.body.contact import contact_points
+from motionmind.body.contact import Posed
 from motionmind.body.limbs import limb_of_points, limbs_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.footing.feet import Foot, foot_points, track_of
@@ -55,16 +55,15 @@ class Shape(NamedTuple):
         return np.asarray(self.places[..., 1].min(axis=1))
 
 
-def shape_of(skeleton: Skeleton, rotations: Floats, feet: list[Foot]) -> Shape:
-    """Return the shape of a body with local rotations [N, J, 4]."""
-    places, joints = contact_points(skeleton, rotations, np.zeros((len(rotations), 3)))
-    limb = limb_of_points(skeleton)[joints]
-    of_feet = points_of_feet(skeleton, joints, feet)
+def shape_of(skeleton: Skeleton, posed: Posed, feet: list[Foot]) -> Shape:
+    """Return the shape of a body that is posed about its root."""
+    places, limb = posed.places, limb_of_points(skeleton)[posed.joints]
+    of_feet = points_of_feet(skeleton, posed.joints, feet)
     others = (limb == np.arange(len(limbs_of(skeleton)) + 1)[:, None]) & ~of_feet.any(axis=0)
     hips = places[:, [foot.leg[0] for foot in feet]][..., [0, 2]]
     outward = hips - hips.mean(axis=1, keepdims=True) if feet else hips
     outward /= np.maximum(np.linalg.norm(outward, axis=-1, keepdims=True), 1e-9)
-    tracks = [track_of(foot, places[:, : 2 * len(skeleton)]) for foot in feet]
+    tracks = [track_of(foot, places, len(skeleton)) for foot in feet]
     along = np.stack(tracks, axis=1) if feet else np.zeros((len(places), 0, 2))
     return Shape(places, of_feet, others, lowest(places, of_feet), lowest(places, others), along, outward)
 

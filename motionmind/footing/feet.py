@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices
+from motionmind.body.contact import Posed
 from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.footing.knees import SHIFTS, bend_of, distance_of, keep_detail, slow_down, smoothed
 from motionmind.footing.legs import SOFT, find_hinge, find_legs, stretched, usual_hinge, write_bent
@@ -97,16 +98,16 @@ def foot_points(foot: Foot, joints: Indices, count: int) -> Bools:
     return out
 
 
-def track_of(foot: Foot, places: Floats) -> Floats:
+def track_of(foot: Foot, places: Floats, count: int) -> Floats:
     """Return where a foot is, level, relative to the root [N, 2], metres, so that one that stands or rolls stays.
 
     It moves as its last bone does, both ends of it by how low they are.
 
     Args:
         foot: the foot.
-        places: of all joints, then all tips, relative to the root [N, 2 J, 3], metres.
+        places: of all joints, then all tips, and whatever points after them, relative to the root [N, P, 3], metres.
+        count: number of joints.
     """
-    count = places.shape[1] // 2
     ends = places[:, [foot.leg[-1], count + foot.leg[-1]]]
     height, level = ends[..., 1], ends[..., [0, 2]]
     holds = _hold(np.maximum(height[1:], height[:-1]))
@@ -144,27 +145,6 @@ def _hold(height: Floats) -> Floats:
     """Return how much each end of a foot holds on to the floor [..., 2], by its height [..., 2], metres; sums are 1."""
     share = np.exp(-(height - height.min(axis=-1, keepdims=True)) / GRIP)
     return np.asarray(share / share.sum(axis=-1, keepdims=True))
-
-
-class Posed(NamedTuple):
-    """A movement as its rotations have it, about its root: what legs are bent from.
-
-    Attributes:
-        rotations: local rotations [N, J, 4].
-        turned: orientations of the joints in the world [N, J, 4].
-        places: of joints and tips relative to the root [N, 2 J, 3], metres.
-    """
-
-    rotations: Floats
-    turned: Floats
-    places: Floats
-
-
-def pose(skeleton: Skeleton, rotations: Floats) -> Posed:
-    """Return a movement of local rotations [N, J, 4] about its root."""
-    still = np.zeros((len(rotations), 3))
-    turned = skeleton.global_rotations(rotations)
-    return Posed(rotations, turned, skeleton.positions_and_tips(rotations, still))
 
 
 def softness(holds: Floats) -> Floats:
@@ -303,8 +283,7 @@ def bend_legs(skeleton: Skeleton, posed: Posed, feet: list[Foot], off: Floats, s
         off: how far each is from where the rotations have it [N, feet, 3], metres.
         soft: how near to its full length each falls short [N, feet], a share of it.
     """
-    rotations, turned, places = posed
-    out = rotations.copy()
+    turned, places, out = posed.turned, posed.places, posed.rotations.copy()
     if not feet:
         return out
     chains, hinges = np.array([foot.chain(skeleton) for foot in feet]), [foot.hinge for foot in feet]

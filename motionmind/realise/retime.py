@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.body.contact import TALL, contact_points, lowest_height, slides_between
+from motionmind.body.contact import TALL, Posed, lowest_height, pose, slides_between
 from motionmind.body.motion import Motion
 from motionmind.body.plausibility import GRAVITY
 from motionmind.body.skeleton import Skeleton
@@ -190,14 +190,13 @@ def slow_down(
     for again in range(AGAIN if settle else 1):
         before = clock
         for number in range(ROUNDS):
-            places, _ = contact_points(motion.skeleton, motion.rotations, motion.root)
-            low = places[..., 1].min(axis=1)
-            slower, slack = _slower(motion, places, low, most, slides, moving)
+            posed = pose(motion.skeleton, motion.rotations, motion.root)
+            slower, slack = _slower(motion, posed, most, slides, moving)
             if lasts:
                 slower = _within(slower, slack, np.diff(motion.times))
             if slower.max() < (1.0 / ENDS_AT if again or number else 1.0 + SLIGHT):
                 break
-            motion, clock = _slowed(motion, clock, low, slower)
+            motion, clock = _slowed(motion, clock, posed.lowest, slower)
         if settle is None or clock is before:
             break
         motion = settle(motion, clock)
@@ -205,15 +204,14 @@ def slow_down(
 
 
 def _slower(
-    motion: Motion, places: Floats, low: Floats, most: Floats, slides: float, moving: tuple[bool, bool]
+    motion: Motion, posed: Posed, most: Floats, slides: float, moving: tuple[bool, bool]
 ) -> tuple[Floats, Floats]:
     """Return how many times longer each step of a movement is to take [N - 1], at least 1, and what share of its time
     it could do without [N - 1].
 
     Args:
         motion: the movement.
-        places: of its points that can touch the floor [N, P, 3], metres (`contact_points`).
-        low: height of the lowest of them [N], metres.
+        posed: the same, in the world.
         most: as for `slow_down`, as is all else.
         slides: speed of a foot near the floor, heights/s.
         moving: whether the first and the last posture are passed at a given velocity.
@@ -221,7 +219,7 @@ def _slower(
     times, body = motion.times, motion.skeleton
     middles, fps = 0.5 * (times[1:] + times[:-1]), 1.0 / float(times[1] - times[0])
     ends = [time for fixed, time in zip(moving, times[[0, -1]], strict=True) if fixed]
-    free = np.minimum(_away(middles, ends, fps), _away(middles, times[_falling(motion, low, fps)], fps, PUSHES))
+    free = np.minimum(_away(middles, ends, fps), _away(middles, times[_falling(body, posed, fps)], fps, PUSHES))
     moved = moved_in(motion)
     shown = (fps * steps_of(motion) / most[:-1]).max(axis=1)
     # Twice as slow a movement has a quarter of its accelerations; each is between two steps.
@@ -229,7 +227,7 @@ def _slower(
     changes[_braking(moved, moving, fps)] = 1.0  # the slower the rest, the more a body brakes from what is given
     shown[1:], shown[:-1] = np.maximum(shown[1:], changes), np.maximum(shown[:-1], changes)
     if np.isfinite(slides) and body.height >= TALL:
-        slid = slides_between(body, places, _floor(times, low, times))
+        slid = slides_between(body, posed.places, _floor(times, posed.lowest, times))
         shown = np.maximum(shown, fps * slid.max(axis=1, initial=0.0) / (slides * body.height))
     shown[free < SLIGHT] = 1.0
     reach = max(1, round(AROUND * fps))
@@ -323,10 +321,10 @@ def _away(middles: Floats, times: Iterable[float], fps: float, beside: float = 0
     return np.clip((since - 0.5 / fps - beside) / SETTLES, 0.0, 1.0)
 
 
-def _falling(motion: Motion, low: Floats, fps: float) -> Bools:
-    """Return in which frames the mass of a body falls, off the floor [N]; `low` are its lowest points' heights [N]."""
-    ends, out = np.zeros(len(motion), dtype=np.bool_), np.zeros(len(motion), dtype=np.bool_)
+def _falling(skeleton: Skeleton, posed: Posed, fps: float) -> Bools:
+    """Return in which frames of a movement the mass of a body falls, off the floor [N]."""
+    ends, out = np.zeros(len(posed.places), dtype=np.bool_), np.zeros(len(posed.places), dtype=np.bool_)
     ends[[0, -1]] = True
-    for start, stop in find_falls(motion.skeleton, motion.rotations, motion.root, low, ends, fps)[1]:
+    for start, stop in find_falls(skeleton, posed, ends, fps)[1]:
         out[start:stop] = True
     return out

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from motionmind._typing import Floats
+from motionmind.body.contact import pose
 from motionmind.body.human import human23
 from motionmind.body.limbs import limbs_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import find_support
 from motionmind.footing.balance import ROOM, WALKS, balance_rows, falls_without, is_beyond, walks
-from motionmind.footing.feet import bend_legs, find_free_feet, pose
+from motionmind.footing.feet import bend_legs, find_free_feet
 from motionmind.footing.leaning import STILL, shift_weight
 from motionmind.footing.least_squares import Rows
 from motionmind.footing.legs import SOFT
