@@ -21,7 +21,7 @@ import numpy as np
 from motionmind._typing import Floats, Ints
 from motionmind.body.anatomy import SIDES
 from motionmind.body.human import human23
-from motionmind.body.skeleton import Skeleton
+from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.geometry.segments import nearest_points
 from motionmind.jit import jit
 
@@ -104,19 +104,15 @@ def _pairs(names: tuple[str, ...]) -> Ints:
     return np.array(chosen, dtype=np.int64).reshape(-1, 2)
 
 
+@remembered
 def capsules_of(skeleton: Skeleton) -> Capsules:
     """Return the capsules of a body; none if it is no person."""
-    return _capsules_of(skeleton.names, skeleton.parents, skeleton.height)
-
-
-@lru_cache(maxsize=16)
-def _capsules_of(names: tuple[str, ...], parents: tuple[int, ...], height: float) -> Capsules:
-    """Return the capsules of a body of these joints and of some height, metres."""
+    names, parents = skeleton.names, skeleton.parents
     if not set(human23().names) <= set(names):
         return Capsules((), np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2)))
     shapes = {f"{side}_{part}": (f"{side}_", shape) for side in SIDES for part, shape in _SIDED.items()}
     shapes |= {part: ("", shape) for part, shape in _MIDDLE.items()}
-    points, size = [], height / human23().height
+    points, size = [], skeleton.height / human23().height
     for prefix, shape in shapes.values():
         start, end = names.index(prefix + shape.start), names.index(prefix + shape.end.removesuffix("_tip"))
         if shape.end.endswith("_tip"):

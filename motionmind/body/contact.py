@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices
+from motionmind.arguments import as_floats
 from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.limbs import limb_of_points, limbs_of
@@ -57,8 +58,14 @@ def lowest_height(skeleton: Skeleton, rotations: Floats, root: Floats, *, heels:
         root: positions of the root [..., 3], metres.
         heels: whether heels count besides joints and tips (see the module).
     """
-    places, _ = contact_points(skeleton, rotations, root, heels=heels)
-    return np.asarray(places[..., 1].min(axis=-1))
+    from motionmind.body.kinematics import write_lowest  # numba is slow to import
+
+    points, _ = (_with_heels if heels else _without_heels)(skeleton)
+    turned, root = skeleton.global_rotations(rotations), as_floats("root", root)
+    out = np.empty(turned.shape[:-2])
+    out[...] = root[..., 1]
+    write_lowest(out.reshape(-1), turned.reshape(-1, len(skeleton), 4), *points)
+    return out
 
 
 def limb_heights(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:

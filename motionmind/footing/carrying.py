@@ -166,6 +166,7 @@ def carry(
     legs, knees = legs_of(skeleton, plain.places, feet), [float(allowed.fastest[foot.leg[foot.knee]]) for foot in feet]
     start, off, bent = root, np.zeros((count, len(feet), 3)), plain.rotations
     touches, borne = bearing.touching(shape), _borne_rows(shape, bearing, root, floor, freedom, fps)
+    holds = bearing.holds(fps)
     balances = "balance" not in without and bool(mass.any())
     stands = balances and staying is None and "steps" not in without and not walks(root, fps)
     for number_of_round in range(ROUNDS[0]):
@@ -174,6 +175,7 @@ def carry(
             if falls is not None:
                 bearing = find_bearing(*planned, falls)
                 touches, borne = bearing.touching(shape), _borne_rows(shape, bearing, root, floor, freedom, fps)
+                holds = bearing.holds(fps)
         mass = own_mass if bent is plain.rotations else _mass(skeleton, pose(skeleton, bent))
         smooth = smooth_rows(root, mass, fps, 1e-4 if "bounce" in without else 1.0)
         falling = flight_rows(flights, mass, standing, gravity, fps)
@@ -196,12 +198,12 @@ def carry(
             start = solve(rows, start, fixed)
         off = _departures(skeleton, shape, bearing, floor, start, feet, knees, known.moving, fps)
         if number_of_round < ROUNDS[0] - 1:
-            bent = bend_legs(skeleton, plain, feet, off, softness(bearing.holds(fps)))
+            bent = bend_legs(skeleton, plain, feet, off, softness(holds))
     detailed, falls = shape, np.zeros((count, 3))
     if moving is not plain:
         detailed, falls = shape_of(skeleton, moving, feet), own_mass - _mass(skeleton, moving)
-    start, off, heights = _with_detail(shape, detailed, bearing, falls, flying, start, off, floor, fps)
-    return Carried(start, off, bearing.holds(fps), heights, 1.0 - freedom, staying)
+    start, off, heights = _with_detail(shape, detailed, bearing, holds, falls, flying, start, off, floor, fps)
+    return Carried(start, off, holds, heights, 1.0 - freedom, staying)
 
 
 def _borne_rows(shape: Shape, bearing: Bearing, prior: Floats, floor: Floats, freedom: Floats, fps: float) -> Rows:
@@ -238,6 +240,7 @@ def _with_detail(
     plain: Shape,
     detailed: Shape,
     bearing: Bearing,
+    holds: Floats,
     falls: Floats,
     flying: Bools,
     root: Floats,
@@ -255,6 +258,7 @@ def _with_detail(
         plain: the body without detail.
         detailed: the body with it.
         bearing: what bears it.
+        holds: how much each foot holds its place [N, feet], from 0 to 1.
         falls: how far detail takes the root from the centre of mass [N, 3], metres.
         flying: where nothing bears the body [N].
         root: positions of the root without detail [N, 3], metres.
@@ -280,7 +284,7 @@ def _with_detail(
     off = off.copy()
     off[..., 1] += kept - reached
     slips = plain.tracks - detailed.tracks - (moved - root)[:, None, [0, 2]]
-    off[..., [0, 2]] += (bearing.holds(fps) * fades[:, None])[..., None] * slips
+    off[..., [0, 2]] += (holds * fades[:, None])[..., None] * slips
     return moved, off, kept
 
 

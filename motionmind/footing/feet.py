@@ -286,9 +286,10 @@ def bend_legs(skeleton: Skeleton, posed: Posed, feet: list[Foot], off: Floats, s
     turned, places, out = posed.turned, posed.places, posed.rotations.copy()
     if not feet:
         return out
-    chains, hinges = np.array([foot.chain(skeleton) for foot in feet]), [foot.hinge for foot in feet]
-    hips, hinge = chains[:, 0], None if hinges[0] is None else np.array(hinges)
-    usual = usual_hinge(turned[:, hips], places[:, chains], hinge)
+    chains = np.array([foot.chain(skeleton) for foot in feet])
+    hips, usual = chains[:, 0], None if feet[0].hinge is None else np.array([foot.hinge for foot in feet])
+    if usual is None or not usual.any(axis=1).all():
+        usual = usual_hinge(turned[:, hips], places[:, chains], usual)
     above = np.array([skeleton.parents[hip] for hip in hips.tolist()])
     write_bent(out, turned, places, chains, above, np.ascontiguousarray(off), usual, np.ascontiguousarray(soft))
     if not np.isfinite(out[:, hips]).all():
