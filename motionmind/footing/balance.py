@@ -188,14 +188,23 @@ def _nearest_in_support(points: Floats, touches: Bools, wanted: Floats) -> Float
     angles, chosen = np.empty(points.shape[1]), np.empty(points.shape[1], np.int64)
     for t in range(len(points)):
         count = 0
-        best = np.inf
         for i in range(points.shape[1]):
-            if not touches[t, i]:
+            if touches[t, i]:
+                chosen[count] = i
+                angles[count] = np.arctan2(points[t, i, 1] - wanted[t, 1], points[t, i, 0] - wanted[t, 0])
+                count += 1
+        if count > 2:
+            angles[:count].sort()
+            gap = angles[0] + 2.0 * np.pi - angles[count - 1]
+            for i in range(1, count):
+                gap = max(gap, angles[i] - angles[i - 1])
+            if gap < np.pi:
                 continue
-            chosen[count] = i
-            count += 1
+        best = np.inf
+        for number in range(count):
+            i = chosen[number]
             dx, dy = points[t, i, 0] - wanted[t, 0], points[t, i, 1] - wanted[t, 1]
-            for j in chosen[:count]:
+            for j in chosen[: number + 1]:
                 ex, ey = points[t, j, 0] - points[t, i, 0], points[t, j, 1] - points[t, i, 1]
                 length = ex * ex + ey * ey
                 share = 0.0 if length < 1e-12 else min(max(-(dx * ex + dy * ey) / length, 0.0), 1.0)
@@ -203,13 +212,4 @@ def _nearest_in_support(points: Floats, touches: Bools, wanted: Floats) -> Float
                 if x * x + y * y < best:
                     best = x * x + y * y
                     out[t, 0], out[t, 1] = wanted[t, 0] + x, wanted[t, 1] + y
-        if count > 2:
-            for n in range(count):
-                angles[n] = np.arctan2(points[t, chosen[n], 1] - wanted[t, 1], points[t, chosen[n], 0] - wanted[t, 0])
-            angles[:count].sort()
-            gap = angles[0] + 2.0 * np.pi - angles[count - 1]
-            for i in range(1, count):
-                gap = max(gap, angles[i] - angles[i - 1])
-            if gap < np.pi:
-                out[t] = wanted[t]
     return out

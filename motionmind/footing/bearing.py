@@ -215,9 +215,7 @@ def find_bearing(
     loads, places = np.zeros(stands.shape), tracks.copy()
     for k, own in enumerate(stances):
         for stance in own:
-            here = slice(stance.start, stance.end + 1)
-            places[here, k] = stance.places
-            _write_load(stance.start, stance.end, LOADS * fps, k, loads)
+            _write_stance(*stance, LOADS * fps, k, places, loads)
     return Bearing(stances, loads, stands, places - shape.tracks, others)
 
 
@@ -248,11 +246,18 @@ def find_staying(shape: Shape, root: Floats) -> int | None:
 
 
 @jit
-def _write_load(start: int, end: int, fades: float, foot: int, out: Floats) -> None:
-    """Write how much of the weight a foot may bear in the frames of a stance [N, feet]: 1 well within it, and less
-    where it begins and ends, within so many frames."""
+def _write_stance(
+    start: int, end: int, place: Floats, slip: Floats, fades: float, foot: int, places: Floats, loads: Floats
+) -> None:
+    """Write the places of a foot in its stance [N, feet, 2], metres, and how much of the weight it may bear [N, feet].
+
+    It bears all of it well within the stance, and less where that begins and ends, within so many frames.
+    """
     for t in range(start, end + 1):
+        share = 1.0 if t == end > start else (t - start) * (1.0 / max(end - start, 1))
+        for k in range(2):
+            places[t, foot, k] = place[k] + share * slip[k]
         since = t - start + 1.0 if start > 0 else np.inf
-        until = end - t + 1.0 if end < len(out) - 1 else np.inf
+        until = end - t + 1.0 if end < len(loads) - 1 else np.inf
         s = min(min(since, until) / fades, 1.0)
-        out[t, foot] = s * s * (3.0 - 2.0 * s)
+        loads[t, foot] = s * s * (3.0 - 2.0 * s)

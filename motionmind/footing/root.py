@@ -53,7 +53,8 @@ def root_trajectory(
     """
     points = posed.places[:, : 2 * len(skeleton)]
     height = points[..., 1] - points[..., 1].min(axis=-1, keepdims=True) + clearance[:, None]
-    hold = np.exp(-np.maximum(height[1:], height[:-1]) / GRIP) * stands[:, limb_of_points(skeleton)] ** BEARS
+    firm = (stands**BEARS)[:, limb_of_points(skeleton)]
+    hold = np.exp(-np.maximum(height[1:], height[:-1]) / GRIP) * firm
     weight = SLIP + hold.sum(axis=1)
     steps = (SLIP * drift - np.einsum("np,npk->nk", hold, np.diff(points, axis=0))) / weight[:, None]
     slack = (1.0 / weight) / np.sum(1.0 / weight)
