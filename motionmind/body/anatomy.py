@@ -164,13 +164,17 @@ class Anatomy:
             joints: those whose angles are wanted; the others' are 0. None for all.
         """
         wanted = np.arange(len(self.skeleton)) if joints is None else np.array(joints, dtype=np.intp)
-        turned = rotations[..., wanted, :]
-        for index, frame in self._measured_elsewhere:
-            for place in np.flatnonzero(wanted == index):
-                turned[..., place, :] = rot.mul(self._between(rotations, frame, index), turned[..., place, :])
         out = np.zeros((*rotations.shape[:-1], 3))
-        out[..., wanted, :] = to_degrees(self._conventions.of(wanted), turned)
+        out[..., wanted, :] = self.degrees_of(wanted, rotations)
         return out
+
+    def degrees_of(self, joints: Indices, rotations: Floats) -> Floats:
+        """Return the angles of some joints alone [..., n, 3], by their numbers [n]; see `degrees`."""
+        turned = rotations[..., joints, :]
+        for index, frame in self._measured_elsewhere:
+            for place in np.flatnonzero(joints == index):
+                turned[..., place, :] = rot.mul(self._between(rotations, frame, index), turned[..., place, :])
+        return to_degrees(self._conventions.of(joints), turned)
 
     @cached_property
     def limits(self) -> tuple[Floats, Floats]:
@@ -187,20 +191,15 @@ class Anatomy:
         """Whether the weight of its parts is known."""
         return bool(self._segments[0].any())
 
-    def centre_of_mass(self, rotations: Floats, root: Floats, skeleton: Skeleton | None = None) -> Floats:
-        """Return the centre of mass [..., 3], metres, for local rotations [..., J, 4] and root positions [..., 3].
+    def centre_of_mass(self, rotations: Floats, root: Floats) -> Floats:
+        """Return the centre of mass [..., 3], metres, for local rotations [..., J, 4] and root positions [..., 3]."""
+        turned = self.skeleton.global_rotations(rotations)
+        return self.masses_of(self.skeleton).centre(self.skeleton.positions(rotations, root), turned)
 
-        Args:
-            rotations: local rotations [..., J, 4].
-            root: positions of the root [..., 3], metres.
-            skeleton: the body, where it has other proportions than the anatomy's own.
-        """
-        body = skeleton or self.skeleton
-        masses, centres = self._segments
-        if skeleton is not None:
-            centres = centres * (skeleton.height / self.skeleton.height)
-        segments = body.positions_with(rotations, root, np.arange(len(body)), centres)[..., len(body) :, :]
-        return np.asarray(np.einsum("j,...jk->...k", masses, segments))
+    def masses_of(self, skeleton: Skeleton) -> Masses:
+        """Return the masses of a body with this anatomy, in its own proportions or in others."""
+        shares, centres = self._segments
+        return Masses(shares, centres * (skeleton.height / self.skeleton.height))
 
     @cached_property
     def _segments(self) -> tuple[Floats, Floats]:
@@ -239,6 +238,32 @@ class Anatomy:
         while above != frame:
             out = rot.mul(rotations[..., above, :], out)
             above = self.skeleton.parents[above]
+        return out
+
+
+class Masses(NamedTuple):
+    """The masses of a body's segments.
+
+    Attributes:
+        shares: of the body's mass [J].
+        centres: of mass in the joints' frames [J, 3], metres.
+    """
+
+    shares: Floats
+    centres: Floats
+
+    def centre(self, places: Floats, turned: Floats) -> Floats:
+        """Return the body's centre of mass [..., 3], metres.
+
+        Args:
+            places: of the joints, and whatever points after them [..., P, 3], metres.
+            turned: orientations of the joints in the world [..., J, 4].
+        """
+        from motionmind.body.kinematics import weigh  # numba is slow to import
+
+        out = np.empty((*places.shape[:-2], 3))
+        rows = places.reshape(-1, *places.shape[-2:]), turned.reshape(-1, *turned.shape[-2:])
+        weigh(*rows, self.shares, self.centres, out.reshape(-1, 3))
         return out
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from motionmind.body.anatomy import SIDES, Anatomy, Joint, Leg
 from motionmind.body.human import BODIES
-from motionmind.body.skeleton import Skeleton
+from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.errors import FormatError, did_you_mean
 from motionmind.files import FilePath, parse_toml, read_bytes
 
@@ -52,6 +52,7 @@ def anatomy_named(name: str) -> Anatomy:
     return read_body(_bundled(name))
 
 
+@remembered
 def anatomy_of(skeleton: Skeleton) -> Anatomy | None:
     """Return the anatomy of a body with the joints of human23 or human44, in any proportions; None for other bodies."""
     return next((anatomy_named(name) for name, make in BODIES.items() if make().names == skeleton.names), None)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from functools import lru_cache
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ import numpy as np
 from motionmind._typing import Floats, Ints
 from motionmind.body.anatomy import SIDES
 from motionmind.body.human import human23
-from motionmind.body.skeleton import Skeleton
+from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.geometry.segments import nearest_points
 from motionmind.jit import jit
 
@@ -76,8 +77,10 @@ class Capsules(NamedTuple):
 
     def place(self, positions: Floats) -> Floats:
         """Return the ends [..., C, 2, 3], metres, from the `positions_and_tips` [..., 2 J, 3] of the skeleton."""
-        first, second = (positions.take(of, axis=-2) for of in self.points.T)
-        return np.asarray(first[..., None, :] + self.shares[..., None] * (second - first)[..., None, :])
+        *shape, count, _ = positions.shape
+        out = np.empty((prod(shape), len(self.names), 2, 3))
+        _place(positions.reshape(len(out), count, 3), self.points, self.shares, out)
+        return out.reshape(*shape, *out.shape[1:])
 
     def pairs(self) -> Ints:
         """Return the pairs of capsules that could pass through each other [P, 2].
@@ -101,19 +104,15 @@ def _pairs(names: tuple[str, ...]) -> Ints:
     return np.array(chosen, dtype=np.int64).reshape(-1, 2)
 
 
+@remembered
 def capsules_of(skeleton: Skeleton) -> Capsules:
     """Return the capsules of a body; none if it is no person."""
-    return _capsules_of(skeleton.names, skeleton.parents, skeleton.height)
-
-
-@lru_cache(maxsize=16)
-def _capsules_of(names: tuple[str, ...], parents: tuple[int, ...], height: float) -> Capsules:
-    """Return the capsules of a body of these joints and of some height, metres."""
+    names, parents = skeleton.names, skeleton.parents
     if not set(human23().names) <= set(names):
         return Capsules((), np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2)))
     shapes = {f"{side}_{part}": (f"{side}_", shape) for side in SIDES for part, shape in _SIDED.items()}
     shapes |= {part: ("", shape) for part, shape in _MIDDLE.items()}
-    points, size = [], height / human23().height
+    points, size = [], skeleton.height / human23().height
     for prefix, shape in shapes.values():
         start, end = names.index(prefix + shape.start), names.index(prefix + shape.end.removesuffix("_tip"))
         if shape.end.endswith("_tip"):
@@ -171,6 +170,17 @@ def _depths(skeleton: Skeleton, rotations: Floats, capsules: Capsules, pairs: In
 
 def _sided(side: str, parts: Collection[str]) -> set[str]:
     return {f"{side}_{part}" for part in parts}
+
+
+@jit
+def _place(positions: Floats, points: Ints, shares: Floats, out: Floats) -> None:
+    """Write the ends [T, C, 2, 3] of axes between points [C, 2] at positions [T, P, 3], by their shares [C, 2]."""
+    for t in range(len(positions)):
+        for c in range(len(points)):
+            first, second = positions[t, points[c, 0]], positions[t, points[c, 1]]
+            for end in range(2):
+                for k in range(3):
+                    out[t, c, end, k] = first[k] + shares[c, end] * (second[k] - first[k])
 
 
 @jit

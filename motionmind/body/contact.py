@@ -18,10 +18,11 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices
+from motionmind.arguments import as_floats
 from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.limbs import limb_of_points, limbs_of
-from motionmind.body.skeleton import Skeleton
+from motionmind.body.skeleton import Points, Skeleton, remembered
 
 RATE = 30.0  # frames a second at which feet are measured
 LOW = 0.05  # metres above the floor below which a foot should stand
@@ -57,8 +58,14 @@ def lowest_height(skeleton: Skeleton, rotations: Floats, root: Floats, *, heels:
         root: positions of the root [..., 3], metres.
         heels: whether heels count besides joints and tips (see the module).
     """
-    places, _ = contact_points(skeleton, rotations, root, heels=heels)
-    return np.asarray(places[..., 1].min(axis=-1))
+    from motionmind.body.kinematics import write_lowest  # numba is slow to import
+
+    points, _ = (_with_heels if heels else _without_heels)(skeleton)
+    turned, root = skeleton.global_rotations(rotations), as_floats("root", root)
+    out = np.empty(turned.shape[:-2])
+    out[...] = root[..., 1]
+    write_lowest(out.reshape(-1), turned.reshape(-1, len(skeleton), 4), *points)
+    return out
 
 
 def limb_heights(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
@@ -91,8 +98,8 @@ def lowest_point(anatomy: Anatomy, rotations: Floats, root: Floats) -> tuple[Flo
         rotations: local rotations [T, J, 4].
         root: positions of the root [T, 3], metres.
     """
-    places, joints = _points(anatomy.skeleton, rotations, root, anatomy)
-    heights = places[..., 1]
+    points, joints = _contacts(anatomy.skeleton, anatomy)
+    heights = anatomy.skeleton.positions_of(points, rotations, root)[..., 1]
     at = heights.argmin(axis=-1)
     return np.take_along_axis(heights, at[..., None], axis=-1)[..., 0], joints[at]
 
@@ -110,19 +117,68 @@ def contact_points(
         root: positions of the root [..., 3], metres.
         heels: whether heels count besides joints and tips (see the module).
     """
-    return _points(skeleton, rotations, root, anatomy_of(skeleton) if heels else None)
+    points, joints = (_with_heels if heels else _without_heels)(skeleton)
+    return skeleton.positions_of(points, rotations, root), joints
 
 
-def _points(skeleton: Skeleton, rotations: Floats, root: Floats, anatomy: Anatomy | None) -> tuple[Floats, Indices]:
-    """Return the places [..., P, 3] of all joints, all tips and, given an anatomy with legs, both heels; and the joint
-    [P] that each point belongs to."""
+class Posed(NamedTuple):
+    """A movement in the world: what touches the floor, the centre of mass and legs that bend are found from it.
+
+    Attributes:
+        rotations: local rotations [T, J, 4].
+        turned: orientations of the joints in the world [T, J, 4].
+        places: of the points that can touch the floor [T, P, 3], metres: joints, tips and heels.
+        joints: the joint that each point belongs to [P].
+    """
+
+    rotations: Floats
+    turned: Floats
+    places: Floats
+    joints: Indices
+
+    @property
+    def lowest(self) -> Floats:
+        """Height of the lowest point [T], metres."""
+        return np.asarray(self.places[..., 1].min(axis=1))
+
+    def part(self, frames: slice) -> Posed:
+        """Return some of the frames."""
+        return self._replace(rotations=self.rotations[frames], turned=self.turned[frames], places=self.places[frames])
+
+
+def pose(skeleton: Skeleton, rotations: Floats, root: Floats | None = None) -> Posed:
+    """Return a movement of local rotations [T, J, 4] in the world, or about its root.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [T, J, 4].
+        root: positions of the root [T, 3], metres; None for 0.
+    """
+    points, joints = _with_heels(skeleton)
+    turned = skeleton.global_rotations(rotations)
+    return Posed(rotations, turned, skeleton.place(points, turned, np.zeros(3) if root is None else root), joints)
+
+
+@remembered
+def _with_heels(skeleton: Skeleton) -> tuple[Points, Indices]:
+    return _contacts(skeleton, anatomy_of(skeleton))
+
+
+@remembered
+def _without_heels(skeleton: Skeleton) -> tuple[Points, Indices]:
+    return _contacts(skeleton, None)
+
+
+def _contacts(skeleton: Skeleton, anatomy: Anatomy | None) -> tuple[Points, Indices]:
+    """Return all joints, all tips and, given an anatomy with legs, both heels; and the joint [P] that each belongs
+    to."""
     ankles, heels = (
         ((), ()) if anatomy is None else _heel_points(anatomy, skeleton is anatomy.skeleton, skeleton.height)
     )
     own = np.arange(len(skeleton))
     joints = np.concatenate([own, own, np.array(ankles, dtype=np.int64)])
-    points = np.concatenate([skeleton.tips, heels]) if ankles else skeleton.tips
-    return skeleton.positions_with(rotations, root, joints[len(skeleton) :], points), joints
+    places = np.concatenate([skeleton.tips, heels]) if ankles else skeleton.tips
+    return skeleton.points(joints[len(skeleton) :], places), joints
 
 
 def heels_of(skeleton: Skeleton) -> dict[str, Heel]:
@@ -177,6 +233,7 @@ def find_floor(skeleton: Skeleton, rotations: Floats, root: Floats, *, heels: bo
 # --- feet -------------------------------------------------------------------------------------------------------------
 
 
+@remembered
 def find_feet(skeleton: Skeleton) -> list[int]:
     """Return the joints that end in feet: a person's toes, all legs of an insect.
 
@@ -220,7 +277,13 @@ def foot_slides(skeleton: Skeleton, rotations: Floats, root: Floats, floor: floa
         root: positions of the root joint [T, 3], metres.
         floor: height of the floor, or in each frame [T], metres.
     """
-    moved, height = _foot_ends(skeleton, rotations, root, floor)
+    return slides_between(skeleton, skeleton.positions_and_tips(rotations, root), floor)
+
+
+def slides_between(skeleton: Skeleton, places: Floats, floor: float | Floats) -> Floats:
+    """Return what `foot_slides` does, of a body whose joints and tips, and whatever points after them, are at places
+    [T, P, 3], metres."""
+    moved, height = _foot_ends(skeleton, places, floor)
     least = np.where(height < LOW, moved, np.inf).min(axis=-1)
     return np.where(np.isfinite(least), least, 0.0)
 
@@ -236,7 +299,7 @@ def feet_that_stay(skeleton: Skeleton, rotations: Floats, root: Floats, floor: f
         root: positions of the root joint [T, 3], metres.
         floor: height of the floor, metres.
     """
-    moved, height = _foot_ends(skeleton, rotations, root, floor)
+    moved, height = _foot_ends(skeleton, skeleton.positions_and_tips(rotations, root), floor)
     least = np.where(height < LOW, moved, np.inf).min(axis=-1)
     return np.asarray(least.sum(axis=0) <= STAYS)
 
@@ -255,17 +318,17 @@ def foot_slide(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float
         root: positions of the root joint [T, 3], metres.
         floor: height of the floor, metres; for a recording, from `find_floor`.
     """
-    moved, height = _foot_ends(skeleton, rotations, root, floor)
+    moved, height = _foot_ends(skeleton, skeleton.positions_and_tips(rotations, root), floor)
     share = np.clip(2.0 - 2.0 ** (height / _SOFT), 0.0, 1.0)
     least = np.where(share > 0.0, moved * share, np.inf).min(axis=-1)
     return float(100.0 * np.where(np.isfinite(least), least, 0.0).mean()) if least.size else 0.0
 
 
-def _foot_ends(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float | Floats) -> tuple[Floats, Floats]:
+def _foot_ends(skeleton: Skeleton, places: Floats, floor: float | Floats) -> tuple[Floats, Floats]:
     """Return how far both ends of each foot's last bone move, level, to the next frame, and the greater of their
-    heights above the floor in the two frames: [T - 1, feet, 2] each, metres."""
+    heights above the floor in the two frames: [T - 1, feet, 2] each, metres; from places of joints and tips."""
     feet = np.array(find_feet(skeleton), dtype=np.intp)
-    places = skeleton.positions_and_tips(rotations, root)[:, np.stack([feet, feet + len(skeleton)], axis=-1)]
-    moved = np.hypot(np.diff(places[..., 0], axis=0), np.diff(places[..., 2], axis=0))
-    height = places[..., 1] - np.reshape(floor, (-1, 1, 1))
+    ends = places[:, np.stack([feet, feet + len(skeleton)], axis=-1)]
+    moved = np.hypot(np.diff(ends[..., 0], axis=0), np.diff(ends[..., 2], axis=0))
+    height = ends[..., 1] - np.reshape(floor, (-1, 1, 1))
     return moved, np.maximum(height[1:], height[:-1])

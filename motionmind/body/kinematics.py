@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from motionmind._typing import Floats, Ints
 from motionmind.jit import jit
 
@@ -44,3 +46,44 @@ def place_points(places: Floats, turned: Floats, joints: Ints, offsets: Floats) 
             places[t, point, 0] = places[t, joint, 0] + (vx + w * tx + (y * tz - z * ty))
             places[t, point, 1] = places[t, joint, 1] + (vy + w * ty + (z * tx - x * tz))
             places[t, point, 2] = places[t, joint, 2] + (vz + w * tz + (x * ty - y * tx))
+
+
+@jit
+def write_lowest(lowest: Floats, turned: Floats, joints: Ints, offsets: Floats) -> None:
+    """Write the heights [N] of the lowest of points, metres, that `place_points` places, over those of the first.
+
+    Other arguments are as there.
+    """
+    heights = np.empty(len(joints))
+    for t in range(len(lowest)):
+        heights[0] = lowest[t]
+        for point in range(1, len(joints)):
+            joint = joints[point]
+            x, y, z, w = turned[t, joint]
+            vx, vy, vz = offsets[point]
+            tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
+            heights[point] = heights[joint] + (vy + w * ty + (z * tx - x * tz))
+            lowest[t] = min(lowest[t], heights[point])
+
+
+@jit
+def weigh(places: Floats, turned: Floats, shares: Floats, centres: Floats, out: Floats) -> None:
+    """Write the centres of mass [N, 3] of bodies, metres.
+
+    Args:
+        places: of the joints, and whatever points after them [N, P, 3], metres.
+        turned: orientations of the joints in the world [N, J, 4].
+        shares: of the body's mass that the joints' segments have [J].
+        centres: of mass of the segments in the joints' frames [J, 3], metres.
+        out: the centres of mass.
+    """
+    for t in range(len(places)):
+        out[t] = 0.0
+        for joint in range(len(shares)):
+            x, y, z, w = turned[t, joint]
+            vx, vy, vz = centres[joint]
+            # As in `rotations.mul_vec`.
+            tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
+            out[t, 0] += shares[joint] * (places[t, joint, 0] + (vx + w * tx + (y * tz - z * ty)))
+            out[t, 1] += shares[joint] * (places[t, joint, 1] + (vy + w * ty + (z * tx - x * tz)))
+            out[t, 2] += shares[joint] * (places[t, joint, 2] + (vz + w * tz + (x * ty - y * tx)))

@@ -21,7 +21,7 @@ import numpy as np
 
 from motionmind._typing import Ints
 from motionmind.body.mirror import MIDDLE, sides_of
-from motionmind.body.skeleton import Skeleton
+from motionmind.body.skeleton import Skeleton, remembered
 
 TRUNK = "trunk"
 
@@ -54,6 +54,7 @@ def _limbs_of(parents: tuple[int, ...]) -> tuple[tuple[int, ...], ...]:
     return tuple(limbs)
 
 
+@remembered
 def limb_of_points(skeleton: Skeleton) -> Ints:
     """Return the number in `limbs_of` of the limb of each joint, then of each tip [2 J].
 
@@ -63,7 +64,9 @@ def limb_of_points(skeleton: Skeleton) -> Ints:
     out = np.full(len(skeleton), len(limbs), dtype=np.int64)
     for number, limb in enumerate(limbs):
         out[limb] = number
-    return np.concatenate([out, out])
+    out = np.concatenate([out, out])
+    out.setflags(write=False)
+    return out
 
 
 def parts_of(skeleton: Skeleton) -> tuple[Ints, ...]:

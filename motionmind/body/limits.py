@@ -30,15 +30,17 @@ def within_limits(
         loose: joints without limits [J].
         joints: those that may be beyond their limits; None for all.
     """
+    from motionmind.body.angles import find_beyond  # numba is slow to import
+
     anatomy = anatomy_of(skeleton)
     if anatomy is None:
         return rotations
     wanted = np.arange(len(skeleton)) if joints is None else np.array(joints, dtype=np.intp)
-    degrees = anatomy.degrees(np.concatenate([rotations, given]), joints)[:, wanted]
+    degrees = anatomy.degrees_of(wanted, np.concatenate([rotations, given]))
     degrees, shown = degrees[: len(rotations)], degrees[len(rotations) :]
     least, most = (limits[wanted] for limits in anatomy.limits)
     least, most = np.minimum(least, shown.min(axis=0)), np.maximum(most, shown.max(axis=0))
-    beyond = ((degrees < least) | (degrees > most)).any(axis=-1) & ~loose[wanted]
+    beyond = find_beyond(degrees, least, most) & ~loose[wanted]
     frames = np.flatnonzero(beyond.any(axis=1))
     if len(frames) == 0:
         return rotations

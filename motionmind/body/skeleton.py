@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+from functools import cached_property, wraps
 from numbers import Integral
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -16,6 +17,34 @@ from motionmind.body.everyday import suggest_joint
 from motionmind.display import displayed
 from motionmind.errors import SkeletonError
 from motionmind.geometry import rotations as rot
+
+_Found = TypeVar("_Found")
+
+
+def remembered(find: Callable[[Skeleton], _Found]) -> Callable[[Skeleton], _Found]:
+    """Return a function that finds something of a skeleton once, and then remembers it: nobody is to change it."""
+
+    @wraps(find)
+    def of(skeleton: Skeleton) -> _Found:
+        known = skeleton._known
+        if find not in known:
+            known[find] = find(skeleton)
+        found: _Found = known[find]
+        return found
+
+    return of
+
+
+class Points(NamedTuple):
+    """Points of a body: its joints, then others.
+
+    Attributes:
+        joints: those in whose frames the points are [P]; of a joint its parent, of the root -1.
+        places: of the points in these frames [P, 3], metres.
+    """
+
+    joints: Ints
+    places: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +166,10 @@ class Skeleton:
             return f"{other.name} lists the same joints in another order"
         return None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields, and nothing that was found of them."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}
+
     def _parent_names(self) -> dict[str, str]:
         above = ("nothing" if parent < 0 else self.names[parent] for parent in self.parents)
         return dict(zip(self.names, above, strict=True))
@@ -145,6 +178,11 @@ class Skeleton:
     def _tree(self) -> Ints:
         """The joints' parents [J], as compiled code takes them."""
         return np.array(self.parents, dtype=np.int64)
+
+    @cached_property
+    def _known(self) -> dict[Callable[[Skeleton], Any], Any]:
+        """What is `remembered` of this skeleton, by what finds it."""
+        return {}
 
     @cached_property
     def rest(self) -> Floats:
@@ -182,14 +220,14 @@ class Skeleton:
             rotations: local rotations [..., J, 4].
             root: positions of the root [..., 3], metres.
         """
-        return self.positions_with(rotations, root, [], np.zeros((0, 3)))
+        return self.positions_of(joints_of(self), rotations, root)
 
     def positions_and_tips(self, rotations: Floats, root: Floats) -> Floats:
         """Return the positions [..., 2 J, 3], metres, of all joints, then of all tips.
 
         A joint without a tip has its own position for one; arguments as for `positions`.
         """
-        return self.positions_with(rotations, root, np.arange(len(self)), self.tips)
+        return self.positions_of(_joints_and_tips(self), rotations, root)
 
     def positions_with(
         self, rotations: Floats, root: Floats, joints: Sequence[int] | Indices, points: Floats
@@ -202,18 +240,44 @@ class Skeleton:
             joints: those in whose frames the points are [P].
             points: their places in these frames [P, 3], metres.
         """
-        from motionmind.body.kinematics import place_points  # numba is slow to import
+        return self.positions_of(self.points(joints, points), rotations, root)
 
-        root, points = as_floats("root", root), as_floats("points", points)
+    def points(self, joints: Sequence[int] | Indices, points: Floats) -> Points:
+        """Return all joints, then points of their segments, for `positions_of`.
+
+        Args:
+            joints: those in whose frames the points are [P].
+            points: their places in these frames [P, 3], metres.
+        """
         if not (isinstance(joints, np.ndarray) and joints.dtype.kind in "iu"):
             check_items("joints", joints, "joints' indices", Integral)
-        turned, count = self.global_rotations(rotations), len(self) + len(joints)
-        out = np.empty((*turned.shape[:-2], count, 3))
-        out[..., 0, :] = root
         frames = np.concatenate([self._tree, np.asarray(joints, dtype=np.int64)])
-        offsets = np.concatenate([self.offsets, points])
-        place_points(out.reshape(-1, count, 3), turned.reshape(-1, len(self), 4), frames, offsets)
+        return Points(frames, np.concatenate([self.offsets, as_floats("points", points)]))
+
+    def positions_of(self, points: Points, rotations: Floats, root: Floats) -> Floats:
+        """Return the positions [..., P, 3], metres, of points of this body; arguments as for `positions`."""
+        return self.place(points, self.global_rotations(rotations), root)
+
+    def place(self, points: Points, turned: Floats, root: Floats) -> Floats:
+        """Return the same, from the orientations of the joints in the world [..., J, 4] (`global_rotations`)."""
+        from motionmind.body.kinematics import place_points  # numba is slow to import
+
+        out = np.empty((*turned.shape[:-2], len(points.joints), 3))
+        out[..., 0, :] = as_floats("root", root)
+        place_points(out.reshape(-1, *out.shape[-2:]), turned.reshape(-1, len(self), 4), *points)
         return out
+
+
+@remembered
+def joints_of(skeleton: Skeleton) -> Points:
+    """Return a body's joints."""
+    return skeleton.points(np.arange(0), np.zeros((0, 3)))
+
+
+@remembered
+def _joints_and_tips(skeleton: Skeleton) -> Points:
+    """Return a body's joints, then its tips."""
+    return skeleton.points(np.arange(len(skeleton)), skeleton.tips)
 
 
 def _some(names: list[str]) -> str:

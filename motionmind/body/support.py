@@ -17,12 +17,12 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Ints
+from motionmind.body.anatomy import Masses
 from motionmind.body.anatomy_file import anatomy_of
-from motionmind.body.contact import contact_points, limb_heights
+from motionmind.body.contact import Posed, contact_points, limb_heights, pose
 from motionmind.body.human import human23
 from motionmind.body.limbs import limb_of_points
-from motionmind.body.skeleton import Skeleton
-from motionmind.geometry import rotations as rot
+from motionmind.body.skeleton import Skeleton, joints_of, remembered
 from motionmind.jit import jit
 
 NEAR = 0.05  # metres above the body's lowest point within which a limb can bear
@@ -62,11 +62,11 @@ def find_support(
         fps: frames a second.
         floor: height of the floor, or in each frame [T], metres.
     """
-    places, joints = contact_points(skeleton, rotations, root)
-    limb = limb_of_points(skeleton)[joints]
-    bears, airborne, touches = find_bearers(places, limb, size_of(skeleton), fps, floor)
-    mass = centre_of_mass(skeleton, rotations, root)
-    over = None if mass is None else overhang(places[..., [0, 2]], touches, mass[:, [0, 2]])
+    posed = pose(skeleton, rotations, root)
+    limb = limb_of_points(skeleton)[posed.joints]
+    bears, airborne, touches = find_bearers(posed.places, limb, size_of(skeleton), fps, floor)
+    mass = mass_of(skeleton, posed)
+    over = None if mass is None else overhang(posed.places[..., [0, 2]], touches, mass[:, [0, 2]])
     return Support(bears, airborne, mass, over)
 
 
@@ -84,12 +84,11 @@ def find_bearers(
     """
     lowest = places[..., 1].min(axis=-1)
     airborne = lowest > floor + AIRBORNE * size
-    low = (places[..., 1] <= lowest[:, None] + NEAR * size) & ~airborne[:, None]
-    firm = low & (_speeds(places, fps) < STILL * size)
-    bears = np.stack([firm[:, limb == number].any(axis=1) for number in range(limb.max() + 1)], axis=1)
-    return bears, airborne, low & bears[:, limb]
+    bears, touches = _find_bearers(places, limb, lowest + NEAR * size, airborne, STILL * size, fps)
+    return bears, airborne, touches
 
 
+@remembered
 def size_of(skeleton: Skeleton) -> float:
     """Return how large a body is beside human23, by its greatest extent at rest: legs that spread count as well.
 
@@ -106,10 +105,24 @@ def centre_of_mass(skeleton: Skeleton, rotations: Floats, root: Floats) -> Float
         rotations: local rotations [..., J, 4].
         root: positions of the root [..., 3], metres.
     """
-    anatomy = anatomy_of(skeleton)
-    if anatomy is None or not anatomy.has_masses:
+    masses = _masses_of(skeleton)
+    if masses is None:
         return None
-    return anatomy.centre_of_mass(rotations, root, skeleton)
+    turned = skeleton.global_rotations(rotations)
+    return masses.centre(skeleton.place(joints_of(skeleton), turned, root), turned)
+
+
+def mass_of(skeleton: Skeleton, posed: Posed) -> Floats | None:
+    """Return the same of a movement that is posed [T, 3], metres."""
+    masses = _masses_of(skeleton)
+    return None if masses is None else masses.centre(posed.places, posed.turned)
+
+
+@remembered
+def _masses_of(skeleton: Skeleton) -> Masses | None:
+    """Return the masses of a body's segments; None where they are not known."""
+    anatomy = anatomy_of(skeleton)
+    return None if anatomy is None or not anatomy.has_masses else anatomy.masses_of(skeleton)
 
 
 def overhang(points: Floats, supports: Bools, mass: Floats) -> Floats:
@@ -188,14 +201,34 @@ def _extent(skeleton: Skeleton) -> float:
     return float(np.ptp(skeleton.rest, axis=0).max())
 
 
-def _speeds(places: Floats, fps: float) -> Floats:
-    """Return the speeds of points [T, P], metres a second: over two frames, at the ends over one."""
-    if len(places) < 2:
-        return np.zeros(places.shape[:2])
-    frames = np.arange(len(places))
-    before, after = np.maximum(frames - 1, 0), np.minimum(frames + 1, len(places) - 1)
-    moved = rot.norm(places[after] - places[before])
-    return np.asarray(moved * fps / (after - before)[:, None])
+@jit
+def _find_bearers(
+    places: Floats, limb: Ints, near: Floats, airborne: Bools, still: float, fps: float
+) -> tuple[Bools, Bools]:
+    """Return which limbs bear a body [T, limbs + 1], and which of its points are its support [T, P].
+
+    Args:
+        places: of the points [T, P, 3], metres.
+        limb: the limb, or trunk, that each belongs to [P].
+        near: height up to which a point is low [T], metres.
+        airborne: whether the body is in the air [T].
+        still: speed up to which a point bears, metres a second: over two frames, at the ends over one.
+        fps: frames a second.
+    """
+    last = len(places) - 1
+    bears, touches = np.zeros((len(places), limb.max() + 1), np.bool_), np.zeros(places.shape[:2], np.bool_)
+    for t in range(len(places)):
+        if airborne[t]:
+            continue
+        before, after = max(t - 1, 0), min(t + 1, last)
+        for p in range(len(limb)):
+            if places[t, p, 1] <= near[t]:
+                x, y, z = places[after, p] - places[before, p]
+                if np.sqrt(x * x + y * y + z * z) * fps / max(after - before, 1) < still:
+                    bears[t, limb[p]] = True
+        for p in range(len(limb)):
+            touches[t, p] = bears[t, limb[p]] and places[t, p, 1] <= near[t]
+    return bears, touches
 
 
 @jit

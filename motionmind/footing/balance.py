@@ -39,8 +39,11 @@ def balance_rows(
     overhang: float,
     gravity: float,
     fps: float,
-) -> list[Rows]:
+) -> Rows:
     """Return rows for the root's trajectory that bring the weight back over the support where it is beyond it.
+
+    They are those of the zero-moment point towards the support, and round it, and the same of the centre of mass, for
+    all frames but the first and the last.
 
     Args:
         points: level places of points of the body [N, P, 2], metres.
@@ -52,16 +55,11 @@ def balance_rows(
         gravity: metres a second squared.
         fps: frames a second.
     """
-    centre = np.ascontiguousarray(centre)
     lever = np.maximum(height, 0.1)[1:-1] / gravity * fps**2
-    pressure = centre.copy()
-    pressure[1:-1] -= lever[:, None] * np.diff(centre, 2, axis=0)
-    fades = _fades(len(centre), fps)
-    rows, frames = [], np.arange(len(lever))
-    for point, share, room in ((pressure, lever, ROOM), (centre, 0.0 * lever, overhang)):
-        nearest = nearest_in_support(points, touches, point)
-        rows += [Rows(frames, *row) for row in _rows_towards(nearest, point, own, share, fades, room)]
-    return rows
+    # The same order in memory, whoever asks, or it would be compiled for each.
+    points, centre, own = (np.ascontiguousarray(places) for places in (points, centre, own))
+    rows = _balance_rows(points, touches, centre, own, lever, _fades(len(centre), fps), overhang)
+    return Rows(np.tile(np.arange(len(lever)), 4), *rows)
 
 
 @lru_cache(maxsize=64)
@@ -72,10 +70,36 @@ def _fades(count: int, fps: float) -> Floats:
 
 
 @jit
-def _rows_towards(
-    nearest: Floats, point: Floats, own: Floats, share: Floats, fades: Floats, room: float
-) -> list[tuple[Floats, Floats, Floats]]:
-    """Return rows that bring a point towards the nearest of the support, and rows that keep it from going round that.
+def _balance_rows(
+    points: Floats, touches: Bools, centre: Floats, own: Floats, lever: Floats, fades: Floats, overhang: float
+) -> tuple[Floats, Floats, Floats]:
+    """Return the coefficients [4 (N - 2), 9], targets and weights of `balance_rows`, with h / g in frames^2 [N - 2]."""
+    count = len(lever)
+    coefficients, targets, weights = np.zeros((4 * count, 9)), np.empty(4 * count), np.empty(4 * count)
+    pressure = centre.copy()
+    for t in range(1, count + 1):
+        for k in range(2):
+            pressure[t, k] -= lever[t - 1] * ((centre[t + 1, k] - centre[t, k]) - (centre[t, k] - centre[t - 1, k]))
+    for which, (point, share, room) in enumerate(((pressure, lever, ROOM), (centre, 0.0 * lever, overhang))):
+        nearest, here = _nearest_in_support(points, touches, point), slice(2 * count * which, 2 * count * (which + 1))
+        rows = coefficients[here], targets[here], weights[here]
+        _write_rows_towards(nearest, point, own, share, fades, room, *rows)
+    return coefficients, targets, weights
+
+
+@jit
+def _write_rows_towards(
+    nearest: Floats,
+    point: Floats,
+    own: Floats,
+    share: Floats,
+    fades: Floats,
+    room: float,
+    coefficients: Floats,
+    targets: Floats,
+    weights: Floats,
+) -> None:
+    """Write rows that bring a point towards the nearest of the support, then rows that keep it from going round that.
 
     Args:
         nearest: level places of the support [N, 2], metres.
@@ -84,13 +108,12 @@ def _rows_towards(
         share: s of all frames but the first and the last [N - 2], in frames^2.
         fades: how far the body is yet from having left the first frame [N], from 1 to 0.
         room: how far beyond the support the point may be, metres.
-
-    Returns:
-        Coefficients [N - 2, 9], targets and weights [N - 2] of both.
+        coefficients: of both [2 (N - 2), 9], 0 before.
+        targets: of both [2 (N - 2)].
+        weights: of both [2 (N - 2)].
     """
     count = len(point)
     far = np.sqrt((point[:, 0] - nearest[:, 0]) ** 2 + (point[:, 1] - nearest[:, 1]) ** 2)
-    coefficients, targets, weights = np.zeros((2, count - 2, 9)), np.empty((2, count - 2)), np.empty((2, count - 2))
     for t in range(1, count - 1):
         # Ends may be beyond the support; the body comes back from there, and goes there, within a while.
         allowed = max(far[0] * fades[t], far[-1] * fades[count - 1 - t], room)
@@ -98,17 +121,16 @@ def _rows_towards(
         pull = OVER**-2.0 / np.sqrt(1.0 + (over / GIVES) ** 2) if over > 0.0 else 0.0
         x, y = (point[t] - nearest[t]) / max(far[t], 1e-9)
         for row, direction, further, weight in (
-            (0, (x, y), min(far[t], allowed), pull),
-            (1, (-y, x), 0.0, ACROSS * pull),
+            (t - 1, (x, y), min(far[t], allowed), pull),
+            (t - 1 + count - 2, (-y, x), 0.0, ACROSS * pull),
         ):
             target = direction[0] * nearest[t, 0] + direction[1] * nearest[t, 1] + further
             for k in range(2):
                 bends = (own[t + 1, k] - own[t, k]) - (own[t, k] - own[t - 1, k])
                 target -= direction[k] * (own[t, k] - s * bends)
                 for frame, factor in enumerate((-s, 1.0 + 2.0 * s, -s)):
-                    coefficients[row, t - 1, 3 * frame + 2 * k] = direction[k] * factor
-            targets[row, t - 1], weights[row, t - 1] = target, weight
-    return [(coefficients[row], targets[row], weights[row]) for row in range(2)]
+                    coefficients[row, 3 * frame + 2 * k] = direction[k] * factor
+            targets[row], weights[row] = target, weight
 
 
 def walks(root: Floats, fps: float) -> bool:
@@ -163,19 +185,26 @@ def nearest_in_support(points: Floats, touches: Bools, wanted: Floats) -> Floats
 @jit
 def _nearest_in_support(points: Floats, touches: Bools, wanted: Floats) -> Floats:
     out = wanted.copy()
-    angles = np.empty(points.shape[1])
+    angles, chosen = np.empty(points.shape[1]), np.empty(points.shape[1], np.int64)
     for t in range(len(points)):
         count = 0
-        best = np.inf
         for i in range(points.shape[1]):
-            if not touches[t, i]:
+            if touches[t, i]:
+                chosen[count] = i
+                angles[count] = np.arctan2(points[t, i, 1] - wanted[t, 1], points[t, i, 0] - wanted[t, 0])
+                count += 1
+        if count > 2:
+            angles[:count].sort()
+            gap = angles[0] + 2.0 * np.pi - angles[count - 1]
+            for i in range(1, count):
+                gap = max(gap, angles[i] - angles[i - 1])
+            if gap < np.pi:
                 continue
+        best = np.inf
+        for number in range(count):
+            i = chosen[number]
             dx, dy = points[t, i, 0] - wanted[t, 0], points[t, i, 1] - wanted[t, 1]
-            angles[count] = np.arctan2(dy, dx)
-            count += 1
-            for j in range(i + 1):
-                if not touches[t, j]:
-                    continue
+            for j in chosen[: number + 1]:
                 ex, ey = points[t, j, 0] - points[t, i, 0], points[t, j, 1] - points[t, i, 1]
                 length = ex * ex + ey * ey
                 share = 0.0 if length < 1e-12 else min(max(-(dx * ex + dy * ey) / length, 0.0), 1.0)
@@ -183,11 +212,4 @@ def _nearest_in_support(points: Floats, touches: Bools, wanted: Floats) -> Float
                 if x * x + y * y < best:
                     best = x * x + y * y
                     out[t, 0], out[t, 1] = wanted[t, 0] + x, wanted[t, 1] + y
-        if count > 2:
-            angles[:count].sort()
-            gap = angles[0] + 2.0 * np.pi - angles[count - 1]
-            for i in range(1, count):
-                gap = max(gap, angles[i] - angles[i - 1])
-            if gap < np.pi:
-                out[t] = wanted[t]
     return out

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices
-from motionmind.body.contact import contact_points
+from motionmind.body.contact import Posed
 from motionmind.body.limbs import limb_of_points, limbs_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.footing.feet import Foot, foot_points, track_of
@@ -55,16 +55,15 @@ class Shape(NamedTuple):
         return np.asarray(self.places[..., 1].min(axis=1))
 
 
-def shape_of(skeleton: Skeleton, rotations: Floats, feet: list[Foot]) -> Shape:
-    """Return the shape of a body with local rotations [N, J, 4]."""
-    places, joints = contact_points(skeleton, rotations, np.zeros((len(rotations), 3)))
-    limb = limb_of_points(skeleton)[joints]
-    of_feet = points_of_feet(skeleton, joints, feet)
+def shape_of(skeleton: Skeleton, posed: Posed, feet: list[Foot]) -> Shape:
+    """Return the shape of a body that is posed about its root."""
+    places, limb = posed.places, limb_of_points(skeleton)[posed.joints]
+    of_feet = points_of_feet(skeleton, posed.joints, feet)
     others = (limb == np.arange(len(limbs_of(skeleton)) + 1)[:, None]) & ~of_feet.any(axis=0)
     hips = places[:, [foot.leg[0] for foot in feet]][..., [0, 2]]
     outward = hips - hips.mean(axis=1, keepdims=True) if feet else hips
     outward /= np.maximum(np.linalg.norm(outward, axis=-1, keepdims=True), 1e-9)
-    tracks = [track_of(foot, places[:, : 2 * len(skeleton)]) for foot in feet]
+    tracks = [track_of(foot, places, len(skeleton)) for foot in feet]
     along = np.stack(tracks, axis=1) if feet else np.zeros((len(places), 0, 2))
     return Shape(places, of_feet, others, lowest(places, of_feet), lowest(places, others), along, outward)
 
@@ -216,9 +215,7 @@ def find_bearing(
     loads, places = np.zeros(stands.shape), tracks.copy()
     for k, own in enumerate(stances):
         for stance in own:
-            here = slice(stance.start, stance.end + 1)
-            places[here, k] = stance.places
-            loads[here, k] = _load(stance, len(root), fps)
+            _write_stance(*stance, LOADS * fps, k, places, loads)
     return Bearing(stances, loads, stands, places - shape.tracks, others)
 
 
@@ -248,10 +245,19 @@ def find_staying(shape: Shape, root: Floats) -> int | None:
     return foot if np.linalg.norm(moved, axis=1).min() < NEAR else None
 
 
-def _load(stance: Stance, count: int, fps: float) -> Floats:
-    """Return how much of the weight a foot may bear in the frames of a stance: 1 well within it, less at its ends."""
-    frames = np.arange(stance.start, stance.end + 1)
-    since = frames - stance.start + 1.0 if stance.start > 0 else np.full(len(frames), np.inf)
-    until = stance.end - frames + 1.0 if stance.end < count - 1 else np.full(len(frames), np.inf)
-    s = np.minimum(np.minimum(since, until) / (LOADS * fps), 1.0)
-    return np.asarray(s * s * (3.0 - 2.0 * s))
+@jit
+def _write_stance(
+    start: int, end: int, place: Floats, slip: Floats, fades: float, foot: int, places: Floats, loads: Floats
+) -> None:
+    """Write the places of a foot in its stance [N, feet, 2], metres, and how much of the weight it may bear [N, feet].
+
+    It bears all of it well within the stance, and less where that begins and ends, within so many frames.
+    """
+    for t in range(start, end + 1):
+        share = 1.0 if t == end > start else (t - start) * (1.0 / max(end - start, 1))
+        for k in range(2):
+            places[t, foot, k] = place[k] + share * slip[k]
+        since = t - start + 1.0 if start > 0 else np.inf
+        until = end - t + 1.0 if end < len(loads) - 1 else np.inf
+        s = min(min(since, until) / fades, 1.0)
+        loads[t, foot] = s * s * (3.0 - 2.0 * s)

@@ -13,17 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.body.contact import contact_points
+from motionmind.body.contact import Posed, pose
 from motionmind.body.skeleton import Skeleton
-from motionmind.body.support import centre_of_mass
+from motionmind.body.support import mass_of
 from motionmind.footing.balance import balance_rows, falls_without, is_beyond, walks
 from motionmind.footing.bearing import Bearing, Shape, find_bearing, find_staying, lowest, points_of_feet, shape_of
 from motionmind.footing.corrections import Correction
 from motionmind.footing.departures import clear_of_hip, departure, fade_at_ends
-from motionmind.footing.feet import Foot, bend_legs, pose, softness
+from motionmind.footing.feet import Foot, bend_legs, softness
 from motionmind.footing.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
 from motionmind.footing.knees import cover, smoothed
-from motionmind.footing.least_squares import joined, solve
+from motionmind.footing.least_squares import Rows, joined, solve
 from motionmind.footing.root_rows import (
     hurry_rows,
     jerk_rows,
@@ -105,8 +105,8 @@ class Carried(NamedTuple):
 
 def carry(
     skeleton: Skeleton,
-    rotations: Floats,
-    plain: Floats,
+    moving: Posed,
+    plain: Posed,
     root: Floats,
     floor: Floats,
     firm: Floats,
@@ -122,7 +122,7 @@ def carry(
 
     Args:
         skeleton: the body.
-        rotations: local rotations [N, J, 4].
+        moving: the movement about its root, of N frames.
         plain: the same without fine detail.
         root: positions of the root as feet have it by themselves [N, 3], metres; the first and the last do not change.
         floor: height of the floor [N], metres.
@@ -135,7 +135,7 @@ def carry(
         fps: frames a second.
         without: corrections to leave out.
     """
-    count = len(rotations)
+    count = len(root)
     shape = shape_of(skeleton, plain, feet)
     mass = own_mass = _mass(skeleton, plain)
     standing = floor - shape.lowest
@@ -162,10 +162,11 @@ def carry(
     fixed = np.zeros(count, dtype=np.bool_)
     fixed[[0, -1]] = True
     fixed[[1, -2]] |= known.moving
-    own, bones = pose(skeleton, plain), np.array([foot.bones(skeleton) for foot in feet]).reshape(-1, 2)
-    legs, knees = legs_of(skeleton, own.places, feet), [float(allowed.fastest[foot.leg[foot.knee]]) for foot in feet]
-    start, off, posed = root, np.zeros((count, len(feet), 3)), plain
-    touches = bearing.touching(shape)
+    bones = np.array([foot.bones(skeleton) for foot in feet]).reshape(-1, 2)
+    legs, knees = legs_of(skeleton, plain.places, feet), [float(allowed.fastest[foot.leg[foot.knee]]) for foot in feet]
+    start, off, bent = root, np.zeros((count, len(feet), 3)), plain.rotations
+    touches, borne = bearing.touching(shape), _borne_rows(shape, bearing, root, floor, freedom, fps)
+    holds = bearing.holds(fps)
     balances = "balance" not in without and bool(mass.any())
     stands = balances and staying is None and "steps" not in without and not walks(root, fps)
     for number_of_round in range(ROUNDS[0]):
@@ -173,15 +174,14 @@ def carry(
             falls = _falls(shape, bearing, touches, start, mass, overhang)
             if falls is not None:
                 bearing = find_bearing(*planned, falls)
-                touches = bearing.touching(shape)
-        mass = own_mass if posed is plain else _mass(skeleton, posed)
-        steady = smooth_rows(root, mass, fps, 1e-4 if "bounce" in without else 1.0)
-        steady += prior_rows(root, bearing, fps)
-        steady += standing_rows(shape, bearing, floor, freedom)
-        steady = [joined(steady + flight_rows(flights, mass, standing, gravity, fps))]
+                touches, borne = bearing.touching(shape), _borne_rows(shape, bearing, root, floor, freedom, fps)
+                holds = bearing.holds(fps)
+        mass = own_mass if bent is plain.rotations else _mass(skeleton, pose(skeleton, bent))
+        smooth = smooth_rows(root, mass, fps, 1e-4 if "bounce" in without else 1.0)
+        falling = flight_rows(flights, mass, standing, gravity, fps)
         for _ in range(ROUNDS[1]):
             rows = [
-                *steady,
+                *(smooth, borne, *falling),
                 sunk_rows(shape, floor, start),
                 hurry_rows(start, allowed.travels, freedom, fps),
                 jerk_rows(start, allowed.pushes, freedom, fps),
@@ -194,16 +194,21 @@ def carry(
             if balances:
                 points, centre, level = _points_on_floor(shape, bearing, start), start + mass, [0, 2]
                 weight = centre[:, level], mass[:, level], centre[:, 1] - floor
-                rows += balance_rows(points, touches, *weight, overhang, gravity, fps)
+                rows.append(balance_rows(points, touches, *weight, overhang, gravity, fps))
             start = solve(rows, start, fixed)
         off = _departures(skeleton, shape, legs, bearing, floor, start, feet, knees, known.moving, fps)
         if number_of_round < ROUNDS[0] - 1:
-            posed = bend_legs(skeleton, own, feet, off, softness(bearing.holds(fps)))
+            bent = bend_legs(skeleton, plain, feet, off, softness(holds))
     detailed, falls = shape, np.zeros((count, 3))
-    if not np.array_equal(plain, rotations):
-        detailed, falls = shape_of(skeleton, rotations, feet), own_mass - _mass(skeleton, rotations)
-    start, off, heights = _with_detail(shape, detailed, bearing, falls, flying, start, off, floor, fps)
-    return Carried(start, off, bearing.holds(fps), heights, 1.0 - freedom, staying)
+    if moving is not plain:
+        detailed, falls = shape_of(skeleton, moving, feet), own_mass - _mass(skeleton, moving)
+    start, off, heights = _with_detail(shape, detailed, bearing, holds, falls, flying, start, off, floor, fps)
+    return Carried(start, off, holds, heights, 1.0 - freedom, staying)
+
+
+def _borne_rows(shape: Shape, bearing: Bearing, prior: Floats, floor: Floats, freedom: Floats, fps: float) -> Rows:
+    """Return rows for what bears the body to bear it, and for the root to move as on its trajectory before [N, 3]."""
+    return joined(prior_rows(prior, bearing, fps) + standing_rows(shape, bearing, floor, freedom))
 
 
 def _departures(
@@ -237,6 +242,7 @@ def _with_detail(
     plain: Shape,
     detailed: Shape,
     bearing: Bearing,
+    holds: Floats,
     falls: Floats,
     flying: Bools,
     root: Floats,
@@ -254,6 +260,7 @@ def _with_detail(
         plain: the body without detail.
         detailed: the body with it.
         bearing: what bears it.
+        holds: how much each foot holds its place [N, feet], from 0 to 1.
         falls: how far detail takes the root from the centre of mass [N, 3], metres.
         flying: where nothing bears the body [N].
         root: positions of the root without detail [N, 3], metres.
@@ -279,21 +286,20 @@ def _with_detail(
     off = off.copy()
     off[..., 1] += kept - reached
     slips = plain.tracks - detailed.tracks - (moved - root)[:, None, [0, 2]]
-    off[..., [0, 2]] += (bearing.holds(fps) * fades[:, None])[..., None] * slips
+    off[..., [0, 2]] += (holds * fades[:, None])[..., None] * slips
     return moved, off, kept
 
 
-def foot_heights(skeleton: Skeleton, rotations: Floats, root: Floats, feet: list[Foot]) -> Floats:
+def foot_heights(skeleton: Skeleton, posed: Posed, feet: list[Foot]) -> Floats:
     """Return the height of each foot's lowest point [N, feet], metres."""
-    places, joints = contact_points(skeleton, rotations, root)
-    return lowest(places, points_of_feet(skeleton, joints, feet))
+    return lowest(posed.places, points_of_feet(skeleton, posed.joints, feet))
 
 
-def _mass(skeleton: Skeleton, rotations: Floats) -> Floats:
-    """Return the centre of mass relative to the root [N, 3], metres; the root itself where masses are not known."""
-    still = np.zeros((len(rotations), 3))
-    mass = centre_of_mass(skeleton, rotations, still)
-    return still if mass is None else mass
+def _mass(skeleton: Skeleton, posed: Posed) -> Floats:
+    """Return the centre of mass relative to the root [N, 3], metres, of a body posed about that; the root itself where
+    masses are not known."""
+    mass = mass_of(skeleton, posed)
+    return np.zeros((len(posed.places), 3)) if mass is None else mass
 
 
 def _rates_of_mass(

@@ -9,10 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices
-from motionmind.body.skeleton import Skeleton
+from motionmind.body.contact import Posed
+from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.footing.knees import SHIFTS, bend_of, distance_of, keep_detail, slow_down, smoothed
 from motionmind.footing.legs import SOFT, find_hinge, find_legs, stretched, usual_hinge, write_bent
 from motionmind.geometry import rotations as rot
+from motionmind.geometry.single import length, vector
+from motionmind.jit import jit
 
 GRIP = 0.015  # metres above the lower end of a foot at which the other's hold on the floor has fallen to 1/e
 LOOSE = 0.15  # of a leg's length, as `legs.SOFT`, of one that swings
@@ -66,11 +69,16 @@ def _length(x: float, y: float, z: float) -> float:
 
 def find_free_feet(skeleton: Skeleton, fixed: Bools) -> list[Foot]:
     """Return the feet of a body's legs, but for those with joints that must not change."""
+    return [foot for foot in _find_feet(skeleton) if not fixed[foot.leg].any()]
+
+
+@remembered
+def _find_feet(skeleton: Skeleton) -> list[Foot]:
+    """Return the feet of a body's legs."""
     numbers, legs = find_legs(skeleton)
     return [
         Foot(number, leg, knee, find_hinge(skeleton, leg[knee]))
         for number, (leg, knee) in zip(numbers, legs, strict=True)
-        if not fixed[leg].any()
     ]
 
 
@@ -90,53 +98,53 @@ def foot_points(foot: Foot, joints: Indices, count: int) -> Bools:
     return out
 
 
-def track_of(foot: Foot, places: Floats) -> Floats:
+def track_of(foot: Foot, places: Floats, count: int) -> Floats:
     """Return where a foot is, level, relative to the root [N, 2], metres, so that one that stands or rolls stays.
 
     It moves as its last bone does, both ends of it by how low they are.
 
     Args:
         foot: the foot.
-        places: of all joints, then all tips, relative to the root [N, 2 J, 3], metres.
+        places: of all joints, then all tips, and whatever points after them, relative to the root [N, P, 3], metres.
+        count: number of joints.
     """
-    count = places.shape[1] // 2
     ends = places[:, [foot.leg[-1], count + foot.leg[-1]]]
     height, level = ends[..., 1], ends[..., [0, 2]]
-    moved = np.einsum("np,npk->nk", _hold(np.maximum(height[1:], height[:-1])), np.diff(level, axis=0))
-    along = np.concatenate([np.zeros((1, 2)), np.cumsum(moved, axis=0)])
+    holds = _hold(np.maximum(height[1:], height[:-1]))
     # A foot that rolls to and fro comes back to its place only roughly: on the whole, it moves as the end of it does
     # that stands in the first and in the last frame.
-    both = _hold(height[0] + height[-1])
-    drift = both @ (level[-1] - level[0]) - along[-1]
-    along += np.linspace(0.0, 1.0, len(along))[:, None] * drift
-    return np.asarray(both @ level[0] + along)
+    both, out = _hold(height[0] + height[-1]), np.empty((len(places), 2))
+    _write_track(np.ascontiguousarray(ends), holds, both @ level[0], both @ (level[-1] - level[0]), out)
+    return out
+
+
+@jit
+def _write_track(ends: Floats, holds: Floats, first: Floats, whole: Floats, out: Floats) -> None:
+    """Write the level track of a foot [N, 2], metres.
+
+    Args:
+        ends: of its last bone [N, 2, 3], metres.
+        holds: how much each end holds on to the floor between frames [N - 1, 2].
+        first: where the track begins [2].
+        whole: how far it goes on the whole [2].
+        out: the track.
+    """
+    last = len(ends) - 1
+    out[0] = 0.0
+    for t in range(last):
+        for k in range(2):
+            moved = holds[t, 0] * (ends[t + 1, 0, 2 * k] - ends[t, 0, 2 * k])
+            out[t + 1, k] = out[t, k] + (moved + holds[t, 1] * (ends[t + 1, 1, 2 * k] - ends[t, 1, 2 * k]))
+    for k in range(2):
+        drift = whole[k] - out[last, k]
+        for t in range(last + 1):
+            out[t, k] = first[k] + (out[t, k] + (1.0 if t == last else t * (1.0 / last)) * drift)
 
 
 def _hold(height: Floats) -> Floats:
     """Return how much each end of a foot holds on to the floor [..., 2], by its height [..., 2], metres; sums are 1."""
     share = np.exp(-(height - height.min(axis=-1, keepdims=True)) / GRIP)
     return np.asarray(share / share.sum(axis=-1, keepdims=True))
-
-
-class Posed(NamedTuple):
-    """A movement as its rotations have it, about its root: what legs are bent from.
-
-    Attributes:
-        rotations: local rotations [N, J, 4].
-        turned: orientations of the joints in the world [N, J, 4].
-        places: of joints and tips relative to the root [N, 2 J, 3], metres.
-    """
-
-    rotations: Floats
-    turned: Floats
-    places: Floats
-
-
-def pose(skeleton: Skeleton, rotations: Floats) -> Posed:
-    """Return a movement of local rotations [N, J, 4] about its root."""
-    still = np.zeros((len(rotations), 3))
-    turned = skeleton.global_rotations(rotations)
-    return Posed(rotations, turned, skeleton.positions_and_tips(rotations, still))
 
 
 def softness(holds: Floats) -> Floats:
@@ -243,14 +251,26 @@ def _lengths(bends: Sequence[Floats], bones: Sequence[tuple[float, float]]) -> F
 
 def _lengthened(legs: Floats, lengths: Floats) -> Floats:
     """Return legs from hip to foot [N, feet, 3] as long as given [N, feet], metres: steep ones, with feet level."""
-    own = rot.norm(legs)
-    out = legs * (lengths / np.maximum(own, 1e-9))[..., None]
-    level = np.minimum(own**2 - legs[..., 1] ** 2, lengths**2)
-    upright = legs.copy()
-    upright[..., 1] = -np.sqrt(lengths**2 - level)
-    s = np.clip((-legs[..., 1] / np.maximum(own, 1e-9) - STEEP[0]) / (STEEP[1] - STEEP[0]), 0.0, 1.0)[..., None]
-    out += s * s * (3.0 - 2.0 * s) * (upright - out)
-    return np.asarray(out * (lengths / np.maximum(rot.norm(out), 1e-9))[..., None])
+    out = np.empty(legs.shape)
+    _write_lengthened(legs, lengths, out)
+    return out
+
+
+@jit
+def _write_lengthened(legs: Floats, lengths: Floats, out: Floats) -> None:
+    """Write what `_lengthened` returns."""
+    for t in range(len(legs)):
+        for foot in range(legs.shape[1]):
+            leg, wanted, own = vector(legs[t, foot]), lengths[t, foot], length(vector(legs[t, foot]))
+            level = min(own**2 - leg[1] ** 2, wanted**2)
+            upright = leg[0], -np.sqrt(wanted**2 - level), leg[2]
+            s = min(max((-leg[1] / max(own, 1e-9) - STEEP[0]) / (STEEP[1] - STEEP[0]), 0.0), 1.0)
+            for k in range(3):
+                drawn = leg[k] * (wanted / max(own, 1e-9))
+                out[t, foot, k] = drawn + s * s * (3.0 - 2.0 * s) * (upright[k] - drawn)
+            longer = wanted / max(length(vector(out[t, foot])), 1e-9)
+            for k in range(3):
+                out[t, foot, k] *= longer
 
 
 def bend_legs(skeleton: Skeleton, posed: Posed, feet: list[Foot], off: Floats, soft: Floats) -> Floats:
@@ -263,13 +283,13 @@ def bend_legs(skeleton: Skeleton, posed: Posed, feet: list[Foot], off: Floats, s
         off: how far each is from where the rotations have it [N, feet, 3], metres.
         soft: how near to its full length each falls short [N, feet], a share of it.
     """
-    rotations, turned, places = posed
-    out = rotations.copy()
+    turned, places, out = posed.turned, posed.places, posed.rotations.copy()
     if not feet:
         return out
-    chains, hinges = np.array([foot.chain(skeleton) for foot in feet]), [foot.hinge for foot in feet]
-    hips, hinge = chains[:, 0], None if hinges[0] is None else np.array(hinges)
-    usual = usual_hinge(turned[:, hips], places[:, chains], hinge)
+    chains = np.array([foot.chain(skeleton) for foot in feet])
+    hips, usual = chains[:, 0], None if feet[0].hinge is None else np.array([foot.hinge for foot in feet])
+    if usual is None or not usual.any(axis=1).all():
+        usual = usual_hinge(turned[:, hips], places[:, chains], usual)
     above = np.array([skeleton.parents[hip] for hip in hips.tolist()])
     write_bent(out, turned, places, chains, above, np.ascontiguousarray(off), usual, np.ascontiguousarray(soft))
     if not np.isfinite(out[:, hips]).all():

@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.body.contact import LOW, lowest_height
+from motionmind.body.contact import LOW, Posed, pose
 from motionmind.body.plausibility import GRAVITY
 from motionmind.body.skeleton import Skeleton
-from motionmind.body.support import centre_of_mass, size_of
+from motionmind.body.support import mass_of, size_of
 from motionmind.body.tempo import runs_of
-from motionmind.footing.least_squares import Rows, difference_rows, position_rows
+from motionmind.footing.least_squares import Rows, difference_rows, joined, position_rows
 
 SURELY = 0.5  # share of the corpus's walks that are in the air where a given posture is
 EVER = 0.05  # share of them from which a movement may be
@@ -169,6 +169,8 @@ def flight_rows(flights: list[Flight], own: Floats, standing: Floats, gravity: f
         gravity: metres a second squared.
         fps: frames a second.
     """
+    if not flights:
+        return []
     count = len(own)
     weights, at = np.zeros(count - 2), []
     leaves: list[Rows] = []
@@ -190,7 +192,7 @@ def flight_rows(flights: list[Flight], own: Floats, standing: Floats, gravity: f
     frames = np.array(at, dtype=np.int64)
     up = np.tile([0.0, 1.0, 0.0], (len(frames), 1))
     rows.append(position_rows(frames, up, standing[frames], np.full(len(frames), TOUCHES**-2.0)))
-    return rows + leaves
+    return [joined(rows + leaves)]
 
 
 def fall_freely(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bools, fps: float) -> Floats:
@@ -207,7 +209,7 @@ def fall_freely(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bool
         given: frames that must not change, the first and the last among them [N].
         fps: frames a second.
     """
-    mass, falls = find_falls(skeleton, rotations, root, given, fps)
+    mass, falls = find_falls(skeleton, pose(skeleton, rotations, root), given, fps)
     if not falls:
         return root
     out = root.copy()
@@ -219,20 +221,24 @@ def fall_freely(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bool
     return out
 
 
-def find_falls(
-    skeleton: Skeleton, rotations: Floats, root: Floats, given: Bools, fps: float
-) -> tuple[Floats, list[tuple[int, int]]]:
+def find_falls(skeleton: Skeleton, posed: Posed, given: Bools, fps: float) -> tuple[Floats, list[tuple[int, int]]]:
     """Return the centre of mass [N, 3], metres, and the first frame of each fall, and the one after its last.
 
-    Where masses are not known there are no falls. Arguments are those of `fall_freely`.
+    Where masses are not known there are no falls.
+
+    Args:
+        skeleton: the body.
+        posed: the movement.
+        given: frames that must not change, the first and the last among them [N].
+        fps: frames a second.
     """
-    low = lowest_height(skeleton, rotations, root)
+    low = posed.lowest
     off_floor = low > low.min() + LOW * size_of(skeleton)
     up = ~given & off_floor
-    mass = centre_of_mass(skeleton, rotations, root) if up.any() else None
+    mass = mass_of(skeleton, posed) if up.any() else None
     if mass is None:
-        return root, []
-    fall = np.zeros(len(root))
+        return posed.places[:, 0], []
+    fall = np.zeros(len(low))
     fall[1:-1] = -(fps**2) * np.diff(mass[:, 1], 2) / GRAVITY
     return mass, _falls(fall, up, (bool(off_floor[0]), bool(off_floor[-1])), round(PAUSES * fps))
 

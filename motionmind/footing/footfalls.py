@@ -42,11 +42,6 @@ class Stance(NamedTuple):
     place: Floats
     slip: Floats
 
-    @property
-    def places(self) -> Floats:
-        """The foot's place in each of the frames [frames, 2], metres."""
-        return self.place + np.linspace(0.0, 1.0, self.end + 1 - self.start)[:, None] * self.slip
-
 
 def standing_costs(above: Floats, firm: Floats) -> tuple[Floats, Floats]:
     """Return what it costs a foot to stand and to swing [N] each, a second.
@@ -170,7 +165,8 @@ def _part(  # noqa: PLR0915 - one table, filled in one go
     for t in range(count):
         for s in range(t + 1):  # standing from s to t
             before = 0.0 if s == 0 else best[1, s - 1]
-            if before == np.inf:
+            least = before + stand_sum[t + 1] - stand_sum[s]
+            if not least < best[0, t]:  # what is to be added costs at least 0
                 continue
             n = t - s + 1
             x, y = sums[t + 1, 0] - sums[s, 0], sums[t + 1, 1] - sums[s, 1]
@@ -188,7 +184,7 @@ def _part(  # noqa: PLR0915 - one table, filled in one go
                 moved_x, moved_y = track[t, 0] - track[s, 0], track[t, 1] - track[s, 1]
                 across = 0.5 * OUTSIDE * (moved_x * outward[(s + t) // 2, 0] + moved_y * outward[(s + t) // 2, 1])
                 spread += n * across * across
-            cost = before + stand_sum[t + 1] - stand_sum[s] + max(spread, 0.0) / (STRAYS**2 * fps)
+            cost = least + max(spread, 0.0) / (STRAYS**2 * fps)
             if cost < best[0, t]:
                 best[0, t], came[0, t] = cost, s
         for s in range(t + 1):  # swinging from s to t
@@ -199,12 +195,12 @@ def _part(  # noqa: PLR0915 - one table, filled in one go
             if n < (brief if steps else half[0] if s == 0 else half[1]):
                 continue
             before = 0.0 if s == 0 else best[0, s - 1]
-            if before == np.inf:
+            least = before + swing_sum[t + 1] - swing_sum[s]
+            if not least < best[1, t]:
                 continue
             stood, stands = max(s - 1, 0), min(t + 1, last)
             x, y = track[stands, 0] - track[stood, 0], track[stands, 1] - track[stood, 1]
-            cost = before + swing_sum[t + 1] - swing_sum[s]
-            cost += (x * x + y * y) / ((n + 1) / fps * QUICK**2)
+            cost = least + (x * x + y * y) / ((n + 1) / fps * QUICK**2)
             if steps:
                 cost += STEP_COST
             if cost < best[1, t]:

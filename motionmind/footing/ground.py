@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.body.contact import lowest_height
+from motionmind.body.contact import Posed, lowest_height, pose
 from motionmind.body.limits import within_limits
-from motionmind.body.skeleton import Skeleton
+from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.body.support import size_of
 from motionmind.footing.balance import GRAVITY
 from motionmind.footing.carrying import Allowed, Carried, Ends, carry, foot_heights
@@ -29,7 +29,6 @@ from motionmind.footing.feet import (
     bend_legs,
     ease_knees,
     find_free_feet,
-    pose,
     softness,
 )
 from motionmind.footing.flight import EVER, SURELY
@@ -148,10 +147,9 @@ def set_on_floor(
         without: corrections to leave out.
     """
     size = size_of(skeleton)
-    small = replace(skeleton, offsets=skeleton.offsets / size, tips=skeleton.tips / size)
     by = 1.0 / size
     turned, root = _set_down(
-        small,
+        _as_large_as_a_person(skeleton),
         rotations,
         plain,
         times,
@@ -164,6 +162,13 @@ def set_on_floor(
     root *= size
     root[0], root[-1] = given.ends
     return turned, root
+
+
+@remembered
+def _as_large_as_a_person(skeleton: Skeleton) -> Skeleton:
+    """Return a body of the same proportions."""
+    size = size_of(skeleton)
+    return replace(skeleton, offsets=skeleton.offsets / size, tips=skeleton.tips / size)
 
 
 def _set_down(
@@ -195,8 +200,10 @@ def _set_down(
     drifts = np.diff(natural_spline(half_steps, places, times), axis=0)
     clear = np.maximum(heights - floor, 0.0)
     fps, feet = 1.0 / (times[1] - times[0]), find_free_feet(skeleton, allowed.fixed)
-    easily = steps_easily(foot_heights(skeleton, rotations, np.zeros((len(times), 3)), feet), fps)
-    root = root_trajectory(skeleton, rotations, clear, held, drifts, *given.ends, times[-1], easily)
+    posed, fine = pose(skeleton, rotations), not np.array_equal(plain, rotations)
+    smooth = pose(skeleton, plain) if fine else posed
+    easily = steps_easily(foot_heights(skeleton, posed, feet), fps)
+    root = root_trajectory(skeleton, posed, clear, held, drifts, *given.ends, times[-1], easily)
     root = stand(skeleton, rotations, _with_rates(root, times, rates), heights)
     root[0], root[-1] = given.ends
     first, last = rates  # what is in the air goes on as it goes; elsewhere what stands says how high it is
@@ -207,7 +214,7 @@ def _set_down(
         root[-2, 1] = root[-1, 1] - last[1] / fps - fallen
     firm = np.stack([np.interp(times, half_steps, limb) for limb in stance.stands.T], axis=1)
     aloft, leaps = (np.interp(times, half_steps, one) for one in (aloft, stance.leaps))
-    frames, fine, rotations = fps * half_steps[through], not np.array_equal(plain, rotations), rotations.copy()
+    frames, rotations = fps * half_steps[through], rotations.copy()
     for number, (start, end) in enumerate(pairwise(frames)):
         # Rounded: a posture that falls on a frame but for rounding errors keeps that frame.
         part = slice(int(np.ceil(start - 1e-6)), int(end + 1e-6) + 1)
@@ -221,10 +228,11 @@ def _set_down(
             (number > 0 or rate[0] is not None, number < len(frames) - 2 or rate[1] is not None),
             (None if rate[0] is None else float(rate[0][1]), None if rate[1] is None else float(rate[1][1])),
         )
+        own = posed.part(part)
         carried = carry(
             skeleton,
-            rotations[part],
-            plain[part],
+            own,
+            smooth.part(part) if fine else own,
             root[part],
             floor[part],
             firm[part],
@@ -237,7 +245,7 @@ def _set_down(
             without,
         )
         rotations[part], root[part] = _reach_floor(
-            skeleton, rotations[part], carried, floor[part], feet, allowed, fine, known.moving, fps
+            skeleton, own, carried, floor[part], feet, allowed, fine, known.moving, fps
         )
         sunk = np.maximum(floor[part] - lowest_height(skeleton, rotations[part], root[part]) - SINKS, 0.0)
         root[part, 1] += cover(sunk, fps) * fade_at_ends(len(sunk), (True, True), fps)
@@ -246,7 +254,7 @@ def _set_down(
 
 def _reach_floor(
     skeleton: Skeleton,
-    rotations: Floats,
+    posed: Posed,
     carried: Carried,
     floor: Floats,
     feet: list[Foot],
@@ -260,14 +268,14 @@ def _reach_floor(
     A foot that the limits of its joints turn is lifted or lowered by as much as that takes it off its height. Knees
     bend no faster than they can, and with the movement's own fine detail.
     """
+    rotations, soft = posed.rotations, softness(carried.holds)
     joints, fades = [joint for foot in feet for joint in foot.leg], fade_at_ends(len(rotations), moving, fps)
     out, root = rotations.copy(), carried.root
     if not joints:
         return out, root
-    posed, soft = pose(skeleton, rotations), softness(carried.holds)
     planted = bend_legs(skeleton, posed, feet, carried.off, soft)
     out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], allowed.loose, joints)[1:-1, joints]
-    missing = carried.heights - foot_heights(skeleton, out, root, feet)
+    missing = carried.heights - foot_heights(skeleton, pose(skeleton, out, root), feet)
     off = carried.off + missing[..., None] * np.array([0.0, 1.0, 0.0]) * fades[:, None, None]
     room = carried.heights - floor[:, None] + SINKS
     eased, shift = ease_knees(

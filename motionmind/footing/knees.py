@@ -124,9 +124,21 @@ def cover(need: Floats, fps: float) -> Floats:
         return need
     width = max(1, round(0.5 * LIFTS * fps))
     # The mean over a window of each frame's greatest need within a window: none of those is less than the need here.
-    wide = np.concatenate([np.full(2 * width, need[0]), need, np.full(2 * width, need[-1])])
-    around = np.lib.stride_tricks.sliding_window_view(wide, 2 * width + 1).max(axis=1)
-    return np.convolve(around, bell(width), "valid")
+    return np.convolve(greatest_around(need, width, width), bell(width), "valid")
+
+
+@jit
+def greatest_around(values: Floats, reach: int, beyond: int) -> Floats:
+    """Return the greatest of the values [N] within so many frames of each, and of so many frames beyond the ends:
+    [N + 2 beyond]. Beyond them values are as at the ends."""
+    last = len(values) - 1
+    out = np.empty(len(values) + 2 * beyond)
+    for t in range(len(out)):
+        first, stop = min(max(t - beyond - reach, 0), last), min(max(t - beyond + reach, 0), last) + 1
+        out[t] = values[first]
+        for k in range(first + 1, stop):
+            out[t] = max(out[t], values[k])
+    return out
 
 
 def _towards(wanted: Floats, values: Floats, where: Bools, most: float) -> Floats:

@@ -8,17 +8,19 @@ body that is accelerated may fall from foot to foot.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.body.contact import contact_points
+from motionmind.body.contact import pose
 from motionmind.body.limbs import limb_of_points
 from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
-from motionmind.body.support import centre_of_mass, find_bearers, size_of
+from motionmind.body.support import find_bearers, mass_of, size_of
 from motionmind.footing.balance import GRAVITY, balance_rows, is_beyond
-from motionmind.footing.feet import QUICK, Foot, bend_legs, find_free_feet, pose
-from motionmind.footing.least_squares import difference_rows, joined, position_rows, solve
+from motionmind.footing.feet import QUICK, Foot, bend_legs, find_free_feet
+from motionmind.footing.least_squares import Rows, difference_rows, joined, position_rows, solve
 from motionmind.footing.legs import SOFT, find_legs
 from motionmind.geometry import rotations as rot
 
@@ -87,32 +89,22 @@ def _shift_once(
 
     Joints turn at most so fast [J], rad/s; None for any speed.
     """
-    size = size_of(skeleton)
-    centre = centre_of_mass(skeleton, rotations, root)
+    size, placed = size_of(skeleton), pose(skeleton, rotations, root)
+    places, centre = placed.places, mass_of(skeleton, placed)
     if centre is None:
         return rotations, root
-    places, joints = contact_points(skeleton, rotations, root)
-    bears, _, touches = find_bearers(places, limb_of_points(skeleton)[joints], size, fps)
+    bears, _, touches = find_bearers(places, limb_of_points(skeleton)[placed.joints], size, fps)
     points, mass, allowed = places[..., [0, 2]] / size, centre[:, [0, 2]] / size, overhang / size
     calm = bears.sum(axis=1) == 1
     calm[1:-1] &= np.linalg.norm(np.diff(mass, 2, axis=0), axis=1) * fps**2 < STILL
     if not (is_beyond(points, touches, mass, allowed) & calm & ~given).any():
         return rotations, root
-    height = (centre[:, 1] - places[..., 1].min(axis=1)) / size
-    shift, none = np.zeros_like(root), np.zeros(len(root))
-    small = []  # what keeps the shift small, and smooth
-    for axis in range(3):
-        small.append(position_rows(np.arange(len(root)), np.eye(3)[axis], none, none + SHIFTS**-2.0))
-        bends = (fps**2, -2.0 * fps**2, fps**2)
-        small.append(difference_rows(axis, bends, none[1:-1], none[1:-1] + PUSH**-2.0))
-    small = [joined(small)]
+    height = (centre[:, 1] - placed.lowest) / size
+    shift, every = np.zeros_like(root), np.tile(calm[1:-1], 4)
     for _ in range(ROUNDS):
         now = mass + shift[:, [0, 2]]
-        rows = [
-            row._replace(weights=row.weights * calm[1:-1])
-            for row in balance_rows(points, touches, now, mass, height, allowed, GRAVITY / size, fps)
-        ]
-        shift = solve(rows + small, shift, given)
+        rows = balance_rows(points, touches, now, mass, height, allowed, GRAVITY / size, fps)
+        shift = solve([rows._replace(weights=rows.weights * every), _small_shift(len(root), fps)], shift, given)
     shift[given] = 0.0
     legs, posed = [joint for foot in feet for joint in foot.leg], pose(skeleton, rotations)
     for share in LESS:
@@ -124,6 +116,17 @@ def _shift_once(
         if most is None or np.all(_fastest_turns(out[:, legs], fps) <= most[legs]):
             return out, root + share * size * shift
     return rotations, root
+
+
+@lru_cache(maxsize=64)
+def _small_shift(count: int, fps: float) -> Rows:
+    """Return rows that keep a shift small in so many frames, and smooth."""
+    rows, none = [], np.zeros(count)
+    for axis in range(3):
+        rows.append(position_rows(np.arange(count), np.eye(3)[axis], none, none + SHIFTS**-2.0))
+        bends = (fps**2, -2.0 * fps**2, fps**2)
+        rows.append(difference_rows(axis, bends, none[1:-1], none[1:-1] + PUSH**-2.0))
+    return joined(rows)
 
 
 def _fastest_turns(rotations: Floats, fps: float) -> Floats:

@@ -62,19 +62,17 @@ def solve(rows: list[Rows], start: Floats, fixed: Bools) -> Floats:
     """Return the trajectory [N, 3] whose weighted sum of squares over all rows is least.
 
     Args:
-        rows: of the problem; each frame that is not fixed must matter to one.
+        rows: of the problem, their arrays in one piece; each frame that is not fixed must matter to one.
         start: a trajectory with the right places at the fixed frames [N, 3].
         fixed: frames that do not change [N].
     """
-    matrix, right = _normal_equations(*joined(rows), np.ascontiguousarray(start))
-    keep = np.repeat(fixed, 3)
-    # A change of 0 at the fixed frames: their own equations outweigh all others.
-    matrix[keep, 0] = 1e12 * max(matrix[:, 0].max(), 1.0)
-    right[keep] = 0.0
-    solve_rows(matrix, right)
-    change = right.reshape(-1, 3)
-    change[fixed] = 0.0
-    return np.asarray(start + change)
+    flat = np.ascontiguousarray(start).reshape(-1)
+    matrix, right = np.zeros((len(flat), _BAND)), np.zeros(len(flat))
+    matrix[:, 0] = 1e-9
+    for some in rows:
+        _add_normal_equations(*some, flat, matrix, right)
+    _solve_but_fixed(matrix, right, fixed)
+    return np.asarray(start + right.reshape(-1, 3))
 
 
 def bending_diagonals(weights: Floats) -> Floats:
@@ -136,16 +134,11 @@ def substitute(matrix: Floats, right: Floats) -> None:
 
 
 @jit
-def _normal_equations(
-    first: Ints, coefficients: Floats, targets: Floats, weights: Floats, start: Floats
-) -> tuple[Floats, Floats]:
-    """Return the normal equations of a change from `start` [N, 3]: a matrix as `solve_rows` takes it [3 N, 9], and the
-    right side [3 N]."""
-    flat = start.ravel()
-    count = len(flat)
-    matrix, right = np.zeros((count, _BAND)), np.zeros(count)
-    for i in range(count):
-        matrix[i, 0] = 1e-9
+def _add_normal_equations(
+    first: Ints, coefficients: Floats, targets: Floats, weights: Floats, flat: Floats, matrix: Floats, right: Floats
+) -> None:
+    """Add the normal equations of rows to others, for a change from a trajectory [3 N]: to a matrix as `solve_rows`
+    takes it [3 N, 9], and to the right side [3 N]."""
     for r in range(len(first)):
         if weights[r] == 0.0:
             continue
@@ -162,4 +155,16 @@ def _normal_equations(
             for m in range(k + 1):
                 if coefficients[r, m] != 0.0:
                     matrix[at + k, k - m] += weighted * coefficients[r, m]
-    return matrix, right
+
+
+@jit
+def _solve_but_fixed(matrix: Floats, right: Floats, fixed: Bools) -> None:
+    """Solve such a system in place of its right side [3 N], with a change of 0 in the fixed frames [N]."""
+    # Their own equations outweigh all others.
+    firmly = 1e12 * max(matrix[:, 0].max(), 1.0)
+    for t in np.flatnonzero(fixed):
+        for k in range(3 * t, 3 * t + 3):
+            matrix[k, 0], right[k] = firmly, 0.0
+    solve_rows(matrix, right)
+    for t in np.flatnonzero(fixed):
+        right[3 * t : 3 * t + 3] = 0.0

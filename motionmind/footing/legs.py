@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from itertools import pairwise
 from typing import TypeVar
 
@@ -11,7 +10,7 @@ import numpy as np
 from motionmind._typing import Floats, Ints
 from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.limbs import limbs_of, stem_of
-from motionmind.body.skeleton import Skeleton
+from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.single import (
     Rotation,
@@ -38,6 +37,7 @@ SOFT = 0.02  # of a leg's length: this near to its full length a leg that stands
 HINGE = 0.1  # sine of a knee's bend below which its axis is mostly the one of other frames
 
 
+@remembered
 def find_legs(skeleton: Skeleton) -> tuple[list[int], list[tuple[list[int], int]]]:
     """Find the legs of a body: limbs of two bones or more that hang from the root, or from the first fork below it.
 
@@ -48,20 +48,10 @@ def find_legs(skeleton: Skeleton) -> tuple[list[int], list[tuple[list[int], int]
         The legs' numbers in `limbs_of`; and for each leg its joints, outward, and the place among them of its knee, the
         joint between its two longest neighbouring bones.
     """
-    numbers, legs = _find_legs(skeleton.names, skeleton.parents, skeleton.offsets.tobytes(), skeleton.tips.tobytes())
-    return [*numbers], [([*leg], knee) for leg, knee in legs]
-
-
-@lru_cache(maxsize=64)
-def _find_legs(
-    names: tuple[str, ...], parents: tuple[int, ...], offsets: bytes, tips: bytes
-) -> tuple[list[int], list[tuple[list[int], int]]]:
-    """Return what `find_legs` does, of a skeleton's fields: its bones as the bytes of their arrays [J, 3]."""
-    skeleton = Skeleton("", names, parents, *(np.frombuffer(bones).reshape(-1, 3) for bones in (offsets, tips)))
     numbers, out, above = [], [], stem_of(skeleton)[-1]
     lengths, ends = rot.norm(skeleton.offsets), rot.norm(skeleton.tips)
     for number, limb in enumerate(limbs_of(skeleton)):
-        if parents[limb[0]] != above or len(limb) < 2:
+        if skeleton.parents[limb[0]] != above or len(limb) < 2:
             continue
         bones = [*lengths[limb[1:]].tolist(), float(ends[limb[-1]])]
         pairs = [min(pair) for pair in pairwise(bones)]

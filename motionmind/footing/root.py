@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.body.contact import lowest_height
+from motionmind.body.contact import Posed, lowest_height
 from motionmind.body.limbs import limb_of_points
 from motionmind.body.skeleton import Skeleton
 from motionmind.footing.knees import smoothed
@@ -22,7 +22,7 @@ BEARS = 4  # a limb bears the body by this power of how much it stands: of two f
 
 def root_trajectory(
     skeleton: Skeleton,
-    rotations: Floats,
+    posed: Posed,
     clearance: Floats,
     stands: Floats,
     drift: Floats,
@@ -42,7 +42,7 @@ def root_trajectory(
 
     Args:
         skeleton: the body.
-        rotations: local rotations [N, J, 4].
+        posed: the movement about its root, of N frames.
         clearance: height of the lowest point above the floor [N], metres.
         stands: how firmly each limb, and last the trunk, stands between frames [N - 1, limbs + 1], from 0 to 1.
         drift: displacement of the corpus's bodies from each frame to the next [N - 1, 3], metres.
@@ -51,9 +51,10 @@ def root_trajectory(
         seconds: duration of the whole.
         easily: how easily the body steps between frames [N - 1], from LEAST to 1 (`steps_easily`).
     """
-    points = skeleton.positions_and_tips(rotations, np.zeros((len(rotations), 3)))
+    points = posed.places[:, : 2 * len(skeleton)]
     height = points[..., 1] - points[..., 1].min(axis=-1, keepdims=True) + clearance[:, None]
-    hold = np.exp(-np.maximum(height[1:], height[:-1]) / GRIP) * stands[:, limb_of_points(skeleton)] ** BEARS
+    firm = (stands**BEARS)[:, limb_of_points(skeleton)]
+    hold = np.exp(-np.maximum(height[1:], height[:-1]) / GRIP) * firm
     weight = SLIP + hold.sum(axis=1)
     steps = (SLIP * drift - np.einsum("np,npk->nk", hold, np.diff(points, axis=0))) / weight[:, None]
     slack = (1.0 / weight) / np.sum(1.0 / weight)

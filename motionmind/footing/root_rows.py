@@ -36,6 +36,7 @@ PUSH = 2.0  # metres a second squared: accelerations of the centre of mass
 HURRY = 0.018  # metres a second by which a body travels faster than it may; chosen on cmu-05, 0.02, and with SLIDES
 JERKS = 0.2  # metres a second squared by which it is accelerated level more than it may; chosen on cmu-16
 NEARLY = 0.9  # of that speed, or acceleration: from here on it is held to it
+BENDS, LEAVES, ARRIVES = (1.0, -2.0, 1.0), (-1.0, 1.0, 0.0), (0.0, -1.0, 1.0)  # of three frames' places
 
 
 def prior_rows(prior: Floats, bearing: Bearing, fps: float) -> list[Rows]:
@@ -103,22 +104,29 @@ def _jerk_rows(root: Floats, pushes: float, freedom: Floats, fps: float) -> tupl
     return coefficients, np.full(len(weights), min(pushes, 1e3)), weights
 
 
-def smooth_rows(prior: Floats, mass: Floats, fps: float, vertical: float) -> list[Rows]:
+def smooth_rows(prior: Floats, mass: Floats, fps: float, vertical: float) -> Rows:
     """Return rows for the accelerations of the centre of mass, `mass` [N, 3] relative to the root.
 
     At the ends the root is to move as on the trajectory that feet have it on by themselves [N, 3].
     """
     last = len(prior) - 3
-    bends, first = -(fps**2) * np.diff(mass, 2, axis=0), np.array([*range(last + 1), 0, last])
-    coefficients, targets, weights = np.zeros((3, last + 3, 9)), np.empty((3, last + 3)), np.empty((3, last + 3))
-    leaves, arrives = np.array([-(fps**2), fps**2, 0.0]), np.array([0.0, -(fps**2), fps**2])
+    first, coefficients, weights = _smooth_rows(len(prior), fps, vertical)
+    targets, leaves, arrives = np.empty((3, len(prior))), np.array(LEAVES), np.array(ARRIVES)
+    targets[:, :-2] = -(fps**2) * np.diff(mass, 2, axis=0).T
+    for axis in range(3):
+        targets[axis, -2:] = prior[:3, axis] @ (fps**2 * leaves), prior[last:, axis] @ (fps**2 * arrives)
+    return Rows(first, coefficients, targets.reshape(-1), weights)
+
+
+@lru_cache(maxsize=64)
+def _smooth_rows(count: int, fps: float, vertical: float) -> tuple[Ints, Floats, Floats]:
+    """Return the frames that `smooth_rows` of so many begin with, their coefficients and their weights."""
+    coefficients, weights = np.zeros((3, count, 9)), np.empty((3, count))
     for axis, share in enumerate((1.0, vertical, 1.0)):
         of_axis = coefficients[axis, :, axis::3]
-        of_axis[:-2], of_axis[-2], of_axis[-1] = (fps**2, -2.0 * fps**2, fps**2), leaves, arrives
-        targets[axis, :-2] = bends[:, axis]
-        targets[axis, -2:] = prior[:3, axis] @ leaves, prior[last:, axis] @ arrives
+        of_axis[:-2], of_axis[-2], of_axis[-1] = (fps**2 * np.array(shares) for shares in (BENDS, LEAVES, ARRIVES))
         weights[axis] = share * PUSH**-2.0
-    return [Rows(first, *of_axis) for of_axis in zip(coefficients, targets, weights, strict=True)]
+    return np.tile([*range(count - 2), 0, count - 3], 3), coefficients.reshape(-1, 9), weights.reshape(-1)
 
 
 def standing_rows(shape: Shape, bearing: Bearing, floor: Floats, freedom: Floats) -> list[Rows]:

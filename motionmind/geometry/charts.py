@@ -1,4 +1,7 @@
-"""Charts of the rotations, compiled: rotation vectors from one key of a curve to those near it, and curves by them."""
+"""Charts of the rotations, compiled: rotation vectors from one key of a curve to those near it, and curves by them.
+
+Here the coefficients of rotations lie one row after another, [4, m], so that several are reckoned at once.
+"""
 
 from __future__ import annotations
 
@@ -22,17 +25,19 @@ def curve_of_rotations(times: Floats, keys: Floats, at: Floats) -> Floats:
         at: times to evaluate at.
     """
     count, joints = keys.shape[:2]
+    rows = keys.transpose(0, 2, 1).copy()
     out, pieces, wanted = np.empty((len(at), joints, 4)), np.empty(len(at), np.int64), np.zeros(count, np.bool_)
     for t in range(len(at)):
         pieces[t] = piece_of(times, at[t])
         if at[t] != times[pieces[t]]:
             wanted[pieces[t]] = wanted[pieces[t] + 1] = True
     # In each chart only the centre and its neighbours count: values, and second derivatives.
-    values, bends = np.zeros((count, 3, joints, 3)), np.zeros((count, 3, joints, 3))
+    values, bends = np.zeros((count, 3, 3, joints)), np.zeros((count, 3, 3, joints))
     for centre in range(count):
         if wanted[centre]:
-            _write_chart(times, keys, centre, values[centre], bends[centre])
-    one, other, vector = np.empty(4), np.empty(4), np.empty(3)
+            _write_chart(times, rows, centre, values[centre], bends[centre])
+    one, other, turned = np.empty((4, joints)), np.empty((4, joints)), np.empty((4, joints))
+    vectors, room = np.empty((3, joints)), np.empty((2, joints))
     for t in range(len(at)):
         key = pieces[t]
         after, before = times[key + 1] - at[t], at[t] - times[key]
@@ -42,24 +47,28 @@ def curve_of_rotations(times: Floats, keys: Floats, at: Floats) -> Floats:
         step = after + before
         a, b, s = after**3 / step - step * after, before**3 / step - step * before, before / step
         share = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-        for joint in range(joints):
-            for end, rotation in ((0, one), (1, other)):
-                # The chart of the piece's first key has that in the middle, and that of its last one the last.
-                v, m, first = values[key + end], bends[key + end], 1 - end
-                for k in range(3):
-                    line = (v[first, joint, k] * after + v[first + 1, joint, k] * before) / step
-                    vector[k] = line + (m[first, joint, k] * a + m[first + 1, joint, k] * b) / 6.0
-                _write_turned(keys[key + end, joint], vector, rotation)
-            _write_log(one, other, vector)
+        for end, rotations in ((0, one), (1, other)):
+            # The chart of the piece's first key has that in the middle, and that of its last one the last.
+            v, m, first = values[key + end], bends[key + end], 1 - end
             for k in range(3):
-                vector[k] *= share
-            _write_turned(one, vector, out[t, joint])
+                for joint in range(joints):
+                    line = (v[first, k, joint] * after + v[first + 1, k, joint] * before) / step
+                    vectors[k, joint] = line + (m[first, k, joint] * a + m[first + 1, k, joint] * b) / 6.0
+            _write_turned(rows[key + end], vectors, room, rotations)
+        _write_logs(one, other, vectors, room)
+        for k in range(3):
+            for joint in range(joints):
+                vectors[k, joint] *= share
+        _write_turned(one, vectors, room, turned)
+        for joint in range(joints):
+            for k in range(4):
+                out[t, joint, k] = turned[k, joint]
     return out
 
 
 @jit
 def _write_chart(times: Floats, keys: Floats, centre: int, values: Floats, bends: Floats) -> None:
-    """Write the natural spline of rotation vectors around a key: values and second derivatives [3, m, 3] there and at
+    """Write the natural spline of rotation vectors around a key: values and second derivatives [3, 3, m] there and at
     its neighbours, where there are some."""
     first, last = max(centre - _MARGIN, 0), min(centre + _MARGIN, len(keys) - 1)
     vectors = _vectors_around(keys, centre, first, last)
@@ -72,25 +81,27 @@ def _write_chart(times: Floats, keys: Floats, centre: int, values: Floats, bends
 
 @jit
 def _vectors_around(keys: Floats, centre: int, first: int, last: int) -> Floats:
-    """Return rotation vectors [n, m, 3], radians, from the key that is the centre to the keys from first to last.
+    """Return rotation vectors [n, 3, m], radians, from the key that is the centre to the keys from first to last.
 
     They are unrolled: each has whole turns added so that it is nearest to that of the neighbouring key towards the
     centre.
     """
-    out = np.empty((last - first + 1, keys.shape[1], 3))
-    turned = np.empty(keys.shape[1])
+    joints = keys.shape[2]
+    out = np.empty((last - first + 1, 3, joints))
+    turned, room = np.empty(joints), np.empty((2, joints))
     out[centre - first] = 0.0
     for side in (1, -1):
         turned[:] = 0.0
         key = centre + side
         while first <= key <= last:
-            for joint in range(keys.shape[1]):
-                own = out[key - first, joint]
-                angle = _write_log(keys[centre, joint], keys[key, joint], own)
+            own = out[key - first]
+            _write_logs(keys[centre], keys[key], own, room)
+            for joint in range(joints):
                 # No turn could bring it nearer: neither is half a turn away. Of zeros the sign would be lost.
-                if angle + turned[joint] > _NEAR or angle < 1e-8 or own[0] * own[1] * own[2] == 0.0:
-                    _unroll(own, out[key - side - first, joint])
-                    angle = np.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2)
+                angle, is_flat = room[0, joint], own[0, joint] * own[1, joint] * own[2, joint] == 0.0
+                if angle + turned[joint] > _NEAR or angle < 1e-8 or is_flat:
+                    _unroll(own[:, joint], out[key - side - first, :, joint])
+                    angle = np.sqrt(own[0, joint] ** 2 + own[1, joint] ** 2 + own[2, joint] ** 2)
                 turned[joint] = angle
             key += side
     return out
@@ -110,29 +121,49 @@ def _unroll(own: Floats, toward: Floats) -> None:
 
 
 @jit
-def _write_log(a: Floats, b: Floats, out: Floats) -> float:
-    """Write the rotation vector [3] from rotation `a` to `b` [4], in the frame of `a`: as `rotations.log`. Return its
-    length, radians."""
-    x = a[3] * b[0] - a[0] * b[3] - a[1] * b[2] + a[2] * b[1]
-    y = a[3] * b[1] + a[0] * b[2] - a[1] * b[3] - a[2] * b[0]
-    z = a[3] * b[2] - a[0] * b[1] + a[1] * b[0] - a[2] * b[3]
-    w = a[3] * b[3] + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    sine = np.sqrt(x * x + y * y + z * z)
-    angle = 2.0 * np.arctan2(sine, abs(w))
-    scale = angle / sine if sine > 1e-8 else 2.0
-    if w < 0.0:
-        scale = -scale
-    out[0], out[1], out[2] = scale * x, scale * y, scale * z
-    return float(angle)
+def _write_logs(a: Floats, b: Floats, out: Floats, room: Floats) -> None:
+    """Write the rotation vectors [3, m] from rotations `a` to `b` [4, m], in the frames of `a`: as `rotations.log`.
+
+    Their lengths, radians, are then in the first row of the `room` for intermediate results [2, m].
+    """
+    # Loops of one line each, which the compiler turns into instructions on several numbers at once.
+    count, lengths, scales = a.shape[1], room[0], room[1]
+    for j in range(count):
+        out[0, j] = a[3, j] * b[0, j] - a[0, j] * b[3, j] - a[1, j] * b[2, j] + a[2, j] * b[1, j]
+    for j in range(count):
+        out[1, j] = a[3, j] * b[1, j] + a[0, j] * b[2, j] - a[1, j] * b[3, j] - a[2, j] * b[0, j]
+    for j in range(count):
+        out[2, j] = a[3, j] * b[2, j] - a[0, j] * b[1, j] + a[1, j] * b[0, j] - a[2, j] * b[3, j]
+    for j in range(count):
+        lengths[j] = a[3, j] * b[3, j] + a[0, j] * b[0, j] + a[1, j] * b[1, j] + a[2, j] * b[2, j]
+    for j in range(count):
+        scales[j] = np.sqrt(out[0, j] * out[0, j] + out[1, j] * out[1, j] + out[2, j] * out[2, j])
+    for j in range(count):
+        cosine, sine = lengths[j], scales[j]
+        lengths[j] = 2.0 * np.arctan2(sine, abs(cosine))
+        scale = lengths[j] / sine if sine > 1e-8 else 2.0
+        scales[j] = -scale if cosine < 0.0 else scale
+    for k in range(3):
+        for j in range(count):
+            out[k, j] *= scales[j]
 
 
 @jit
-def _write_turned(key: Floats, vector: Floats, out: Floats) -> None:
-    """Write a key [4] turned by a rotation vector [3] in its own frame: as `rotations.exp`, and the product."""
-    angle = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
-    share = np.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
-    x, y, z, w = share * vector[0], share * vector[1], share * vector[2], np.cos(0.5 * angle)
-    out[0] = key[3] * x + key[0] * w + key[1] * z - key[2] * y
-    out[1] = key[3] * y - key[0] * z + key[1] * w + key[2] * x
-    out[2] = key[3] * z + key[0] * y - key[1] * x + key[2] * w
-    out[3] = key[3] * w - key[0] * x - key[1] * y - key[2] * z
+def _write_turned(keys: Floats, vectors: Floats, room: Floats, out: Floats) -> None:
+    """Write keys [4, m] turned by rotation vectors [3, m] in their own frames: as `rotations.exp`, and the product.
+
+    There is `room` for intermediate results [2, m].
+    """
+    count, shares, cosines = keys.shape[1], room[0], room[1]
+    for j in range(count):
+        shares[j] = np.sqrt(vectors[0, j] ** 2 + vectors[1, j] ** 2 + vectors[2, j] ** 2)
+    for j in range(count):
+        angle = shares[j]
+        shares[j] = np.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
+        cosines[j] = np.cos(0.5 * angle)
+    for j in range(count):
+        x, y, z, w = shares[j] * vectors[0, j], shares[j] * vectors[1, j], shares[j] * vectors[2, j], cosines[j]
+        out[0, j] = keys[3, j] * x + keys[0, j] * w + keys[1, j] * z - keys[2, j] * y
+        out[1, j] = keys[3, j] * y - keys[0, j] * z + keys[1, j] * w + keys[2, j] * x
+        out[2, j] = keys[3, j] * z + keys[0, j] * y - keys[1, j] * x + keys[2, j] * w
+        out[3, j] = keys[3, j] * w - keys[0, j] * x - keys[1, j] * y - keys[2, j] * z

@@ -11,7 +11,8 @@ of Shoemake, "Animating rotation with quaternion curves", SIGGRAPH (1985), unles
 
 from __future__ import annotations
 
-from functools import reduce
+from functools import cache, reduce
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +23,14 @@ IDENTITY: Floats = np.array([0.0, 0.0, 0.0, 1.0])
 IDENTITY.setflags(write=False)
 _MANY = 64  # items from which compiled code (`many`) does the same arithmetic
 _LEAST = 1e-12  # longer is what can be made a rotation
+
+
+@cache
+def _many() -> ModuleType:
+    """Return the loops over many rotations; numba is slow to import."""
+    from motionmind.geometry import many
+
+    return many
 
 
 def mul(a: Floats, b: Floats) -> Floats:
@@ -41,11 +50,9 @@ def mul(a: Floats, b: Floats) -> Floats:
 
 def _product(a: Floats, b: Floats, of_a: float = 1.0, of_b: float = 1.0) -> Floats:
     """Return the product [..., 4] of many rotations whose vector parts are of these signs: -1 inverts."""
-    from motionmind.geometry.many import multiply  # numba is slow to import
-
     shape = a.shape[:-1] if a.shape == b.shape else np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
     out = np.empty((*shape, 4))
-    multiply(_rows(a, shape), _rows(b, shape), of_a, of_b, out.reshape(-1, 4))
+    _many().multiply(_rows(a, shape), _rows(b, shape), of_a, of_b, out.reshape(-1, 4))
     return out
 
 
@@ -86,11 +93,9 @@ def mul_inv(a: Floats, b: Floats) -> Floats:
 def mul_vec(q: Floats, v: Floats) -> Floats:
     """Return the vectors `v` [..., 3] turned by `q` [..., 4]."""
     if q.size >= 4 * _MANY or v.size >= 3 * _MANY:
-        from motionmind.geometry.many import turn
-
         shape = np.broadcast_shapes(q.shape[:-1], v.shape[:-1])
         out = np.empty((*shape, 3))
-        turn(_rows(q, shape), _rows(v, shape), out.reshape(-1, 3))
+        _many().turn(_rows(q, shape), _rows(v, shape), out.reshape(-1, 3))
         return out
     # v + w t + u x t with t = 2 (u x v) and u the vector part: cheaper than two products of quaternions.
     u, w = q[..., :3], q[..., 3:]
@@ -101,10 +106,8 @@ def mul_vec(q: Floats, v: Floats) -> Floats:
 def norm(v: Floats) -> Floats:
     """Return the lengths [...] of vectors [..., n]; np.linalg.norm takes several times as long on short vectors."""
     if v.size >= v.shape[-1] * _MANY:
-        from motionmind.geometry.many import measure
-
         lengths = np.empty(v.shape[:-1])
-        measure(_rows(v), lengths.reshape(-1))
+        _many().measure(_rows(v), lengths.reshape(-1))
         return lengths
     squares = v[..., 0] ** 2
     for i in range(1, v.shape[-1]):
@@ -133,10 +136,8 @@ def normalise(q: ArrayLike) -> Floats:
     q = np.asarray(q, dtype=np.float64)
     length = norm(q)
     if q.size >= 4 * _MANY:
-        from motionmind.geometry.many import divide
-
         out = q.copy()
-        is_rotation = divide(out.reshape(-1, 4), length.reshape(-1), _LEAST)
+        is_rotation = _many().divide(out.reshape(-1, 4), length.reshape(-1), _LEAST)
     else:
         is_rotation = bool(np.all(length > _LEAST))
         out = np.asarray(q / length[..., None] if is_rotation else q, dtype=np.float64)
@@ -167,10 +168,8 @@ def _sides(q: Floats) -> tuple[Floats, Floats]:
     """Return the sine and the cosine [...] of half the angle of `q` [..., 4], both at least 0."""
     if q.size < 4 * _MANY:
         return norm(q[..., :3]), np.abs(q[..., 3])
-    from motionmind.geometry.many import sides
-
     sines, cosines = np.empty((2, *q.shape[:-1]))
-    sides(_rows(q), sines.reshape(-1), cosines.reshape(-1))
+    _many().sides(_rows(q), sines.reshape(-1), cosines.reshape(-1))
     return sines, cosines
 
 
@@ -181,10 +180,8 @@ def exp(v: Floats) -> Floats:
     share, cosine = np.sinc(theta / (2.0 * np.pi)), np.cos(0.5 * theta)
     if theta.size < _MANY:
         return np.concatenate([v * 0.5 * share[..., None], cosine[..., None]], axis=-1)
-    from motionmind.geometry.many import quaternions
-
     out = np.empty((*theta.shape, 4))
-    quaternions(_rows(v), share.reshape(-1), cosine.reshape(-1), out.reshape(-1, 4))
+    _many().quaternions(_rows(v), share.reshape(-1), cosine.reshape(-1), out.reshape(-1, 4))
     return out
 
 
@@ -193,10 +190,8 @@ def log(q: Floats) -> Floats:
     s, cosine = _sides(q)
     theta = np.asarray(2.0 * np.arctan2(s, cosine))
     if theta.size >= _MANY:
-        from motionmind.geometry.many import vectors
-
         out = np.empty((*theta.shape, 3))
-        vectors(_rows(q), s.reshape(-1), theta.reshape(-1), out.reshape(-1, 3))
+        _many().vectors(_rows(q), s.reshape(-1), theta.reshape(-1), out.reshape(-1, 3))
         return out
     # theta / s tends to 2 as s does to 0: theta = 2 asin(s) = 2 s + s^3/3 + ...
     scale = np.where(s > 1e-8, theta / np.where(s > 1e-8, s, 1.0), 2.0)
@@ -205,9 +200,11 @@ def log(q: Floats) -> Floats:
 
 def from_axis_angle(axis: ArrayLike, theta: ArrayLike) -> Floats:
     """Return the rotation [..., 4] by `theta` [...] radians about the unit vectors `axis` [..., 3]."""
-    half = 0.5 * np.asarray(theta, dtype=np.float64)[..., None]
-    vector = np.asarray(axis, dtype=np.float64) * np.sin(half)
-    return np.asarray(np.concatenate([vector, np.broadcast_to(np.cos(half), (*vector.shape[:-1], 1))], axis=-1))
+    half = 0.5 * np.asarray(theta, dtype=np.float64)
+    vector = np.asarray(axis, dtype=np.float64) * np.sin(half)[..., None]
+    out = np.empty((*vector.shape[:-1], 4))
+    out[..., :3], out[..., 3] = vector, np.cos(half)
+    return out
 
 
 def from_euler(order: str, angles: Floats) -> Floats:
@@ -225,10 +222,8 @@ def from_euler(order: str, angles: Floats) -> Floats:
     """
     axes = np.array([np.eye(3)["xyz".index(letter)] for letter in order.lower()])
     if len(axes) and angles.size >= len(axes) * _MANY:
-        from motionmind.geometry import many
-
         half, out = 0.5 * angles, np.empty((*angles.shape[:-1], 4))
-        many.turns(_rows(np.sin(half)), _rows(np.cos(half)), axes, out.reshape(-1, 4))
+        _many().turns(_rows(np.sin(half)), _rows(np.cos(half)), axes, out.reshape(-1, 4))
         return out
     turns = [from_axis_angle(axis, angles[..., i]) for i, axis in enumerate(axes)]
     return reduce(mul, turns) if turns else np.tile(IDENTITY, (*angles.shape[:-1], 1))
@@ -267,10 +262,8 @@ def to_matrix(q: Floats) -> Floats:
     """Return rotation matrices [..., 3, 3] of `q` [..., 4]; their columns are the images of x, y and z."""
     if q.size < 4 * _MANY:
         return np.stack([mul_vec(q, np.broadcast_to(e, (*q.shape[:-1], 3))) for e in np.eye(3)], axis=-1)
-    from motionmind.geometry.many import matrices
-
     out = np.empty((*q.shape[:-1], 3, 3))
-    matrices(_rows(q), out.reshape(-1, 3, 3))
+    _many().matrices(_rows(q), out.reshape(-1, 3, 3))
     return out
 
 

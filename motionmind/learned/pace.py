@@ -85,12 +85,24 @@ class Way(NamedTuple):
 
 def ways(skeleton: Skeleton, rotations: tuple[Floats, Floats], roots: tuple[Floats, Floats]) -> Way:
     """Return the ways from postures to others, of local rotations [..., J, 4] and root positions [..., 3], metres."""
-    headings = [rot.heading(those[..., 0, :]) for those in rotations]
-    joints = rot.angle(*rotations)
-    tilts = (rot.mul(rot.about_vertical(-h), those[..., 0, :]) for h, those in zip(headings, rotations, strict=True))
-    joints[..., 0] = rot.angle(*tilts)
-    turn = np.abs(np.angle(np.exp(1j * (headings[1] - headings[0]))))
-    moved = roots[1] - roots[0]
+    first, last = (_faced(those[..., 0, :]) for those in rotations)
+    return _way(skeleton, rot.angle(*rotations), first, last, roots[1] - roots[0])
+
+
+def _faced(root: Floats) -> tuple[Floats, Floats]:
+    """Return where a body whose root has these orientations [..., 4] faces [...], radians, and how it tilts there."""
+    headings = rot.heading(root)
+    return headings, rot.mul(rot.about_vertical(-headings), root)
+
+
+def _way(
+    skeleton: Skeleton, joints: Floats, first: tuple[Floats, Floats], last: tuple[Floats, Floats], moved: Floats
+) -> Way:
+    """Return ways by the joints' angles [..., J], radians, how the body is turned before and after them (`_faced`), and
+    how far its root moves [..., 3], metres."""
+    (faced, tilted), (faces, tilts) = first, last
+    joints[..., 0] = rot.angle(tilted, tilts)
+    turn = np.abs(np.angle(np.exp(1j * (faces - faced))))
     height = skeleton.height if skeleton.height > 0.0 else 1.0
     return Way(joints, np.asarray(turn), np.hypot(moved[..., 0], moved[..., 2]) / height)
 
@@ -102,8 +114,9 @@ def way_between(a: Posture, b: Posture) -> Way:
 
 def way_of(motion: Motion) -> Way:
     """Return the ways from each frame of a motion to the next [T - 1]."""
-    rotations, root = motion.rotations, motion.root
-    return ways(motion.skeleton, (rotations[:-1], rotations[1:]), (root[:-1], root[1:]))
+    joints, (faces, tilts) = rot.angle(motion.rotations[:-1], motion.rotations[1:]), _faced(motion.rotations[:, 0])
+    moved = np.diff(motion.root, axis=0)
+    return _way(motion.skeleton, joints, (faces[:-1], tilts[:-1]), (faces[1:], tilts[1:]), moved)
 
 
 @dataclass(frozen=True, eq=False)

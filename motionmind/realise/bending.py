@@ -28,11 +28,11 @@ def allowed_off(chains: Floats, path: Int32s, grammar: Grammar, tolerances: Floa
     is beyond the tolerance of every state: of a vocabulary that has nothing near, no state is to be forced on a
     movement.
     """
-    starts, beyond = grammar.transitions.starts, np.empty(path.shape)
-    for chain, tolerance in enumerate(tolerances):
+    starts, nearest = grammar.transitions.starts, np.empty(path.shape)  # cosines of half the angles
+    for chain in range(len(tolerances)):
         centres = grammar.centres[starts[chain] : starts[chain + 1]]
-        nearest = 2.0 * np.arccos(np.minimum(np.abs(chains[:, chain] @ centres.T).max(axis=1), 1.0))
-        beyond[:, chain] = np.maximum(nearest - tolerance, 0.0)
+        nearest[:, chain] = np.abs(chains[:, chain] @ centres.T).max(axis=1)
+    beyond = np.maximum(2.0 * np.arccos(np.minimum(nearest, 1.0)) - tolerances, 0.0)
     return np.where(wished, FIRMLY * tolerances, FREELY * tolerances + beyond)
 
 

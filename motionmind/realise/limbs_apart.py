@@ -20,7 +20,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.anatomy import SIDES
 from motionmind.body.capsules import ARM, LEG, Capsules, capsules_of, pair_depths
 from motionmind.body.contact import limb_heights, lowest_height
-from motionmind.body.skeleton import Skeleton
+from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.footing.least_squares import solve_rows
 from motionmind.footing.legs import find_legs, reach
 from motionmind.geometry import rotations as rot
@@ -65,7 +65,7 @@ def keep_limbs_apart(
     if not len(pairs):
         return rotations
     places = skeleton.positions_and_tips(rotations, np.zeros(3))
-    ends = np.ascontiguousarray(capsules.place(places))
+    ends = capsules.place(places)
     frames, fps = np.arange(len(rotations)), 1.0 / (times[1] - times[0])
     held = np.array(sorted({*np.floor(given + 1e-6).tolist(), *np.ceil(given - 1e-6).tolist()}), dtype=np.int64)
     before = np.clip(np.searchsorted(held, frames, side="right") - 1, 0, len(held) - 2)
@@ -79,11 +79,12 @@ def keep_limbs_apart(
     # Beside a given posture, where nothing may turn, there is no time to part: there they do so little by little.
     near = 1.0 - _risen((np.abs(frames[:, None] - held).min(axis=1) - 1) / (SPREADS * fps))
     allowed += near[:, None] * np.maximum(depths - allowed, 0.0)
-    limbs = _limbs_of(skeleton, capsules)
+    limbs = _limbs_of(skeleton)
     still = np.zeros((len(rotations), 4))
     if root is not None:
         still[:, :2] = _standing(capsules, places + root[:, None], fps)
-    frozen = np.isin(frames, held + np.array([[-1], [0], [1]]))
+    frozen = np.zeros(len(rotations), dtype=np.bool_)
+    frozen[np.clip(held + np.array([[-1], [0], [1]]), 0, len(rotations) - 1)] = True
     of_legs = np.isin(limbs.owner[pairs], (0, 1)).all(axis=1)
     crossed = np.any(depths[:, of_legs] > allowed[:, of_legs] + LEAST, axis=1)
     firmly, still = _give_way(_held(still, frozen), still, crossed)
@@ -117,8 +118,10 @@ def keep_limbs_apart(
     return _lift_feet(skeleton, out, root, floor, fixed, frozen, fps)
 
 
-def _limbs_of(skeleton: Skeleton, capsules: Capsules) -> Limbs:
+@remembered
+def _limbs_of(skeleton: Skeleton) -> Limbs:
     """Return the limbs of a person."""
+    capsules = capsules_of(skeleton)
     first = [skeleton.index(f"{side}_{joint}") for joint in ("hip", "shoulder") for side in SIDES]
     ankles = [skeleton.index(f"{side}_ankle") for side in SIDES]
     owner = np.full(len(capsules.names), -1)

@@ -167,7 +167,8 @@ def realise(
     keep_apart = keeper(clock, [*stops], fixed, wished, carriage, a.skeleton, without)
     rotations = _limit(keep_apart(rotations, None), postures, carriage.loose)
 
-    most = None if peaks is None else peaks(LONGER * float(clock.frames[-1]), pace)
+    greatest = None if windows is None else windows(LONGER * float(clock.frames[-1]), pace)
+    most = None if peaks is None else greatest
     if most is not None:
         high = np.sqrt(2.0 * GRAVITY * stance.leaps) > JUMPS_AT * most[-2] * a.skeleton.height
         high[given] = False
@@ -196,11 +197,10 @@ def realise(
         without=without,
     )
     motion = settle(Motion(a.skeleton, rotations, root, clock.frames), clock)
-    if windows is not None:
-        most = windows(LONGER * float(clock.frames[-1]), pace)
+    if greatest is not None:
         if length is None:
-            most = _quickest(most, speeds, pace, len(a.skeleton))
-        motion, clock = slow_down(motion, clock, most, moving, pace * slides, settle, lasts=length is not None)
+            greatest = _quickest(greatest, speeds, pace, len(a.skeleton))
+        motion, clock = slow_down(motion, clock, greatest, moving, pace * slides, settle, lasts=length is not None)
     return Realised(replace(motion, name="tween", insertions=(Insertion(clock.moves),)), detailed, walk.left_out)
 
 

@@ -18,14 +18,14 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.body.contact import TALL, foot_slides, lowest_height
+from motionmind.body.contact import TALL, Posed, lowest_height, pose, slides_between
 from motionmind.body.motion import Motion
 from motionmind.body.plausibility import GRAVITY
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, size_of
 from motionmind.corpus.corpus import Corpus
 from motionmind.footing.flight import PUSHES, find_falls
-from motionmind.footing.knees import bell
+from motionmind.footing.knees import bell, greatest_around
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.learned.pace import moved_in, steps_of, ways
@@ -78,9 +78,7 @@ def keep_pace(
     step = np.searchsorted(times, 0.5 * (frames[1:] + frames[:-1])) - 1
     np.maximum.at(slower, step.clip(0, len(slower) - 1), (speeds / (HEADROOM * fastest)).max(axis=1))
     # The greatest of three, twice, covers the mean of five: no half step is slowed less than it needs.
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(slower, 2, mode="edge"), 5).max(axis=1)
-    weights = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
-    slower = np.convolve(np.pad(around, 2, mode="edge"), weights, "valid")
+    slower = _mean_around(greatest_around(slower, 2, 0), np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0)
     middle = 0.5 * (times[1:] + times[:-1])
     for is_moving, since in zip(moving, (middle - times[0], times[-1] - middle), strict=True):
         if is_moving:
@@ -192,25 +190,36 @@ def slow_down(
     for again in range(AGAIN if settle else 1):
         before = clock
         for number in range(ROUNDS):
-            slower, slack = _slower(motion, most, slides, moving)
+            posed = pose(motion.skeleton, motion.rotations, motion.root)
+            slower, slack = _slower(motion, posed, most, slides, moving)
             if lasts:
                 slower = _within(slower, slack, np.diff(motion.times))
             if slower.max() < (1.0 / ENDS_AT if again or number else 1.0 + SLIGHT):
                 break
-            motion, clock = _slowed(motion, clock, slower)
+            motion, clock = _slowed(motion, clock, posed.lowest, slower)
         if settle is None or clock is before:
             break
         motion = settle(motion, clock)
     return motion, clock
 
 
-def _slower(motion: Motion, most: Floats, slides: float, moving: tuple[bool, bool]) -> tuple[Floats, Floats]:
+def _slower(
+    motion: Motion, posed: Posed, most: Floats, slides: float, moving: tuple[bool, bool]
+) -> tuple[Floats, Floats]:
     """Return how many times longer each step of a movement is to take [N - 1], at least 1, and what share of its time
-    it could do without [N - 1]; arguments are those of `slow_down`."""
+    it could do without [N - 1].
+
+    Args:
+        motion: the movement.
+        posed: the same, in the world.
+        most: as for `slow_down`, as is all else.
+        slides: speed of a foot near the floor, heights/s.
+        moving: whether the first and the last posture are passed at a given velocity.
+    """
     times, body = motion.times, motion.skeleton
     middles, fps = 0.5 * (times[1:] + times[:-1]), 1.0 / float(times[1] - times[0])
     ends = [time for fixed, time in zip(moving, times[[0, -1]], strict=True) if fixed]
-    free = np.minimum(_away(middles, ends, fps), _away(middles, times[_falling(motion, fps)], fps, PUSHES))
+    free = np.minimum(_away(middles, ends, fps), _away(middles, times[_falling(body, posed, fps)], fps, PUSHES))
     moved = moved_in(motion)
     shown = (fps * steps_of(motion) / most[:-1]).max(axis=1)
     # Twice as slow a movement has a quarter of its accelerations; each is between two steps.
@@ -218,20 +227,22 @@ def _slower(motion: Motion, most: Floats, slides: float, moving: tuple[bool, boo
     changes[_braking(moved, moving, fps)] = 1.0  # the slower the rest, the more a body brakes from what is given
     shown[1:], shown[:-1] = np.maximum(shown[1:], changes), np.maximum(shown[:-1], changes)
     if np.isfinite(slides) and body.height >= TALL:
-        low = lowest_height(body, motion.rotations, motion.root)
-        slid = foot_slides(body, motion.rotations, motion.root, _floor(times, low, times))
+        slid = slides_between(body, posed.places, _floor(times, posed.lowest, times))
         shown = np.maximum(shown, fps * slid.max(axis=1, initial=0.0) / (slides * body.height))
     shown[free < SLIGHT] = 1.0
     reach = max(1, round(AROUND * fps))
 
     def around(values: Floats) -> Floats:
-        greatest = np.lib.stride_tricks.sliding_window_view(np.pad(values, reach, mode="edge"), 2 * reach + 1).max(
-            axis=1
-        )
-        return np.convolve(np.pad(greatest, reach, mode="edge"), bell(reach), "valid")
+        return _mean_around(greatest_around(values, reach, 0), bell(reach))
 
     slower = 1.0 + free * (around(np.maximum(shown, 1.0)) - 1.0)
     return slower, free * (1.0 - around(np.minimum(shown, 1.0)))
+
+
+def _mean_around(values: Floats, weights: Floats) -> Floats:
+    """Return means [N] of values around each with so many weights [2 n + 1]; beyond the ends they are as there."""
+    reach = len(weights) // 2
+    return np.convolve(values[np.arange(-reach, len(values) + reach).clip(0, len(values) - 1)], weights, "valid")
 
 
 def _braking(moved: Floats, moving: tuple[bool, bool], fps: float) -> Bools:
@@ -266,8 +277,15 @@ def _within(slower: Floats, slack: Floats, seconds: Floats) -> Floats:
     return np.asarray(slower - slack * (more / max(spare, 1e-9)))
 
 
-def _slowed(motion: Motion, clock: Timeline, slower: Floats) -> tuple[Motion, Timeline]:
-    """Return a movement whose steps take so many times longer [N - 1], and its clock."""
+def _slowed(motion: Motion, clock: Timeline, low: Floats, slower: Floats) -> tuple[Motion, Timeline]:
+    """Return a movement whose steps take so many times longer [N - 1], and its clock.
+
+    Args:
+        motion: the movement.
+        clock: its clock.
+        low: height of its lowest point [N], metres.
+        slower: how many times longer its steps take [N - 1].
+    """
     times = motion.times
     later, at = stretch(clock, times, slower, 1.0 / float(times[1] - times[0]))
     was = np.interp(later.frames, at, times)
@@ -276,7 +294,6 @@ def _slowed(motion: Motion, clock: Timeline, slower: Floats) -> tuple[Motion, Ti
         natural_spline(times, motion.root, was),
     )
     # A spline between frames may lead a little deeper into the floor than they do.
-    low = lowest_height(motion.skeleton, motion.rotations, motion.root)
     lowest = np.minimum(np.interp(was, times, low), _floor(times, low, was))
     deep = lowest - lowest_height(motion.skeleton, rotations, root)
     root[:, 1] += np.maximum(deep, 0.0)
@@ -304,10 +321,10 @@ def _away(middles: Floats, times: Iterable[float], fps: float, beside: float = 0
     return np.clip((since - 0.5 / fps - beside) / SETTLES, 0.0, 1.0)
 
 
-def _falling(motion: Motion, fps: float) -> Bools:
-    """Return in which frames the mass of a body falls, off the floor [N]."""
-    ends, out = np.zeros(len(motion), dtype=np.bool_), np.zeros(len(motion), dtype=np.bool_)
+def _falling(skeleton: Skeleton, posed: Posed, fps: float) -> Bools:
+    """Return in which frames of a movement the mass of a body falls, off the floor [N]."""
+    ends, out = np.zeros(len(posed.places), dtype=np.bool_), np.zeros(len(posed.places), dtype=np.bool_)
     ends[[0, -1]] = True
-    for start, stop in find_falls(motion.skeleton, motion.rotations, motion.root, ends, fps)[1]:
+    for start, stop in find_falls(skeleton, posed, ends, fps)[1]:
         out[start:stop] = True
     return out

@@ -11,6 +11,7 @@ import pytest
 from motionmind._typing import Floats
 from motionmind.body.anatomy_file import anatomy_named
 from motionmind.body.contact import (
+    contact_points,
     feet_that_stay,
     find_floor,
     floor_height,
@@ -63,6 +64,18 @@ def test_a_heel_is_where_a_joint_would_hang_from_the_ankle(name: str) -> None:
         assert np.sum(joints[heel < expected] == ankle) > 10
         expected = np.minimum(expected, heel)
     np.testing.assert_allclose(heights, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("heels", [True, False])
+def test_the_lowest_height_is_that_of_the_lowest_place(heels: bool) -> None:
+    rotations, root = tumble(human23())
+    places, _ = contact_points(human23(), rotations, root, heels=heels)
+    heights = lowest_height(human23(), rotations, root, heels=heels)
+    np.testing.assert_array_equal(heights, places[..., 1].min(axis=-1))
+    in_rows = lowest_height(human23(), rotations.reshape(8, 5, -1, 4), root.reshape(8, 5, 3), heels=heels)
+    np.testing.assert_array_equal(in_rows.reshape(-1), heights)
+    about_root = lowest_height(human23(), rotations[0], np.zeros(3), heels=heels)
+    np.testing.assert_allclose(about_root + root[0, 1], heights[0], atol=1e-12)
 
 
 def test_a_person_at_rest_stands_on_heels_and_toes() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from time import perf_counter
 from typing import Any
 
@@ -11,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from motionmind._typing import Floats
 from motionmind.body.human import human23
-from motionmind.body.skeleton import Skeleton
+from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.errors import SkeletonError
 from motionmind.footing.legs import find_legs
 from motionmind.geometry import rotations as rot
@@ -231,3 +232,22 @@ def test_thousands_of_joints_are_checked_and_compared_in_no_time() -> None:
     skeleton = Skeleton("centipede", *parts)
     assert skeleton.difference(Skeleton("another", *parts)) is None
     assert perf_counter() - began < 2.0  # quadratic work takes minutes
+
+
+def test_what_is_found_of_a_skeleton_is_found_once_for_each_and_does_not_travel_with_it() -> None:
+    asked = []
+
+    @remembered
+    def count(skeleton: Skeleton) -> int:
+        """Count the joints."""
+        asked.append(skeleton.name)
+        return len(skeleton)
+
+    one, other = some_tree(0), some_tree(1, joints=5)
+    assert [count(one), count(other), count(one), count(other)] == [12, 5, 12, 5]
+    assert asked == ["tree", "tree"]
+    assert count.__doc__ == "Count the joints."
+    again = pickle.loads(pickle.dumps(one))
+    assert again == one
+    assert count(again) == 12
+    assert len(asked) == 3

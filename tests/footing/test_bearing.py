@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from motionmind.body.contact import pose
 from motionmind.body.human import human23
 from motionmind.footing.bearing import MOSTLY, TOUCHES, Bearing, lowest, shape_of
-from motionmind.footing.feet import bend_legs, find_free_feet, pose
+from motionmind.footing.feet import bend_legs, find_free_feet
 from motionmind.geometry import rotations as rot
 
 BODY = human23()
@@ -27,7 +28,7 @@ def test_the_lowest_point_of_each_part() -> None:
 
 
 def test_points_touch_the_floor_with_what_bears() -> None:
-    shape = shape_of(BODY, MOVEMENT, FEET)
+    shape = shape_of(BODY, pose(BODY, MOVEMENT), FEET)
     stands = np.ones((FRAMES, 2), dtype=np.bool_)
     stands[10:20, 0] = False
     others = np.where(np.arange(len(shape.others)) == 0, MOSTLY + 0.1, 0.0) * np.ones((FRAMES, 1))

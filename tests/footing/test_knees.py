@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionmind.footing.knees import SHIFTS, bend_of, distance_of, keep_detail, slow_down, smoothed
+from motionmind.footing.knees import SHIFTS, bend_of, distance_of, greatest_around, keep_detail, slow_down, smoothed
 
 FPS, FASTEST = 30.0, 6.0
 
@@ -49,6 +49,14 @@ def test_a_swinging_leg_bends_more_and_a_standing_one_is_kept():
 def test_a_bend_and_a_distance_are_the_same_thing():
     bends = np.linspace(0.0, 3.0, 20)
     assert np.allclose(bend_of(distance_of(bends, 0.4, 0.45), 0.4, 0.45), bends)
+
+
+def test_the_greatest_around_is_that_of_a_window_and_beyond_the_ends_of_what_is_there():
+    values = np.random.default_rng(0).random(20)
+    for reach, beyond in ((0, 0), (1, 0), (3, 3), (30, 2), (2, 5)):
+        padded = np.pad(values, reach + beyond, mode="edge")
+        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
+        np.testing.assert_array_equal(greatest_around(values, reach, beyond), windows.max(axis=1))
 
 
 def test_smoothing_keeps_lines():

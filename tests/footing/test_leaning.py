@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from motionmind._typing import Floats
+from motionmind.body.contact import pose
 from motionmind.body.human import human23
 from motionmind.body.limbs import limbs_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import find_support
 from motionmind.footing.balance import ROOM, WALKS, balance_rows, falls_without, is_beyond, walks
-from motionmind.footing.feet import bend_legs, find_free_feet, pose
+from motionmind.footing.feet import bend_legs, find_free_feet
 from motionmind.footing.leaning import STILL, shift_weight
+from motionmind.footing.least_squares import Rows
 from motionmind.footing.legs import SOFT
 from motionmind.footing.root import stand
 from motionmind.geometry import rotations as rot
@@ -142,7 +144,8 @@ def test_what_brings_the_weight_back_measures_how_far_its_zero_moment_point_is_b
     beyond = np.abs(pressed) - 0.1 - ROOM
     assert np.sum(beyond > 0.01) > 10
     assert np.abs(centre[:, 0]).max() < 0.1  # the mass itself is over the square
-    along = balance_rows(points, touches, centre, own, height, ALLOWED, gravity, fps)[0]
+    rows = balance_rows(points, touches, centre, own, height, ALLOWED, gravity, fps)
+    along = Rows(*(part[: FRAMES - 2] for part in rows))  # the zero-moment point's, towards the support
     root = np.insert(centre - own, 1, 0.8, axis=1)
     windows = np.stack([root[:-2], root[1:-1], root[2:]], axis=1).reshape(FRAMES - 2, 9)
     misses = np.sum(along.coefficients * windows, axis=1) - along.targets

@@ -185,7 +185,7 @@ def test_a_hand_goes_round_the_thigh() -> None:
 
 def test_a_limb_is_as_deep_as_in_the_deepest_of_its_pairs() -> None:
     rng, capsules = np.random.default_rng(0), capsules_of(BODY)
-    pairs, limbs = capsules.pairs(), _limbs_of(BODY, capsules)
+    pairs, limbs = capsules.pairs(), _limbs_of(BODY)
     places = BODY.positions_and_tips(rot.exp(rng.normal(0.0, 0.6, (60, len(BODY), 3))), np.zeros(3))
     ends = capsules.place(places)
     placed = Placed(ends, places[:, limbs.first], places[:, limbs.last], np.zeros((60, 4)))

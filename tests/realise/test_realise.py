@@ -12,7 +12,7 @@ import pytest
 
 from motionmind._typing import Floats, Int32s
 from motionmind.body.capsules import legs_depth
-from motionmind.body.contact import lowest_height
+from motionmind.body.contact import lowest_height, pose
 from motionmind.body.human import human23
 from motionmind.body.limbs import parts_of
 from motionmind.body.motion import Motion, Posture
@@ -76,7 +76,15 @@ def test_a_foot_that_stands_carries_the_body() -> None:
     feet = [stander.index("left_toes"), stander.index("right_toes")]
     seen = stander.positions(rest, np.zeros((30, 3)))[:, feet].mean(axis=1)
     root = root_trajectory(
-        stander, rest, np.zeros(30), np.ones((29, 6)), np.zeros((29, 3)), -seen[0], -seen[-1], 1.0, np.ones(29)
+        stander,
+        pose(stander, rest),
+        np.zeros(30),
+        np.ones((29, 6)),
+        np.zeros((29, 3)),
+        -seen[0],
+        -seen[-1],
+        1.0,
+        np.ones(29),
     )
     np.testing.assert_allclose(root[:, [0, 2]], -seen[:, [0, 2]], atol=0.01)
     assert np.ptp(seen[:, 2]) > 0.1
@@ -105,7 +113,7 @@ def test_in_the_air_a_body_travels_as_the_corpus_does_and_ends_where_it_is_to() 
     motion, drift = walk(12), np.random.default_rng(0).normal(size=(11, 3))
     a, b = np.zeros(3), np.array([1.0, 0.0, -2.0])
     flown = root_trajectory(
-        human23(), motion.rotations, np.full(12, 3.0), np.ones((11, 6)), drift, a, b, 1.0, np.ones(11)
+        human23(), pose(human23(), motion.rotations), np.full(12, 3.0), np.ones((11, 6)), drift, a, b, 1.0, np.ones(11)
     )
     missing = b - drift.sum(axis=0)
     added = np.diff(flown, axis=0) - drift
@@ -122,7 +130,7 @@ def test_a_little_way_that_is_missing_is_made_up_in_the_air_rather_than_on_the_f
     still, clearance = np.tile(rot.IDENTITY, (21, 23, 1)), np.where(np.arange(21) > 10, 1.0, 0.0)
     flown = root_trajectory(
         human23(),
-        still,
+        pose(human23(), still),
         clearance,
         np.ones((20, 6)),
         np.zeros((20, 3)),
@@ -141,7 +149,8 @@ def test_a_far_way_is_gone_where_both_feet_are_low() -> None:
     raised = np.tile(rot.IDENTITY, (91, 23, 1))
     raised[30:60, dancer.index("left_hip")] = rot.from_axis_angle([1.0, 0.0, 0.0], np.array(-1.4))
     still = np.zeros((91, 3))
-    heights = foot_heights(dancer, raised, still, find_free_feet(dancer, np.zeros(23, dtype=bool)))
+    posed = pose(dancer, raised)
+    heights = foot_heights(dancer, posed, find_free_feet(dancer, np.zeros(23, dtype=bool)))
     easily = steps_easily(heights, 30.0)
     assert easily.shape == (90,)
     np.testing.assert_allclose(easily[[0, 15, 75, 89]], 1.0)
@@ -149,7 +158,7 @@ def test_a_far_way_is_gone_where_both_feet_are_low() -> None:
     np.testing.assert_allclose(steps_easily(heights[:, ::-1] + 1.0, 30.0), easily)
     np.testing.assert_array_equal(steps_easily(heights[:, :1], 30.0), np.ones(90))
     far = np.array([0.0, 0.0, 6.0])
-    root = root_trajectory(dancer, raised, still[:, 0], np.zeros((90, 6)), still[1:], still[0], far, 3.0, easily)
+    root = root_trajectory(dancer, posed, still[:, 0], np.zeros((90, 6)), still[1:], still[0], far, 3.0, easily)
     steps = np.diff(root[:, 2])
     assert steps[36:54].max() < 0.4 * steps[[20, 70]].min()
     np.testing.assert_allclose(root[-1], far, atol=1e-12)

@@ -9,7 +9,7 @@ import pytest
 
 from motionmind import Engine, Motion, Posture
 from motionmind._typing import Bools, Floats
-from motionmind.body.contact import lowest_height
+from motionmind.body.contact import lowest_height, pose
 from motionmind.body.human import human23
 from motionmind.body.plausibility import GRAVITY
 from motionmind.body.support import centre_of_mass
@@ -108,7 +108,7 @@ def test_legs_that_come_down_fast_do_not_hide_a_fall(ballet: Engine) -> None:
     """The root of a body that closes a split does not fall as its mass does."""
     motion = ballet.tween(leap(ballet, 1), in_place(standing(ballet, 1)[0], leap(ballet, 1)), fps=FPS).motion
     ends = np.arange(len(motion)) % (len(motion) - 1) == 0
-    _, falls = find_falls(BODY, motion.rotations, motion.root, ends, FPS)
+    _, falls = find_falls(BODY, pose(BODY, motion.rotations, motion.root), ends, FPS)
     assert [first for first, _ in falls] == [1]
     slow = np.full(len(BODY) + 4, 0.05)  # all of it is too fast
     slower, _ = slow_down(motion, Timeline(motion.times[[0, -1]], motion.times, 1), slow, (False, False))
