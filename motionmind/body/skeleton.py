@@ -181,7 +181,7 @@ class Skeleton:
 
     @cached_property
     def _known(self) -> dict[Callable[[Skeleton], Any], Any]:
-        """What is `remembered` of this skeleton, by what finds it."""
+        """Facts that are `remembered` of this skeleton, by the function that finds each."""
         return {}
 
     @cached_property
