@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import nullcontext
+from concurrent.futures import ThreadPoolExecutor
 from functools import reduce
 from itertools import pairwise
 from typing import NamedTuple
@@ -15,6 +14,7 @@ import numpy as np
 from motionmind._typing import Floats, Ints
 from motionmind.body.limbs import parts_of
 from motionmind.body.skeleton import Skeleton
+from motionmind.executors.here import Here
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.distances import squared_turn
 from motionmind.jit import jit, read_only
@@ -206,9 +206,8 @@ def _mean_between(
     # Parts do not depend on each other, and compiled loops run side by side. What larger parts share is kept, what
     # belongs to a limb alone is not: of a large corpus it is large.
     threads = min(THREADS, 1 + len(carriage.weights) // BUSY)
-    with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as pool:
-        each = map if pool is None else pool.map
-        distances = [*each(off, np.array_split(passed, threads))] if trees is None else []
+    with ThreadPoolExecutor(threads) if threads > 1 else Here() as pool:
+        distances = [*pool.map(off, np.array_split(passed, threads))] if trees is None else []
 
         def walk(number: int) -> _PartWalk:
             part, here, counts = parts[number], shown, np.zeros(0, dtype=np.int64)
@@ -224,7 +223,7 @@ def _mean_between(
             weights = counted(float(np.dot((members == number).any(axis=0), SIZES)), marginals, counts)
             return _PartWalk(chosen, here, marginals, counts, weights, trust_in_part, left_out)
 
-        known = {number: _begun(pool, walk, number) for number in larger}
+        known = {number: pool.submit(walk, number) for number in larger}
 
         def move(number: int) -> float:
             mine = known[number].result() if number in known else walk(number)
@@ -241,21 +240,12 @@ def _mean_between(
                 trusted[here] = np.dot(SIZES, [one.trust for one in walks])
             return mine.left_out
 
-        lost = [*each(move, sorted({numbers[-1] for numbers in groups}))]
+        lost = [*pool.map(move, sorted({numbers[-1] for numbers in groups}))]
         lost += [one.result().left_out for one in known.values()]
     departs = _without_ends(rot.log(rot.inv_mul(minimal, poses)), times, leaving is not None, arriving is not None)
     poses = rot.mul(minimal, rot.exp(trusted[:, None] * departs))
     moments = tuple((one.marginals, one.chosen.moments) for one in (known[0].result(), known[1].result()))
     return _Walk(poses, moments, trusted, max(lost))
-
-
-def _begun(pool: ThreadPoolExecutor | None, walk: Callable[[int], _PartWalk], number: int) -> Future[_PartWalk]:
-    """Return the walk of a part, which a thread of the pool begins; it is made now where there is no pool."""
-    if pool is not None:
-        return pool.submit(walk, number)
-    made: Future[_PartWalk] = Future()
-    made.set_result(walk(number))
-    return made
 
 
 def _members(parts: tuple[Ints, ...], joints: int) -> tuple[Ints, dict[tuple[int, ...], list[int]]]:
