@@ -153,9 +153,17 @@ def likelihoods(squares: Floats) -> Floats:
     Args:
         squares: squared distances in units of a variance [K, n].
     """
+    exponents = _exponents(squares)
+    return np.exp(exponents, out=exponents)
+
+
+@jit
+def _exponents(squares: Floats) -> Floats:
+    """Return the exponents of `likelihoods` [K, n]."""
     out = 0.5 * squares
-    np.subtract(out.min(axis=1, keepdims=True), out, out=out)
-    return np.exp(out, out=out)
+    for k in range(len(out)):
+        out[k] = out[k].min() - out[k]
+    return out
 
 
 @jit

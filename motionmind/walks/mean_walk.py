@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motionmind._typing import Floats, Ints
+from motionmind._typing import Floats, Int32s, Ints
 from motionmind.body.limbs import parts_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.executors.here import Here
@@ -35,7 +35,7 @@ from motionmind.walks.likelihood import (
     variance_at_ends,
 )
 from motionmind.walks.marginals import posterior_marginals
-from motionmind.walks.means import COUNTS, counted, mean_of_parts, mean_rotations
+from motionmind.walks.means import counted, mean_of_parts, mean_rotations, that_count
 from motionmind.walks.minimal import LASTS, departure, minimal_movement, trust
 from motionmind.walks.sparse import Chosen, all_of, choose, merged, steps_on
 from motionmind.walks.stops import Rates, Stop
@@ -196,6 +196,7 @@ def _mean_between(
     poses, trusted = np.empty_like(minimal), np.empty(joints)
 
     members, groups = _members(parts, joints)
+    ways = [_way(part, ends, float(times[-1] - times[0])) for part in parts]
     passed = orientations if path is None else np.concatenate([orientations, path])
     shown, trees = carriage.orientations, carriage.trees
 
@@ -210,18 +211,19 @@ def _mean_between(
         distances = [*pool.map(off, np.array_split(passed, threads))] if trees is None else []
 
         def walk(number: int) -> _PartWalk:
-            part, here, counts = parts[number], shown, np.zeros(0, dtype=np.int64)
+            part, here = parts[number], shown
             if trees is None:
                 chosen = all_of(carriage, number)
                 own = distances[0][number] if threads == 1 else np.concatenate([of[number] for of in distances])
             else:
                 chosen = choose(trees, number, carriage, orientations, path, len(times) - 1)
                 here, own = measure(shown, np.asarray(chosen.moments), part, np.ascontiguousarray(passed[:, part]))
-            marginals, trust_in_part, left_out = _part_marginals(part, chosen, rates, ends, times, own)
-            if trees is not None:
-                counts = np.flatnonzero(marginals.max(axis=0) >= COUNTS)
-            weights = counted(float(np.dot((members == number).any(axis=0), SIZES)), marginals, counts)
-            return _PartWalk(chosen, here, marginals, counts, weights, trust_in_part, left_out)
+            likely, nearest, left_out = _likely(part, chosen, rates, ends, own)
+            begins, goals, shares = steps_on(chosen, likely[0])
+            steps = read_only(begins), read_only(goals), read_only(shares), chosen.clusters, read_only(chosen.weights)
+            size = float(np.dot((members == number).any(axis=0), SIZES))
+            found = _marginals(*steps, likely, len(times), size, trees is not None)
+            return _PartWalk(chosen, here, *found, trust(np.array(nearest), ways[number]), left_out)
 
         known = {number: pool.submit(walk, number) for number in larger}
 
@@ -269,16 +271,15 @@ def _without_ends(off: Floats, times: Floats, leaving: bool, arriving: bool) -> 
     return np.asarray(off - departure(times, first, last))
 
 
-def _part_marginals(
+def _likely(
     part: Ints,
     chosen: Chosen,
     rates: Callable[[Ints | slice], Rates] | None,
     ends: tuple[Stop, Stop],
-    times: Floats,
     off: Floats,
-) -> tuple[Floats, float, float]:
-    """Return the posterior marginals [S + 1, n] of walks of one part of the body, how far to trust them, and the share
-    of their ends that is left out, by the moments that stand for these.
+) -> tuple[Floats, tuple[float, float], float]:
+    """Return the likelihoods of moments in one part of the body [K, n], how far the nearest are from both ends, radians
+    a joint, and the share of walks' ends that is left out, by the moments that stand for these.
 
     Arguments are those of `_mean_between`, but for the moments that are `chosen`, and how far `off` they are from the
     two ends, and then from the postures of the path, if there is one: squared distances of the part [K, n], radians^2.
@@ -291,10 +292,34 @@ def _part_marginals(
             squares[k] += differences
     likely = likelihoods(squares)
     left_out = 0.0 if chosen.near is None else keep_near(likely, chosen.near, chosen.weights)
-    begins, goals, shares = steps_on(chosen, likely[0])
-    steps, weights = (read_only(begins), read_only(goals), read_only(shares)), read_only(chosen.weights)
-    marginals = posterior_marginals(*steps, chosen.clusters, weights, by_step(likely, len(times)))
-    return marginals, trust(np.array(nearest), _way(part, ends, float(times[-1] - times[0]))), left_out
+    return likely, nearest, left_out
+
+
+@jit
+def _marginals(
+    begins: Ints,
+    goals: Ints,
+    shares: Floats,
+    clusters: Int32s,
+    weights: Floats,
+    likely: Floats,
+    count: int,
+    size: float,
+    few: bool,
+) -> tuple[Floats, Ints, Floats]:
+    """Return the posterior marginals [S + 1, n] of walks of one part of the body, which of its few moments may count in
+    a mean, and their weights there, as `counted` has them.
+
+    Args:
+        begins, goals, shares, clusters, weights: of `posterior_marginals`.
+        likely: of the moments, as `by_step` takes them.
+        count: S + 1.
+        size: weight of the part.
+        few: whether any are to be counted.
+    """
+    marginals = posterior_marginals(begins, goals, shares, clusters, weights, by_step(likely, count))
+    counts = that_count(marginals) if few else np.empty(0, np.int64)
+    return marginals, counts, counted(size, marginals, counts)
 
 
 def _way(part: Ints, ends: tuple[Stop, Stop], seconds: float) -> float:

@@ -53,6 +53,16 @@ def mean_of_parts(
 
 
 @jit
+def that_count(weights: Floats) -> Ints:
+    """Return which of some orientations have a weight that counts in any of the means [S, N]: [n]."""
+    most = weights[0].copy()
+    for t in range(1, len(weights)):
+        for i in range(len(most)):
+            most[i] = max(most[i], weights[t, i])
+    return np.flatnonzero(most >= COUNTS)
+
+
+@jit
 def counted(size: float, weights: Floats, counts: Ints) -> Floats:
     """Return the weights of some orientations, times a factor, as `add_rotations` takes them [m, S].
 
