@@ -16,7 +16,7 @@ from motionmind.body.limbs import parts_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.executors.here import Here
 from motionmind.geometry import rotations as rot
-from motionmind.geometry.distances import squared_turn
+from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit, read_only
 from motionmind.learned.carriage import Carriage
 from motionmind.walks.likelihood import (
@@ -330,20 +330,11 @@ def _way(part: Ints, ends: tuple[Stop, Stop], seconds: float) -> float:
     body's heights that its root travels. A body in one posture of a cycle has a way to go if it moves there, or has to
     get elsewhere.
     """
-    turn = _turn(ends[0].chains, ends[1].chains, part) / len(part)
+    turn = squared_distance(ends[0].chains[part], ends[1].chains[part]) / len(part)
     rates = [stop.rates.joints[part] for stop in ends if stop.rates is not None]
     speed = float(np.mean([np.sum(rate**2, axis=-1).mean() for rate in rates])) if rates else 0.0
     travel = float(np.sum((ends[1].place - ends[0].place) ** 2))
     return float(np.sqrt(turn + (min(seconds, LASTS) / 3.0) ** 2 * speed + STRIDE**2 * travel))
-
-
-@jit
-def _turn(start: Floats, end: Floats, part: Ints) -> float:
-    """Return `squared_distance` of some chains from their orientations at the one end to those at the other [L, 4]."""
-    total = 0.0
-    for joint in part:
-        total += squared_turn(start[joint], end[joint])
-    return total
 
 
 def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
