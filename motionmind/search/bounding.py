@@ -35,7 +35,8 @@ class Bounded:
     """Bounds on one trellis.
 
     Attributes:
-        trellis: what is left of it; no path cheaper than `cost` lies outside, nor does the best path found.
+        trellis: what is left of it, in its memory; no path cheaper than `cost` lies outside, nor does the best path
+            found.
         heuristic: the bound on the cost to go that was proven last.
         cost: cost of the best path found, or what it has to be cheaper than, nats.
         states: the best path found [T + 1, L]; empty until then.
@@ -125,7 +126,8 @@ def _tighten_by_messages(state: Bounded, sweeps: int, attention: Attention) -> N
         state.update(lower_bound, chosen, messages.through if last or not first else None)
         if state.closed and not state.found:
             break
-        trellis, messages = trws.prune(state.trellis, messages, state.limit)
+        # Of the whole trellis much is left; later, little, and what is kept for A* is to be no larger than that.
+        trellis, messages = trws.prune(state.trellis, messages, state.limit, first)
         state.replace(trellis, Heuristic.of_messages(messages))
         if state.closed or last or (not first and state.stalls(gap, size, STALLED)):
             break

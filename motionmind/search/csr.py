@@ -34,16 +34,42 @@ def select_entries(
     most = 0
     for row in rows:
         most += ptr[row + 1] - ptr[row]
+    out_columns, out_costs = np.empty(most + 1, np.int32), np.empty(most + 1)
+    out_ptr = _write_entries(ptr, columns, costs, rows, numbers, shifts, out_columns, out_costs)
+    return out_ptr, out_columns[: out_ptr[-1]], out_costs[: out_ptr[-1]]
+
+
+@jit
+def keep_entries(ptr: Ints, columns: Int32s, costs: Floats, rows: Ints, numbers: Int32s) -> tuple[Ints, Int32s, Floats]:
+    """Do as `select_entries` with rising rows, in the memory of the other matrix, which is lost.
+
+    To come by as much memory again takes longer than to write to it.
+    """
+    out_ptr = _write_entries(ptr, columns, costs, rows, numbers, np.zeros(len(rows), np.int64), columns, costs)
+    return out_ptr, columns[: out_ptr[-1]], costs[: out_ptr[-1]]
+
+
+@jit
+def _write_entries(
+    ptr: Ints,
+    columns: Int32s,
+    costs: Floats,
+    rows: Ints,
+    numbers: Int32s,
+    shifts: Ints,
+    out_columns: Int32s,
+    out_costs: Floats,
+) -> Ints:
+    """Write the columns and entries of `select_entries`, and return its row pointers [N + 1]."""
     # Every entry is written, and the next one over it where it is left out: a branch would be foretold wrongly.
     out_ptr, at = np.zeros(len(rows) + 1, np.int64), np.uint64(0)
-    out_columns, out_costs = np.empty(most + 1, np.int32), np.empty(most + 1)
     for k in range(len(rows)):
         for e in range(np.uint64(ptr[rows[k]]), np.uint64(ptr[rows[k] + 1])):
             number = numbers[np.uint64(shifts[k] + columns[e])]
             out_columns[at], out_costs[at] = number, costs[e]
             at += np.uint64(number >= 0)
         out_ptr[k + 1] = at
-    return out_ptr, out_columns[:at], out_costs[:at]
+    return out_ptr
 
 
 @jit

@@ -142,7 +142,7 @@ def prune(trellis: Trellis, tables: PairChains, through: Floats, below: float) -
         below: nats.
     """
     kept = reachable(trellis, through, below)
-    smaller = subset(trellis, kept)
+    smaller = subset(trellis, kept, False)
     fewer = empty(smaller)
     if np.any(np.diff(smaller.dom_ptr) == 0):
         return smaller, fewer

@@ -225,11 +225,13 @@ def _costs_to_go(model: Model, goal: Ints, moves: int, timed: Floats, known: Flo
                 arrived[~model.allowed[first:last]] = np.inf
             for row in range(first, last):
                 least, other = np.inf, np.inf  # of every other edge, for the next need not wait for the one before
-                end = model.indptr[row + 1]
-                for e in range(model.indptr[row], end - 1, 2):
+                first_edge, end = np.uint64(model.indptr[row]), np.uint64(model.indptr[row + 1])
+                odd = first_edge + (end - first_edge) % np.uint64(2)
+                if odd > first_edge:
+                    least = model.costs[first_edge] + arrived[np.uint64(model.targets[first_edge])]
+                for e in range(odd, end, np.uint64(2)):
                     least = min(least, model.costs[e] + arrived[np.uint64(model.targets[e])])
-                    other = min(other, model.costs[e + 1] + arrived[np.uint64(model.targets[e + 1])])
-                if (end - model.indptr[row]) % 2:
-                    least = min(least, model.costs[end - 1] + arrived[model.targets[end - 1]])
+                    beside = e + np.uint64(1)
+                    other = min(other, model.costs[beside] + arrived[np.uint64(model.targets[beside])])
                 value[k, row] = min(least, other)
     return value

@@ -10,7 +10,7 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.jit import jit
-from motionmind.search.csr import select_entries
+from motionmind.search.csr import keep_entries, select_entries
 from motionmind.search.problem import Model, Problem, costs_to_go
 
 
@@ -148,8 +148,14 @@ def reachable(trellis: Trellis, through: Floats, below: float) -> Bools:
 
 
 @jit
-def subset(trellis: Trellis, kept: Bools) -> Trellis:
-    """Build the trellis of the positions that are kept [P]."""
+def subset(trellis: Trellis, kept: Bools, in_place: bool) -> Trellis:
+    """Build the trellis of the positions that are kept [P].
+
+    Args:
+        trellis: the whole.
+        kept: which positions to keep.
+        in_place: whether in the memory of the whole, which is lost.
+    """
     chains, variables = trellis.chains, len(trellis.dom_ptr) - 1
     held, rows = np.flatnonzero(kept), coupling_rows(trellis, kept)
     numbers = np.full(len(kept), -1, np.int32)  # of each kept position among them
@@ -162,12 +168,13 @@ def subset(trellis: Trellis, kept: Bools) -> Trellis:
         if trellis.up_ptr[i + 1] > trellis.up_ptr[i]:
             above = i - i % chains + trellis.parents[i % chains]
             up_ptr[i + 1] += dom_ptr[above + 1] - dom_ptr[above]
-    row_ptr, row_to, row_cost = select_entries(
-        trellis.row_ptr, trellis.row_to, trellis.row_cost, held, numbers, np.zeros(len(held), np.int64)
-    )
-    col_ptr, col_to, col_cost = select_entries(
-        trellis.col_ptr, trellis.col_to, trellis.col_cost, rows, numbers, np.zeros(len(rows), np.int64)
-    )
+    row, col = (trellis.row_ptr, trellis.row_to, trellis.row_cost), (trellis.col_ptr, trellis.col_to, trellis.col_cost)
+    if in_place:
+        row_ptr, row_to, row_cost = keep_entries(*row, held, numbers)
+        col_ptr, col_to, col_cost = keep_entries(*col, rows, numbers)
+    else:
+        row_ptr, row_to, row_cost = select_entries(*row, held, numbers, np.zeros(len(held), np.int64))
+        col_ptr, col_to, col_cost = select_entries(*col, rows, numbers, np.zeros(len(rows), np.int64))
     return Trellis(
         chains, trellis.moves, trellis.parents, dom_ptr, trellis.dom[held], trellis.unary[held],
         row_ptr, row_to, row_cost, up_ptr, col_ptr, col_to, col_cost,

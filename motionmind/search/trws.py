@@ -355,15 +355,23 @@ def tighten(trellis: Trellis, messages: Messages, path: Ints, sweeps: int, enoug
 
 
 @jit
-def prune(trellis: Trellis, messages: Messages, below: float) -> tuple[Trellis, Messages]:
+def prune(trellis: Trellis, messages: Messages, below: float, in_place: bool) -> tuple[Trellis, Messages]:
     """Remove the positions that no path cheaper than `below` nats goes through; return the rest with its messages.
 
     Where there is no such path at all a domain is left empty.
+
+    Args:
+        trellis: the whole.
+        messages: those after a backward sweep.
+        below: nats.
+        in_place: whether the rest may be written over the whole, which is lost unless a domain is left empty.
     """
     kept = reachable(trellis, messages.through, below)
     held = np.flatnonzero(kept)
     rows = coupling_rows(trellis, kept)
-    return subset(trellis, kept), Messages(
+    for i in range(len(trellis.dom_ptr) - 1):
+        in_place = in_place and bool(np.any(kept[trellis.dom_ptr[i] : trellis.dom_ptr[i + 1]]))
+    return subset(trellis, kept, in_place), Messages(
         messages.down_row[held], messages.up_row[held], messages.down_col[held], messages.up_col[rows],
         messages.constants.copy(), messages.before.copy(), messages.ahead[held], messages.through[held],
     )  # fmt: skip

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from motionmind._typing import Floats, Ints
+from motionmind._typing import Bools, Floats, Ints
 from motionmind.jit import jit
 
 # How near a walk's ends are to the given postures, radians a joint, standard deviation: the least and the greatest, and
@@ -31,6 +31,7 @@ TRAVELS_WITHIN = 0.5  # metres a second, the same of its travel
 FOLLOWS_WITHIN = 0.35  # radians a joint, the same: how closely a walk follows a given path
 SIZES = (0.25, 0.25, 0.5)  # weights of the walks of the whole body, of its half, and of the limb that a joint is in
 STRAIGHT_ON = 0.6  # share of steps after which a walk goes straight on as its clip does
+AT_ONCE = 32  # moments that are read side by side: memory is waited for as for one of them
 _BLOCK = 256  # moments whose distances are measured at a time: their sums are in the processor's own memory
 ANYWHERE = 0.006  # share of steps after which it goes on from any posture: some walk joins any two
 
@@ -68,6 +69,40 @@ def squared_distances(orientations: Floats, members: Ints, parts: int, postures:
 
 
 @jit
+def measure(orientations: Floats, moments: Ints, part: Ints, postures: Floats) -> tuple[Floats, Floats]:
+    """Return what some moments show of a part of the body [n, m, 4], and its squared distances there from postures,
+    means over its joints [K, n], radians^2.
+
+    Args:
+        orientations: of all chains in the corpus's N moments [N, L, 4].
+        moments: some of them [n].
+        part: the joints of the part [m].
+        postures: of the part [K, m, 4].
+    """
+    shown, out = np.empty((len(part), len(moments), 4)), np.empty((len(postures), len(moments)))
+    own = np.empty((4, AT_ONCE))
+    for first in range(0, len(moments), AT_ONCE):
+        here = moments[first : first + AT_ONCE]
+        for i in range(len(here)):  # so that the memory of all is on its way before that of the first is waited for
+            touched = 0.0
+            for j in range(0, len(part), 2):
+                touched += orientations[here[i], part[j], 0]
+            out[0, first + i] = touched
+        out[:, first : first + len(here)] = 0.0
+        for j in range(len(part)):
+            for i in range(len(here)):
+                for c in range(4):
+                    own[c, i] = shown[j, first + i, c] = orientations[here[i], part[j], c]
+            for k in range(len(postures)):
+                x, y, z, w = postures[k, j]
+                sums = out[k, first : first + len(here)]
+                for i in range(len(here)):  # as `squared_turn`
+                    cosine = own[0, i] * x + own[1, i] * y + own[2, i] * z + own[3, i] * w
+                    sums[i] += 4.0 * max(1.0 - cosine * cosine, 0.0)
+    return shown.transpose(1, 0, 2), out / len(part)
+
+
+@jit
 def squared_differences(rates: Floats, rate: Floats) -> Floats:
     """Return the squared difference of each of a part's angular velocities [N, m, 3] from one of them [m, 3], mean over
     joints [N]."""
@@ -89,13 +124,81 @@ def variance_at_ends(nearest: float) -> float:
     return min(max(OF_NEAREST * nearest, least), most) ** 2
 
 
-def write_likelihood(out: Floats, *terms: Floats) -> None:
-    """Write exp(-sum of terms / 2) for each of the corpus's moments, over that of the likeliest [..., N].
+@jit
+def nearest_to_ends(off: Floats) -> tuple[float, float]:
+    """Return the distances of the nearest moments from both ends, radians a joint.
 
     Args:
-        out: where to.
-        terms: squared distances in units of a variance [..., N] each.
+        off: squared distances of moments from the first posture, and from the last, and others [K, n], radians^2.
     """
-    np.multiply(0.5, sum(terms[1:], start=terms[0]), out=out)
-    np.subtract(out.min(axis=-1, keepdims=True), out, out=out)
-    np.exp(out, out=out)
+    return np.sqrt(off[0].min()), np.sqrt(off[1].min())
+
+
+@jit
+def in_variances(off: Floats, of_first: float, of_last: float) -> Floats:
+    """Return squared distances of moments in units of their variances [K, n].
+
+    Args:
+        off: squared distances from the first posture, from the last, and from those of a path [K, n], radians^2.
+        of_first, of_last: variances of walks' ends about the given postures, radians^2.
+    """
+    out = off / FOLLOWS_WITHIN**2
+    out[0], out[1] = off[0] / of_first, off[1] / of_last
+    return out
+
+
+def likelihoods(squares: Floats) -> Floats:
+    """Return exp(-squares / 2) for each of some moments, over that of the likeliest [K, n].
+
+    Args:
+        squares: squared distances in units of a variance [K, n].
+    """
+    exponents = _exponents(squares)
+    return np.exp(exponents, out=exponents)
+
+
+@jit
+def _exponents(squares: Floats) -> Floats:
+    """Return the exponents of `likelihoods` [K, n]."""
+    out = 0.5 * squares
+    for k in range(len(out)):
+        out[k] = out[k].min() - out[k]
+    return out
+
+
+@jit
+def keep_near(likely: Floats, near: tuple[Bools, Bools], weights: Floats) -> float:
+    """Set the likelihoods [K, n] at both ends to 0 where moments are not near, and return the share of walks that this
+    leaves out, at the end where it is greater.
+
+    Args:
+        likely: the first for the first posture, and the next for the last.
+        near: which moments are near the first and the last [n].
+        weights: of the moments [n].
+    """
+    left_out = 0.0
+    for k in range(2):
+        mass, kept = 0.0, 0.0
+        for i in range(len(weights)):
+            mass += weights[i] * likely[k, i]
+            if near[k][i]:
+                kept += weights[i] * likely[k, i]
+            else:
+                likely[k, i] = 0.0
+        left_out = max(left_out, 1.0 - kept / mass)
+    return left_out
+
+
+@jit
+def by_step(likely: Floats, count: int) -> Floats:
+    """Return likelihoods of moments by the steps' ends [S + 1, n], 1 where there is nothing to be near to.
+
+    Args:
+        likely: those at the first and at the last, then at every other between, or none of these [K, n].
+        count: S + 1.
+    """
+    out = np.ones((count, likely.shape[1]))
+    out[0], out[-1] = likely[0], likely[1]
+    for k in range(2, len(likely)):
+        out[2 * (k - 1)] = likely[k]
+    return out

@@ -5,39 +5,43 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
+from functools import reduce
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from motionmind._typing import Floats, Ints
+from motionmind._typing import Floats, Int32s, Ints
 from motionmind.body.limbs import parts_of
 from motionmind.body.skeleton import Skeleton
+from motionmind.executors.here import Here
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit, read_only
 from motionmind.learned.carriage import Carriage
 from motionmind.walks.likelihood import (
-    FOLLOWS_WITHIN,
     LEAVES_WITHIN,
     SIZES,
     TRAVELS_WITHIN,
     TURNS_WITHIN,
+    by_step,
+    in_variances,
+    keep_near,
+    likelihoods,
+    measure,
+    nearest_to_ends,
     squared_differences,
     squared_distances,
     variance_at_ends,
-    write_likelihood,
 )
 from motionmind.walks.marginals import posterior_marginals
-from motionmind.walks.means import COUNTS, add_rotations, counted, mean_rotations, means
+from motionmind.walks.means import counted, mean_of_parts, mean_rotations, that_count
 from motionmind.walks.minimal import LASTS, departure, minimal_movement, trust
-from motionmind.walks.sparse import Chosen, all_of, choose, steps_on
+from motionmind.walks.sparse import Chosen, all_of, choose, merged, steps_on
 from motionmind.walks.stops import Rates, Stop
 
 STRIDE = 0.5  # radians a joint that go with travelling as far as the body is tall; chosen on cmu-05 and cmu-16
 THREADS = min(4, os.cpu_count() or 1)  # in which parts of the body are worked on; results do not depend on it
-AT_ONCE = 16  # moments that are read side by side: memory is waited for as for one of them
 BUSY = 4000  # moments of a corpus that keep a thread busy: for fewer, another costs more than it saves
 
 
@@ -123,7 +127,7 @@ class _PartWalk(NamedTuple):
         shown: what these show of the part [n, p, 4]; of a corpus without trees, all chains in all moments.
         marginals: their probabilities [S + 1, n].
         counts: of a corpus with trees, those of them that may count in a mean.
-        counted: their probabilities by the part's size, as `add_rotations` takes them, once for all joints of the part.
+        counted: their probabilities by the part's size, as `mean_of_parts` takes them, once for all joints of the part.
         trust: how far the part is trusted to the walks.
         left_out: as in `MeanWalk`.
     """
@@ -146,7 +150,7 @@ def _joined(segments: Mapping[int, _Walk], count: int, moments: int) -> tuple[Fl
         moments: N, of the corpus.
     """
     kept = [of for walk in segments.values() for _, of in walk.moments if not isinstance(of, slice)]
-    chosen = np.unique(np.concatenate(kept)) if kept else slice(None)
+    chosen = reduce(merged, kept) if kept else slice(None)
     out = np.zeros((count, moments if isinstance(chosen, slice) else len(chosen)))
     for start, walk in segments.items():
         rows = out[2 * start : 2 * start + len(walk.poses)]
@@ -191,13 +195,8 @@ def _mean_between(
     minimal = minimal_movement(orientations, times, leaving, arriving)
     poses, trusted = np.empty_like(minimal), np.empty(joints)
 
-    inside = np.zeros((joints, len(parts)), dtype=np.bool_)
-    for number, part in enumerate(parts):
-        inside[part, number] = True
-    members = np.nonzero(inside)[1].reshape(joints, len(SIZES))  # one part of each size
-    groups: dict[tuple[int, ...], list[int]] = {}
-    for joint, numbers in enumerate(members.tolist()):
-        groups.setdefault(tuple(numbers), []).append(joint)
+    members, groups = _members(parts, joints)
+    ways = [_way(part, ends, float(times[-1] - times[0])) for part in parts]
     passed = orientations if path is None else np.concatenate([orientations, path])
     shown, trees = carriage.orientations, carriage.trees
 
@@ -208,9 +207,8 @@ def _mean_between(
     # Parts do not depend on each other, and compiled loops run side by side. What larger parts share is kept, what
     # belongs to a limb alone is not: of a large corpus it is large.
     threads = min(THREADS, 1 + len(carriage.weights) // BUSY)
-    with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as pool:
-        each = map if pool is None else pool.map
-        distances = [*each(off, np.array_split(passed, threads))] if trees is None else []
+    with ThreadPoolExecutor(threads) if threads > 1 else Here() as pool:
+        distances = [*pool.map(off, np.array_split(passed, threads))] if trees is None else []
 
         def walk(number: int) -> _PartWalk:
             part, here = parts[number], shown
@@ -219,37 +217,49 @@ def _mean_between(
                 own = distances[0][number] if threads == 1 else np.concatenate([of[number] for of in distances])
             else:
                 chosen = choose(trees, number, carriage, orientations, path, len(times) - 1)
-                here = _taken(shown, np.asarray(chosen.moments), part)
-                to = np.ascontiguousarray(passed[:, part])
-                own = squared_distances(here, np.zeros((len(part), 1), dtype=np.int64), 1, to)[0]
-            marginals, trust_in_part, left_out = _part_marginals(part, chosen, rates, ends, times, own)
-            counts = np.flatnonzero(marginals.max(axis=0) >= COUNTS) if trees is not None else np.zeros(0, np.int64)
-            weights = counted(float(np.dot((members == number).any(axis=0), SIZES)), marginals, counts)
-            return _PartWalk(chosen, here, marginals, counts, weights, trust_in_part, left_out)
+                here, own = measure(shown, np.asarray(chosen.moments), part, np.ascontiguousarray(passed[:, part]))
+            likely, nearest, left_out = _likely(part, chosen, rates, ends, own)
+            begins, goals, shares = steps_on(chosen, likely[0])
+            steps = read_only(begins), read_only(goals), read_only(shares), chosen.clusters, read_only(chosen.weights)
+            size = float(np.dot((members == number).any(axis=0), SIZES))
+            found = _marginals(*steps, likely, len(times), size, trees is not None)
+            return _PartWalk(chosen, here, *found, trust(np.array(nearest), ways[number]), left_out)
 
-        known = dict(zip(larger, each(walk, larger), strict=True))
+        known = {number: pool.submit(walk, number) for number in larger}
 
         def move(number: int) -> float:
-            mine = known[number] if number in known else walk(number)
+            mine = known[number].result() if number in known else walk(number)
             for numbers, here in groups.items():
                 if numbers[-1] != number:
                     continue
-                walks = [*(known[n] for n in numbers[:-1]), mine]
+                walks = [*(known[n].result() for n in numbers[:-1]), mine]
                 about = np.ascontiguousarray(minimal[:, here])
                 if trees is None:
                     weights = _mixed(*(one.marginals for one in walks))
-                    mean = mean_rotations(weights, shown, np.array(here), about)
+                    poses[:, here] = mean_rotations(weights, shown, np.array(here), about)
                 else:
-                    mean = _mean_of_few(walks, [parts[n] for n in numbers], here, about)
-                off = rot.log(rot.inv_mul(about, mean))
-                off = _without_ends(off, times, leaving is not None, arriving is not None)
+                    poses[:, here] = _mean_of_few(walks, [parts[n] for n in numbers], here, about)
                 trusted[here] = np.dot(SIZES, [one.trust for one in walks])
-                poses[:, here] = rot.mul(about, rot.exp(trusted[here, None] * off))
             return mine.left_out
 
-        lost = [*each(move, sorted({numbers[-1] for numbers in groups})), *(one.left_out for one in known.values())]
-    moments = tuple((one.marginals, one.chosen.moments) for one in (known[0], known[1]))
+        lost = [*pool.map(move, sorted({numbers[-1] for numbers in groups}))]
+        lost += [one.result().left_out for one in known.values()]
+    departs = _without_ends(rot.log(rot.inv_mul(minimal, poses)), times, leaving is not None, arriving is not None)
+    poses = rot.mul(minimal, rot.exp(trusted[:, None] * departs))
+    moments = tuple((one.marginals, one.chosen.moments) for one in (known[0].result(), known[1].result()))
     return _Walk(poses, moments, trusted, max(lost))
+
+
+def _members(parts: tuple[Ints, ...], joints: int) -> tuple[Ints, dict[tuple[int, ...], list[int]]]:
+    """Return the parts of all three sizes that each joint is in [J, 3], and the joints that are in the same three."""
+    inside = np.zeros((joints, len(parts)), dtype=np.bool_)
+    for number, part in enumerate(parts):
+        inside[part, number] = True
+    members = np.nonzero(inside)[1].reshape(joints, len(SIZES))
+    groups: dict[tuple[int, ...], list[int]] = {}
+    for joint, numbers in enumerate(members.tolist()):
+        groups.setdefault(tuple(numbers), []).append(joint)
+    return members, groups
 
 
 def _without_ends(off: Floats, times: Floats, leaving: bool, arriving: bool) -> Floats:
@@ -261,36 +271,55 @@ def _without_ends(off: Floats, times: Floats, leaving: bool, arriving: bool) -> 
     return np.asarray(off - departure(times, first, last))
 
 
-def _part_marginals(
+def _likely(
     part: Ints,
     chosen: Chosen,
     rates: Callable[[Ints | slice], Rates] | None,
     ends: tuple[Stop, Stop],
-    times: Floats,
     off: Floats,
-) -> tuple[Floats, float, float]:
-    """Return the posterior marginals [S + 1, n] of walks of one part of the body, how far to trust them, and the share
-    of their ends that is left out, by the moments that stand for these.
+) -> tuple[Floats, tuple[float, float], float]:
+    """Return the likelihoods of moments in one part of the body [K, n], how far the nearest are from both ends, radians
+    a joint, and the share of walks' ends that is left out, by the moments that stand for these.
 
     Arguments are those of `_mean_between`, but for the moments that are `chosen`, and how far `off` they are from the
     two ends, and then from the postures of the path, if there is one: squared distances of the part [K, n], radians^2.
     """
-    near = np.ones((len(times), len(chosen.weights)))
-    if len(off) > len(ends):
-        write_likelihood(near[2:-2:2], off[len(ends) :] / FOLLOWS_WITHIN**2)
-    nearest = np.sqrt(off[: len(ends)].min(axis=1))
-    known, left_out = None if rates is None else rates(chosen.moments), 0.0
+    nearest = nearest_to_ends(off)
+    squares = in_variances(off, *map(variance_at_ends, nearest))
+    known = None if rates is None else rates(chosen.moments)
     for k, stop in enumerate(ends):
-        variance = variance_at_ends(float(nearest[k]))
-        write_likelihood(near[-k], off[k] / variance, *_rate_terms(part, known, stop))
-        if chosen.near is not None:
-            mass = chosen.weights @ near[-k]
-            near[-k] *= chosen.near[k]
-            left_out = max(left_out, 1.0 - float(chosen.weights @ near[-k] / mass))
-    begins, goals, shares = steps_on(chosen, near[0])
-    steps, weights = (read_only(begins), read_only(goals), read_only(shares)), read_only(chosen.weights)
-    marginals = posterior_marginals(*steps, chosen.clusters, weights, near)
-    return marginals, trust(nearest, _way(part, ends, float(times[-1] - times[0]))), left_out
+        for differences in _rate_terms(part, known, stop):
+            squares[k] += differences
+    likely = likelihoods(squares)
+    left_out = 0.0 if chosen.near is None else keep_near(likely, chosen.near, chosen.weights)
+    return likely, nearest, left_out
+
+
+@jit
+def _marginals(
+    begins: Ints,
+    goals: Ints,
+    shares: Floats,
+    clusters: Int32s,
+    weights: Floats,
+    likely: Floats,
+    count: int,
+    size: float,
+    few: bool,
+) -> tuple[Floats, Ints, Floats]:
+    """Return the posterior marginals [S + 1, n] of walks of one part of the body, which of its few moments may count in
+    a mean, and their weights there, as `counted` has them.
+
+    Args:
+        begins, goals, shares, clusters, weights: of `posterior_marginals`.
+        likely: of the moments, as `by_step` takes them.
+        count: S + 1.
+        size: weight of the part.
+        few: whether any are to be counted.
+    """
+    marginals = posterior_marginals(begins, goals, shares, clusters, weights, by_step(likely, count))
+    counts = that_count(marginals) if few else np.empty(0, np.int64)
+    return marginals, counts, counted(size, marginals, counts)
 
 
 def _way(part: Ints, ends: tuple[Stop, Stop], seconds: float) -> float:
@@ -325,11 +354,9 @@ def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
 
 def _mean_of_few(walks: Sequence[_PartWalk], parts: Sequence[Ints], joints: Sequence[int], about: Floats) -> Floats:
     """Return `mean_rotations` of some joints [m] over the walks of the parts of all three sizes that they are in."""
-    sums = np.zeros((len(joints), 4, len(about)))
-    for part, walk in zip(parts, walks, strict=True):
-        columns = np.array([np.flatnonzero(part == joint)[0] for joint in joints])
-        add_rotations(sums, walk.counted, walk.counts, walk.shown, columns, about)
-    return means(sums, about)
+    weights, counts, shown = zip(*((one.counted, one.counts, one.shown) for one in walks), strict=True)
+    columns = np.array([[np.flatnonzero(part == joint)[0] for joint in joints] for part in parts])
+    return mean_of_parts(weights, counts, shown, columns, about)
 
 
 @jit
@@ -340,21 +367,3 @@ def _mixed(whole: Floats, half: Floats, limb: Floats) -> Floats:
         for i in range(out.shape[1]):
             out[t, i] = SIZES[2] * limb[t, i] + (SIZES[0] * whole[t, i] + SIZES[1] * half[t, i])
     return out
-
-
-@jit
-def _taken(shown: Floats, moments: Ints, joints: Ints) -> Floats:
-    """Return the orientations of some joints in some moments [n, m, 4], of all [N, L, 4]; each joint's lie together."""
-    out = np.empty((len(joints), len(moments), 4))
-    for first in range(0, len(moments), AT_ONCE):
-        here = range(first, min(first + AT_ONCE, len(moments)))
-        for i in here:  # so that the memory of all is on its way before that of the first is waited for
-            touched = 0.0
-            for j in range(0, len(joints), 2):
-                touched += shown[moments[i], joints[j], 0]
-            out[0, i, 0] = touched
-        for i in here:
-            for j in range(len(joints)):
-                for c in range(4):
-                    out[j, i, c] = shown[moments[i], joints[j], c]
-    return out.transpose(1, 0, 2)

@@ -30,6 +30,39 @@ def mean_rotations(weights: Floats, orientations: Floats, joints: Ints, about: F
 
 
 @jit
+def mean_of_parts(
+    weights: tuple[Floats, Floats, Floats],
+    counts: tuple[Ints, Ints, Ints],
+    shown: tuple[Floats, Floats, Floats],
+    columns: Ints,
+    about: Floats,
+) -> Floats:
+    """Return `mean_rotations` over the walks of three parts of the body together, each of moments of its own.
+
+    Args:
+        weights: of those moments that count, by part, `counted` [m, S].
+        counts: which of the part's moments these are, by part [n].
+        shown: what the part's moments show of it, by part [N, p, 4].
+        columns: which of the joints of each part are meant [3, m].
+        about: of `mean_rotations`.
+    """
+    sums = np.zeros((columns.shape[1], 4, len(about)))
+    for k in range(3):
+        add_rotations(sums, weights[k], counts[k], shown[k], columns[k], about)
+    return means(sums, about)
+
+
+@jit
+def that_count(weights: Floats) -> Ints:
+    """Return which of some orientations have a weight that counts in any of the means [S, N]: [n]."""
+    most = weights[0].copy()
+    for t in range(1, len(weights)):
+        for i in range(len(most)):
+            most[i] = max(most[i], weights[t, i])
+    return np.flatnonzero(most >= COUNTS)
+
+
+@jit
 def counted(size: float, weights: Floats, counts: Ints) -> Floats:
     """Return the weights of some orientations, times a factor, as `add_rotations` takes them [m, S].
 
@@ -42,8 +75,8 @@ def counted(size: float, weights: Floats, counts: Ints) -> Floats:
         counts: which of them to add [n].
     """
     out = np.zeros((len(counts) + -len(counts) % 4, len(weights)))
-    for t in range(len(weights)):
-        for i in range(len(counts)):
+    for i in range(len(counts)):
+        for t in range(len(weights)):
             weight = size * weights[t, counts[i]]
             out[i, t] = weight if weight >= COUNTS else 0.0
     return out

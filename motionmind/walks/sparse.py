@@ -28,7 +28,7 @@ from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import find_near
 from motionmind.learned.neighbours import Neighbours
-from motionmind.walks.steps import follow, index_of, steps_at
+from motionmind.walks.steps import follow, place_of, steps_at
 
 SPLITS = 384  # balls that are cut in two
 ENDS = 64  # moments near each end, with those that follow on them or lead to them
@@ -81,20 +81,49 @@ def choose(trees: Neighbours, number: int, carriage: Carriage, ends: Floats, pat
         path: those that walks are to follow [K, J, 4], or None.
         steps: of a walk.
     """
-    near, moments = _near_ends(carriage, number, ends.tobytes(), steps)
-    singles, balls, ranks = near.ravel(), _balls(trees, number), trees.ranks[number]
-    chain = carriage.begins, carriage.ends, len(carriage.orientations) - len(carriage.turn)
+    near, around = _near_ends(carriage, number, ends.tobytes(), steps)
+    by_path = near[:0]
     if path is not None:
-        by_path = find_near(trees, number, carriage.orientations, path[::2], BY_PATH, PATH_LEAVES).ravel()
-        singles = np.concatenate([singles, by_path])
-        moments = _rising(np.concatenate([moments, by_path, follow(by_path, True, 2, *chain)]))
-    where = balls.starts, balls.first, ranks
-    weights, stands = _shares(moments, singles, balls.weights, carriage.weights, *where)
-    begins, leads, numbers = steps_at(moments, True, *chain)
-    goals = _goals(moments, leads, stands, *where)
-    clusters = _numbered(carriage.clusters, moments, number)
-    of_ends = _among(moments, near[0]), _among(moments, near[1])
-    return Chosen(moments, weights, begins, goals, np.asarray(carriage.shares[numbers]), clusters, of_ends)
+        by_path = find_near(trees, number, carriage.orientations, path[::2], BY_PATH, PATH_LEAVES)
+    chain = carriage.begins, carriage.ends, len(carriage.weights) - len(carriage.turn), carriage.shares
+    found = near, around, by_path, _balls(trees, number)
+    return Chosen(*_chosen(*found, *chain, carriage.weights, carriage.clusters, number))
+
+
+@jit
+def _chosen(
+    near: Ints,
+    around: Ints,
+    by_path: Ints,
+    balls: _Balls,
+    begins: Ints,
+    ends: Ints,
+    postures: int,
+    shares: Floats,
+    weights: Floats,
+    clusters: Int32s,
+    number: int,
+) -> tuple[Ints, Floats, Ints, Ints, Floats, Int32s, tuple[Bools, Bools]]:
+    """Return the attributes of `Chosen`: in one call, so that threads seldom wait for Python, which runs in one of them
+    at a time.
+
+    Args:
+        near: moments near both ends [2, n].
+        around: all that are chosen without a path, rising.
+        by_path: moments near every other posture of the path [K, n].
+        balls: of the part's tree.
+        begins, ends, shares, weights, clusters: of the carriage.
+        postures: how many moments are postures.
+        number: of the part.
+    """
+    beside = by_path.ravel()
+    moments = around
+    if len(beside) > 0:
+        moments = merged(around, _rising(np.concatenate((beside, follow(beside, True, 2, begins, ends, postures)))))
+    own, stands = _shares(moments, np.concatenate((near.ravel(), beside)), balls, weights)
+    leaves, leads, steps = steps_at(moments, True, begins, ends, postures)
+    goals, here = _goals(moments, leads, stands, balls), _numbered(clusters, moments, number)
+    return moments, own, leaves, goals, shares[steps], here, (_among(moments, near[0]), _among(moments, near[1]))
 
 
 def steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
@@ -114,6 +143,22 @@ def steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
     ends = np.flatnonzero(~leads)
     begins, goals = (np.concatenate([of, ends]) for of in (chosen.begins, chosen.ends))
     return begins, goals, np.concatenate([chosen.shares, np.ones(len(ends))])
+
+
+@jit
+def merged(some: Ints, others: Ints) -> Ints:
+    """Return numbers that are among either of two, each of them rising."""
+    out, count, k = np.empty(len(some) + len(others), np.int64), 0, 0
+    for number in some:
+        while k < len(others) and others[k] <= number:
+            if others[k] < number:
+                out[count] = others[k]
+                count += 1
+            k += 1
+        out[count] = number
+        count += 1
+    out[count : count + len(others) - k] = others[k:]
+    return out[: count + len(others) - k]
 
 
 _Owner = TypeVar("_Owner")
@@ -158,12 +203,29 @@ def _near_ends(carriage: Carriage, number: int, ends: bytes, steps: int) -> tupl
     assert trees is not None
     postures = np.frombuffer(ends).reshape(2, -1, 4)
     near = find_near(trees, number, carriage.orientations, postures, ENDS)
-    chain = carriage.begins, carriage.ends, len(carriage.orientations) - len(carriage.turn)
-    found = [near.ravel(), _balls(trees, number).middles]
-    for end, ahead in zip(near, (True, False), strict=True):
-        found.append(follow(end, ahead, ALONG, *chain))
-        found.append(follow(end[:NEAREST], ahead, steps // 2 + 1, *chain))
-    return near, _rising(np.concatenate(found))
+    lengths = ALONG, NEAREST, steps // 2 + 1
+    count = len(carriage.weights) - len(carriage.turn)
+    return near, _around(near, _balls(trees, number).middles, lengths, carriage.begins, carriage.ends, count)
+
+
+@jit
+def _around(near: Ints, middles: Ints, lengths: tuple[int, int, int], begins: Ints, ends: Ints, postures: int) -> Ints:
+    """Return moments of all balls, and those near both ends [2, n] with what follows on them or leads there, rising.
+
+    Args:
+        near: the nearest first.
+        middles: of the balls.
+        lengths: ALONG, NEAREST, and the steps that these are followed.
+        begins, ends: of the carriage.
+        postures: how many moments are postures.
+    """
+    along, nearest, halfway = lengths
+    found = np.concatenate((near.ravel(), middles))
+    for end in range(2):
+        soon = follow(near[end], end == 0, along, begins, ends, postures)
+        later = follow(near[end, :nearest], end == 0, halfway, begins, ends, postures)
+        found = np.concatenate((found, soon, later))
+    return _rising(found)
 
 
 class _Balls(NamedTuple):
@@ -174,12 +236,14 @@ class _Balls(NamedTuple):
         weights: sums of their moments' weights [B].
         middles: a moment of each [B].
         first: the ball that each COARSE-th moment of that order is in: the ball of any is that or soon after.
+        ranks: where each of the corpus's moments is in that order [N].
     """
 
     starts: Int32s
     weights: Floats
     middles: Ints
     first: Int32s
+    ranks: Int32s
 
 
 @_Kept
@@ -189,13 +253,18 @@ def _balls(trees: Neighbours, number: int) -> _Balls:
     starts, order = np.ascontiguousarray(trees.bounds[nodes, 0]), trees.order[number]
     first = np.searchsorted(starts, np.arange(0, len(order), COARSE), side="right") - 1
     middles = order[trees.bounds[nodes].sum(axis=1) // 2].astype(np.int64)
-    return _Balls(starts, trees.weights[number][nodes], middles, first.astype(np.int32))
+    return _Balls(starts, trees.weights[number][nodes], middles, first.astype(np.int32), trees.ranks[number])
 
 
+@jit
 def _rising(numbers: Ints) -> Ints:
-    """Return numbers without repetition, rising: `np.unique` of so few takes twice as long."""
-    numbers = np.sort(numbers)
-    return np.asarray(numbers[np.append(True, numbers[1:] != numbers[:-1])])
+    """Return numbers without repetition, rising."""
+    numbers, count = np.sort(numbers), 0
+    for number in numbers:
+        if count == 0 or number != numbers[count - 1]:
+            numbers[count] = number
+            count += 1
+    return numbers[:count]
 
 
 @jit
@@ -224,20 +293,17 @@ def _among(moments: Ints, some: Ints) -> Bools:
 
 
 @jit
-def _shares(
-    moments: Ints, singles: Ints, balls: Floats, counts: Floats, starts: Int32s, first: Int32s, ranks: Int32s
-) -> tuple[Floats, Ints]:
+def _shares(moments: Ints, singles: Ints, balls: _Balls, counts: Floats) -> tuple[Floats, Ints]:
     """Return the weights of chosen moments [n], and the first of them that stands for each ball [B].
 
     Args:
         moments: their numbers, rising [n].
         singles: those of them that stand for themselves.
-        balls: weights of the balls [B].
+        balls: of the part's tree.
         counts: weights of all moments [N].
-        starts, first, ranks: of `_balls_of`.
     """
-    ball, alone = _balls_of(moments, starts, first, ranks), _among(moments, singles)
-    shared, rest = np.zeros(len(balls)), balls.copy()
+    ball, alone = _balls_of(moments, balls), _among(moments, singles)
+    shared, rest = np.zeros(len(balls.weights)), balls.weights.copy()
     for k in range(len(moments)):
         if not alone[k]:
             shared[ball[k]] += counts[moments[k]]
@@ -249,7 +315,7 @@ def _shares(
             shared[ball[k]] += counts[moments[k]]
         elif alone[k]:
             rest[ball[k]] -= counts[moments[k]]
-    weights, stands = np.empty(len(moments)), np.empty(len(balls), np.int64)
+    weights, stands = np.empty(len(moments)), np.empty(len(balls.weights), np.int64)
     for k in range(len(moments) - 1, -1, -1):
         weights[k] = counts[moments[k]]
         if not alone[k]:
@@ -259,31 +325,25 @@ def _shares(
 
 
 @jit
-def _goals(moments: Ints, leads: Ints, stands: Ints, starts: Int32s, first: Int32s, ranks: Int32s) -> Ints:
+def _goals(moments: Ints, leads: Ints, stands: Ints, balls: _Balls) -> Ints:
     """Return which of the chosen moments [n] each step leads to [m]: its own, or what stands for the ball of that."""
-    out, at = np.empty(len(leads), np.int64), -1
+    out, at = np.empty(len(leads), np.int64), 0
     for k in range(len(leads)):
-        out[k] = index_of(moments, 0, len(moments), leads[k], at)
-        at = max(at, out[k])
+        at = place_of(moments, 0, len(moments), leads[k], at)
+        out[k] = at if at < len(moments) and moments[at] == leads[k] else -1
     others = np.flatnonzero(out < 0)
-    out[others] = stands[_balls_of(leads[others], starts, first, ranks)]
+    out[others] = stands[_balls_of(leads[others], balls)]
     return out
 
 
 @jit
-def _balls_of(moments: Ints, starts: Int32s, first: Int32s, ranks: Int32s) -> Ints:
-    """Return the ball that each moment is in [n].
-
-    Args:
-        moments: their numbers.
-        starts, first: of the balls.
-        ranks: of the tree [N].
-    """
-    places = ranks[moments]  # all at once: in the loop, each look-up would wait for the one before
+def _balls_of(moments: Ints, balls: _Balls) -> Ints:
+    """Return the ball that each moment is in [n]."""
+    places = balls.ranks[moments]  # all at once: in the loop, each look-up would wait for the one before
     out = np.empty(len(moments), np.int64)
     for k in range(len(moments)):
-        ball = first[places[k] // COARSE]
-        while ball + 1 < len(starts) and starts[ball + 1] <= places[k]:
+        ball = balls.first[places[k] // COARSE]
+        while ball + 1 < len(balls.starts) and balls.starts[ball + 1] <= places[k]:
             ball += 1
         out[k] = ball
     return out

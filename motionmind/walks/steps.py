@@ -17,19 +17,29 @@ from motionmind.jit import jit
 def index_of(numbers: Ints, first: int, last: int, wanted: int, beside: int) -> int:
     """Return which of rising numbers, from the first up to the last, is the wanted one; -1 for none.
 
-    Those on both sides of one that was found last are tried first: steps follow one another.
+    One that was found last is mostly near: numbers that rise differ by as much as their places, or more.
     """
-    for near in (beside + 1, beside - 1):
-        if first <= near < last and numbers[near] == wanted:
-            return near
-    stop = last
+    place = place_of(numbers, first, last, wanted, beside)
+    return place if place < last and numbers[place] == wanted else -1
+
+
+@jit
+def place_of(numbers: Ints, first: int, last: int, wanted: int, beside: int) -> int:
+    """Return the place of the first of rising numbers, from the first up to the last, that is not below the wanted one;
+    the last for none. Arguments are those of `index_of`."""
+    if first <= beside < last:
+        away = wanted - numbers[beside]
+        if away > 0:
+            first, last = beside + 1, min(last, beside + away)
+        else:
+            first, last = max(first, beside + away), beside
     while first < last:
         middle = (first + last) // 2
         if numbers[middle] < wanted:
             first = middle + 1
         else:
             last = middle
-    return first if first < stop and numbers[first] == wanted else -1
+    return first
 
 
 @jit

@@ -10,7 +10,7 @@ from toys import noisy_messages, random_toy, trellis_of
 
 from motionmind.search import trws
 from motionmind.search.costs import path_cost
-from motionmind.search.csr import insert_entries, select_entries
+from motionmind.search.csr import insert_entries, keep_entries, select_entries
 from motionmind.search.polish import polish
 from motionmind.search.trellis import Trellis, correction
 
@@ -108,3 +108,7 @@ def test_entries_are_selected_by_rows_and_columns() -> None:
             assert np.array_equal(found_columns[there], numbers[columns[here][among]])
             assert np.array_equal(found_costs[there], costs[here][among])
         assert found_ptr[-1] == len(found_columns) == len(found_costs)
+        kept_ptr, kept_columns, kept_costs = keep_entries(ptr, columns, costs, rows, numbers)  # over the other matrix
+        assert np.array_equal(kept_ptr, found_ptr)
+        assert np.array_equal(kept_columns, found_columns)
+        assert np.array_equal(kept_costs, found_costs)

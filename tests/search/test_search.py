@@ -235,8 +235,8 @@ def test_whenever_bounding_ends_no_chain_or_moment_of_its_path_can_be_bettered(
     kind: dict[str, bool], sweeps: int, ends: bool
 ) -> None:
     """That of the first round, too, which is polished only if it is the last."""
-    for trellis, _, seed in bodies(60, kind):
-        state = bounding.Bounded(trellis, Heuristic.of_messages(trws.no_messages(trellis)), np.inf)
+    for (trellis, _, seed), (own, _, _) in zip(bodies(60, kind), bodies(60, kind), strict=True):
+        state = bounding.Bounded(own, Heuristic.of_messages(trws.no_messages(own)), np.inf)
         bounding.tighten(state, sweeps, Attention(lambda: ends))
         path = locate(trellis, state.states)
         assert polish(trellis, path, np.full(len(trellis.dom), -np.inf)) >= state.cost - ROUNDING, seed
@@ -414,7 +414,7 @@ def test_a_narrowed_trellis_keeps_every_path_that_is_cheaper(spare: float) -> No
         messages, path = trws.no_messages(trellis), np.zeros((MOVES + 1) * trellis.chains, np.int64)
         for _ in range(3):
             trws.tighten(trellis, messages, path, 1, np.inf)
-            smaller, messages = trws.prune(trellis, messages, optimum + spare)
+            smaller, messages = trws.prune(trellis, messages, optimum + spare, True)
             taken_out += len(trellis.dom) - len(smaller.dom)
             trellis = smaller
         if trellis.chains == 1:

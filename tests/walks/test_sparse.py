@@ -114,7 +114,7 @@ def test_each_moment_is_in_the_ball_of_its_place(carriage: Carriage) -> None:
     assert trees is not None
     for number in range(len(trees.parts)):
         balls = sparse._balls(trees, number)
-        found = sparse._balls_of(moments, balls.starts, balls.first, trees.ranks[number])
+        found = sparse._balls_of(moments, balls)
         assert set(found) == set(range(len(balls.starts)))
         np.testing.assert_allclose(np.bincount(found, carriage.weights), balls.weights)
         np.testing.assert_array_equal(found[balls.middles], np.arange(len(balls.starts)))
