@@ -199,7 +199,8 @@ class Anatomy:
     def masses_of(self, skeleton: Skeleton) -> Masses:
         """Return the masses of a body with this anatomy, in its own proportions or in others."""
         shares, centres = self._segments
-        return Masses(shares, centres * (skeleton.height / self.skeleton.height))
+        same = skeleton is self.skeleton  # that may be flat, and of no height
+        return Masses(shares, centres if same else centres * (skeleton.height / self.skeleton.height))
 
     @cached_property
     def _segments(self) -> tuple[Floats, Floats]:

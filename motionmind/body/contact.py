@@ -22,7 +22,7 @@ from motionmind.arguments import as_floats
 from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.limbs import limb_of_points, limbs_of
-from motionmind.body.skeleton import Points, Skeleton, remembered
+from motionmind.body.skeleton import Points, Skeleton, place, places_of, points_of, remembered
 
 RATE = 30.0  # frames a second at which feet are measured
 LOW = 0.05  # metres above the floor below which a foot should stand
@@ -99,7 +99,7 @@ def lowest_point(anatomy: Anatomy, rotations: Floats, root: Floats) -> tuple[Flo
         root: positions of the root [T, 3], metres.
     """
     points, joints = _contacts(anatomy.skeleton, anatomy)
-    heights = anatomy.skeleton.positions_of(points, rotations, root)[..., 1]
+    heights = places_of(anatomy.skeleton, points, rotations, root)[..., 1]
     at = heights.argmin(axis=-1)
     return np.take_along_axis(heights, at[..., None], axis=-1)[..., 0], joints[at]
 
@@ -118,7 +118,7 @@ def contact_points(
         heels: whether heels count besides joints and tips (see the module).
     """
     points, joints = (_with_heels if heels else _without_heels)(skeleton)
-    return skeleton.positions_of(points, rotations, root), joints
+    return places_of(skeleton, points, rotations, root), joints
 
 
 class Posed(NamedTuple):
@@ -156,7 +156,7 @@ def pose(skeleton: Skeleton, rotations: Floats, root: Floats | None = None) -> P
     """
     points, joints = _with_heels(skeleton)
     turned = skeleton.global_rotations(rotations)
-    return Posed(rotations, turned, skeleton.place(points, turned, np.zeros(3) if root is None else root), joints)
+    return Posed(rotations, turned, place(skeleton, points, turned, np.zeros(3) if root is None else root), joints)
 
 
 @remembered
@@ -178,7 +178,7 @@ def _contacts(skeleton: Skeleton, anatomy: Anatomy | None) -> tuple[Points, Indi
     own = np.arange(len(skeleton))
     joints = np.concatenate([own, own, np.array(ankles, dtype=np.int64)])
     places = np.concatenate([skeleton.tips, heels]) if ankles else skeleton.tips
-    return skeleton.points(joints[len(skeleton) :], places), joints
+    return points_of(skeleton, joints[len(skeleton) :], places), joints
 
 
 def heels_of(skeleton: Skeleton) -> dict[str, Heel]:

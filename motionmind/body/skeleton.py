@@ -220,14 +220,14 @@ class Skeleton:
             rotations: local rotations [..., J, 4].
             root: positions of the root [..., 3], metres.
         """
-        return self.positions_of(joints_of(self), rotations, root)
+        return places_of(self, joints_of(self), rotations, root)
 
     def positions_and_tips(self, rotations: Floats, root: Floats) -> Floats:
         """Return the positions [..., 2 J, 3], metres, of all joints, then of all tips.
 
         A joint without a tip has its own position for one; arguments as for `positions`.
         """
-        return self.positions_of(_joints_and_tips(self), rotations, root)
+        return places_of(self, _joints_and_tips(self), rotations, root)
 
     def positions_with(
         self, rotations: Floats, root: Floats, joints: Sequence[int] | Indices, points: Floats
@@ -240,44 +240,48 @@ class Skeleton:
             joints: those in whose frames the points are [P].
             points: their places in these frames [P, 3], metres.
         """
-        return self.positions_of(self.points(joints, points), rotations, root)
+        return places_of(self, points_of(self, joints, points), rotations, root)
 
-    def points(self, joints: Sequence[int] | Indices, points: Floats) -> Points:
-        """Return all joints, then points of their segments, for `positions_of`.
 
-        Args:
-            joints: those in whose frames the points are [P].
-            points: their places in these frames [P, 3], metres.
-        """
-        if not (isinstance(joints, np.ndarray) and joints.dtype.kind in "iu"):
-            check_items("joints", joints, "joints' indices", Integral)
-        frames = np.concatenate([self._tree, np.asarray(joints, dtype=np.int64)])
-        return Points(frames, np.concatenate([self.offsets, as_floats("points", points)]))
+def points_of(skeleton: Skeleton, joints: Sequence[int] | Indices, points: Floats) -> Points:
+    """Return all joints, then points of their segments.
 
-    def positions_of(self, points: Points, rotations: Floats, root: Floats) -> Floats:
-        """Return the positions [..., P, 3], metres, of points of this body; arguments as for `positions`."""
-        return self.place(points, self.global_rotations(rotations), root)
+    Args:
+        skeleton: the body.
+        joints: those in whose frames the points are [P].
+        points: their places in these frames [P, 3], metres.
+    """
+    if not (isinstance(joints, np.ndarray) and joints.dtype.kind in "iu"):
+        check_items("joints", joints, "joints' indices", Integral)
+    frames = np.concatenate([skeleton._tree, np.asarray(joints, dtype=np.int64)])
+    return Points(frames, np.concatenate([skeleton.offsets, as_floats("points", points)]))
 
-    def place(self, points: Points, turned: Floats, root: Floats) -> Floats:
-        """Return the same, from the orientations of the joints in the world [..., J, 4] (`global_rotations`)."""
-        from motionmind.body.kinematics import place_points  # numba is slow to import
 
-        out = np.empty((*turned.shape[:-2], len(points.joints), 3))
-        out[..., 0, :] = as_floats("root", root)
-        place_points(out.reshape(-1, *out.shape[-2:]), turned.reshape(-1, len(self), 4), *points)
-        return out
+def places_of(skeleton: Skeleton, points: Points, rotations: Floats, root: Floats) -> Floats:
+    """Return the places [..., P, 3], metres, of points of a body; arguments as for `Skeleton.positions`."""
+    return place(skeleton, points, skeleton.global_rotations(rotations), root)
+
+
+def place(skeleton: Skeleton, points: Points, turned: Floats, root: Floats) -> Floats:
+    """Return the same, from the orientations of the joints in the world [..., J, 4] (`Skeleton.global_rotations`)."""
+    from motionmind.body.kinematics import place_points  # numba is slow to import
+
+    out = np.empty((*turned.shape[:-2], len(points.joints), 3))
+    out[..., 0, :] = as_floats("root", root)
+    place_points(out.reshape(-1, *out.shape[-2:]), turned.reshape(-1, len(skeleton), 4), *points)
+    return out
 
 
 @remembered
 def joints_of(skeleton: Skeleton) -> Points:
     """Return a body's joints."""
-    return skeleton.points(np.arange(0), np.zeros((0, 3)))
+    return points_of(skeleton, np.arange(0), np.zeros((0, 3)))
 
 
 @remembered
 def _joints_and_tips(skeleton: Skeleton) -> Points:
     """Return a body's joints, then its tips."""
-    return skeleton.points(np.arange(len(skeleton)), skeleton.tips)
+    return points_of(skeleton, np.arange(len(skeleton)), skeleton.tips)
 
 
 def _some(names: list[str]) -> str:

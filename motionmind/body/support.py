@@ -22,7 +22,7 @@ from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.contact import Posed, contact_points, limb_heights, pose
 from motionmind.body.human import human23
 from motionmind.body.limbs import limb_of_points
-from motionmind.body.skeleton import Skeleton, joints_of, remembered
+from motionmind.body.skeleton import Skeleton, joints_of, place, remembered
 from motionmind.jit import jit
 
 NEAR = 0.05  # metres above the body's lowest point within which a limb can bear
@@ -109,7 +109,7 @@ def centre_of_mass(skeleton: Skeleton, rotations: Floats, root: Floats) -> Float
     if masses is None:
         return None
     turned = skeleton.global_rotations(rotations)
-    return masses.centre(skeleton.place(joints_of(skeleton), turned, root), turned)
+    return masses.centre(place(skeleton, joints_of(skeleton), turned, root), turned)
 
 
 def mass_of(skeleton: Skeleton, posed: Posed) -> Floats | None:
