@@ -147,7 +147,8 @@ def _lowered(skeleton: Skeleton, rotations: Floats, root: Floats, floor: Floats,
 def _lifted(skeleton: Skeleton, rotations: Floats, root: Floats, floor: Floats, given: Bools, fps: float) -> Floats:
     """Return positions of the root [N, 3], metres, with which nothing is in the floor.
 
-    But a limb that stands alone is not seen to rise with it: millimetres of another foot in the floor show less.
+    But a limb that stands alone is not seen to rise with it, at the price of RISES at most that another foot is in the
+    floor: that shows less.
 
     Args:
         skeleton: the body.
@@ -164,7 +165,7 @@ def _lifted(skeleton: Skeleton, rotations: Floats, root: Floats, floor: Floats, 
     out, lifted = root.copy(), cover(sunk, fps)
     for part, rises in _standing(skeleton, rotations, root, low, given):
         if rises.max() < SEEN:
-            lifted[part] = np.minimum(lifted[part], SEEN - rises)
+            lifted[part] = np.clip(SEEN - rises, lifted[part] - RISES, lifted[part])
     out[:, 1] += np.where(given, 0.0, lifted)
     return out
 

@@ -116,3 +116,7 @@ def test_a_foot_that_stands_does_not_rise_with_one_that_is_a_little_in_the_floor
     # Where both are in it, the body is lifted out all the same.
     deep = _lifted(longer, rotations, root - up(0.1 * bell), FLOOR, GIVEN, FPS)
     assert lowest_height(longer, rotations, deep)[~GIVEN].min() > SEEN - 0.02 - SINKS
+    # And where the other alone is deep in it.
+    offsets[legs] *= 1.05
+    far = _lifted(replace(BODY, offsets=offsets), rotations, root, FLOOR, GIVEN, FPS)
+    assert lowest_height(replace(BODY, offsets=offsets), rotations, far)[~GIVEN].min() > -RISES - SINKS - 1e-9
