@@ -59,7 +59,7 @@ class Realised(NamedTuple):
     Attributes:
         motion: the motion.
         detail: the corpus's moves whose fine detail it has, one after another; none if the corpus keeps no detail.
-        left_out: share of walks that begin or end in moments that were not looked at (`mean_walk.MeanWalk`).
+        left_out: share of walks that begin or end in moments that others stand for (`mean_walk.MeanWalk`).
     """
 
     motion: Motion

@@ -33,7 +33,7 @@ class Expectation(NamedTuple):
         trust: how far each joint is trusted to the walks in each half step [2 T, J], from 0 to 1.
         of_moments: which of the corpus's moments are meant [n]; all of them where they are a slice.
         of_moves: which of its moves are meant [m]; all of them where they are a slice.
-        left_out: share of walks whose ends were not looked at (`motionmind.walks.mean_walk.MeanWalk`).
+        left_out: share of walks whose ends others stand for (`motionmind.walks.mean_walk.MeanWalk`).
     """
 
     half_steps: Floats

@@ -167,26 +167,23 @@ def _exponents(squares: Floats) -> Floats:
 
 
 @jit
-def keep_near(likely: Floats, near: tuple[Bools, Bools], weights: Floats) -> float:
-    """Set the likelihoods [K, n] at both ends to 0 where moments are not near, and return the share of walks that this
-    leaves out, at the end where it is greater.
+def share_of_others(likely: Floats, near: tuple[Bools, Bools], weights: Floats) -> float:
+    """Return the share of walks that begin or end in moments that are not near, at the end where it is greater.
 
     Args:
-        likely: the first for the first posture, and the next for the last.
+        likely: likelihoods [K, n], the first for the first posture, and the next for the last.
         near: which moments are near the first and the last [n].
         weights: of the moments [n].
     """
-    left_out = 0.0
+    share = 0.0
     for k in range(2):
-        mass, kept = 0.0, 0.0
+        every, others = 0.0, 0.0
         for i in range(len(weights)):
-            mass += weights[i] * likely[k, i]
-            if near[k][i]:
-                kept += weights[i] * likely[k, i]
-            else:
-                likely[k, i] = 0.0
-        left_out = max(left_out, 1.0 - kept / mass)
-    return left_out
+            every += weights[i] * likely[k, i]
+            if not near[k][i]:
+                others += weights[i] * likely[k, i]
+        share = max(share, others / every)
+    return share
 
 
 @jit

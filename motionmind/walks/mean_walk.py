@@ -26,10 +26,10 @@ from motionmind.walks.likelihood import (
     TURNS_WITHIN,
     by_step,
     in_variances,
-    keep_near,
     likelihoods,
     measure,
     nearest_to_ends,
+    share_of_others,
     squared_differences,
     squared_distances,
     variance_at_ends,
@@ -53,7 +53,7 @@ class MeanWalk(NamedTuple):
         moments: probabilities of moments of the corpus [2 T + 1, n].
         of: which moments these are [n]; all of them in a small corpus.
         trust: how far each joint is trusted to the walks in each half step [2 T, J], from 0 to 1 (`minimal.trust`).
-        left_out: share of walks that begin or end in moments that were not looked at, about, in the part of the body
+        left_out: share of walks that begin or end in moments that others stand for, about, in the part of the body
             where it is greatest; 0 in a small corpus.
     """
 
@@ -279,7 +279,7 @@ def _likely(
     off: Floats,
 ) -> tuple[Floats, tuple[float, float], float]:
     """Return the likelihoods of moments in one part of the body [K, n], how far the nearest are from both ends, radians
-    a joint, and the share of walks' ends that is left out, by the moments that stand for these.
+    a joint, and the share of walks' ends that are in moments for which others stand.
 
     Arguments are those of `_mean_between`, but for the moments that are `chosen`, and how far `off` they are from the
     two ends, and then from the postures of the path, if there is one: squared distances of the part [K, n], radians^2.
@@ -291,7 +291,7 @@ def _likely(
         for differences in _rate_terms(part, known, stop):
             squares[k] += differences
     likely = likelihoods(squares)
-    left_out = 0.0 if chosen.near is None else keep_near(likely, chosen.near, chosen.weights)
+    left_out = 0.0 if chosen.near is None else share_of_others(likely, chosen.near, chosen.weights)
     return likely, nearest, left_out
 
 

@@ -3,9 +3,9 @@
 The sums over all walks (`motionmind.walks.marginals`) take time in proportion to the corpus. Of a large corpus they
 are taken over a few thousand moments, which are found by the tree of the part (`motionmind.learned.neighbours`):
 
-- those nearest to the first posture, where walks begin, and those that follow on them in the clips; those nearest to
-  the last, where walks end, and those that lead there; those nearest to every other posture of a path to follow, and
-  those that follow on them within a move;
+- those nearest to the first posture, and those that follow on them in the clips for as long as a walk takes; those
+  nearest to the last, and those that lead there; those nearest to every other posture of a path to follow, and those
+  that follow on them within a move;
 - for all others, one moment of each of a few hundred balls into which the tree is cut.
 
 What is nearest stands for itself. All else that is chosen in a ball stands for the rest of it, and has its weight. So
@@ -32,8 +32,7 @@ from motionmind.walks.steps import follow, place_of, steps_at
 
 SPLITS = 384  # balls that are cut in two
 ENDS = 64  # moments near each end, with those that follow on them or lead to them
-ALONG = 8  # steps for which these are followed
-NEAREST = 24  # of those at the ends, that are followed half the way
+ALONG = 30  # steps for which these are followed, at most: 3 s of a corpus of five postures a second
 BY_PATH = 16  # moments near every other posture of a path, that are followed to the next
 PATH_LEAVES = 12  # of a tree that are searched for these
 COARSE = 32  # places in a tree's order for which one ball is kept
@@ -51,7 +50,8 @@ class Chosen(NamedTuple):
         ends: which it leads to [m].
         shares: share of each step among those that leave the same moment [m].
         clusters: their clusters, numbered from 0 [n].
-        near: which of them are near the first posture and the last, where walks begin and end [n] each; None for all.
+        near: which of them are near the first posture and the last, and stand there for themselves [n] each; None for
+            all.
     """
 
     moments: Ints | slice
@@ -203,29 +203,24 @@ def _near_ends(carriage: Carriage, number: int, ends: bytes, steps: int) -> tupl
     assert trees is not None
     postures = np.frombuffer(ends).reshape(2, -1, 4)
     near = find_near(trees, number, carriage.orientations, postures, ENDS)
-    lengths = ALONG, NEAREST, steps // 2 + 1
-    count = len(carriage.weights) - len(carriage.turn)
-    return near, _around(near, _balls(trees, number).middles, lengths, carriage.begins, carriage.ends, count)
+    chain = carriage.begins, carriage.ends, len(carriage.weights) - len(carriage.turn)
+    return near, _around(near, _balls(trees, number).middles, min(steps, ALONG), *chain)
 
 
 @jit
-def _around(near: Ints, middles: Ints, lengths: tuple[int, int, int], begins: Ints, ends: Ints, postures: int) -> Ints:
+def _around(near: Ints, middles: Ints, steps: int, begins: Ints, ends: Ints, postures: int) -> Ints:
     """Return moments of all balls, and those near both ends [2, n] with what follows on them or leads there, rising.
 
     Args:
-        near: the nearest first.
+        near: the moments.
         middles: of the balls.
-        lengths: ALONG, NEAREST, and the steps that these are followed.
+        steps: for which they are followed.
         begins, ends: of the carriage.
         postures: how many moments are postures.
     """
-    along, nearest, halfway = lengths
-    found = np.concatenate((near.ravel(), middles))
-    for end in range(2):
-        soon = follow(near[end], end == 0, along, begins, ends, postures)
-        later = follow(near[end, :nearest], end == 0, halfway, begins, ends, postures)
-        found = np.concatenate((found, soon, later))
-    return _rising(found)
+    on = follow(near[0], True, steps, begins, ends, postures)
+    back = follow(near[1], False, steps, begins, ends, postures)
+    return _rising(np.concatenate((near.ravel(), middles, on, back)))
 
 
 class _Balls(NamedTuple):
