@@ -27,7 +27,9 @@ class Moves:
 
     def take(self, numbers: Ints) -> Moves:
         """Return some of these moves, by their numbers."""
-        return Moves(self._columns, self._times, numbers if self._chosen is None else self._chosen[numbers])
+        some = Moves(self._columns, self._times, numbers if self._chosen is None else self._chosen[numbers])
+        some.firsts = self.firsts  # of all moves: it takes time in proportion to the clips
+        return some
 
     @cached_property
     def begins(self) -> Ints:
@@ -71,4 +73,4 @@ class Moves:
         """The former of the two postures that each joins [M]."""
         runs = self._runs
         numbers = np.arange(len(self)) if self._chosen is None else self._chosen
-        return numbers + (np.tile(self._columns.starts[:-1], 2) - self.firsts[:-1])[runs]
+        return np.asarray(numbers + self._columns.starts[runs % self._clips] - self.firsts[runs])

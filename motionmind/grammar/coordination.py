@@ -20,10 +20,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from motionmind._typing import Floats, Int32s, Ints
+from motionmind._typing import Floats, Int32s, Ints, States
 from motionmind.errors import CorpusError
 from motionmind.executors.here import this_process
 from motionmind.executors.team import Team
+from motionmind.grammar.rows import insertion_points
 
 if TYPE_CHECKING:
     from pgmpy.models import DiscreteBayesianNetwork
@@ -58,21 +59,23 @@ class Coordination:
     child_costs: Floats
     parent_costs: Floats
 
-    def cost(self, chain: int, above: int, state: int, starts: Ints) -> float:
-        """Return -log P(state | parent's state) of one chain, nats.
+    def cost(self, chain: int | Ints, above: int | States, state: int | States, starts: Ints) -> Floats:
+        """Return -log P(state | parent's state) of chains, nats, in the shape of the first three arguments together.
 
         Args:
-            chain: the chain, which has a parent.
-            above: the parent's state.
-            state: the chain's state.
+            chain: the chains, which have parents.
+            above: the parents' states.
+            state: the chains' states.
             starts: first row of each chain [L + 1].
         """
         row = self.pair_starts[chain] + above
-        first, last = self.pair_ptr[row], self.pair_ptr[row + 1]
-        at = first + np.searchsorted(self.pair_states[first:last], state)
-        if at < last and self.pair_states[at] == state:
-            return float(self.pair_costs[at])
-        return float(self.child_costs[starts[chain] + state] + self.parent_costs[row])
+        unseen = self.child_costs[starts[chain] + state] + self.parent_costs[row]
+        if not len(self.pair_states):
+            return np.asarray(unseen)
+        at = insertion_points(self.pair_ptr, self.pair_states, row, state)
+        nearest = np.minimum(at, len(self.pair_states) - 1)
+        is_listed = (at < self.pair_ptr[row + 1]) & (self.pair_states[nearest] == state)
+        return np.where(is_listed, self.pair_costs[nearest], unseen)
 
     def table(self, chain: int, starts: Ints) -> Floats:
         """Return -log P(c | p) of one chain as a table [states of the parent, states of the chain], nats.

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
-from motionmind._typing import Floats, Int32s
+from motionmind._typing import Floats, Int32s, Ints
 from motionmind.corpus.corpus import Corpus
 from motionmind.discretize import StateSpace
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
+from motionmind.grammar.rows import insertion_points
 from motionmind.search.problem import Problem, places
 
 
@@ -66,22 +67,19 @@ def break_down_cost(
     """
     held, graph = problem.model_with_waits(), grammar.transitions
     at = places(problem.model, path)
-    shape = (len(path) - 1, len(grammar.chains))
-    moves, together, guide = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    edges, timed = graph.edges(at), problem.timed_costs(len(path) - 1)
+    before, after = path[:-1], path[1:]
+    together, guide = np.zeros(after.shape), np.zeros(after.shape)
+    edges, timed = graph.edges(at), problem.timed_costs(len(after))
     likelihood = np.where(edges >= 0, np.exp(-graph.weights("conditional")[edges]), 0.0)
     if timed is not None:
-        guide[:] = np.take_along_axis(timed[1:], problem.model.starts[:-1] + path[1:], axis=1)
-    for t, chain in np.ndindex(*shape):
-        before, after, parent = int(path[t, chain]), int(path[t + 1, chain]), int(network.parents[chain])
-        row = held.starts[chain] + before
-        first, last = held.indptr[row], held.indptr[row + 1]
-        moves[t, chain] = held.costs[first + np.searchsorted(held.targets[first:last], after)]
-        if parent >= 0:
-            together[t, chain] = factor * network.cost(chain, int(path[t + 1, parent]), after, held.starts)
+        guide[:] = np.take_along_axis(timed[1:], problem.model.starts[:-1] + after, axis=1)
+    moves = held.costs[insertion_points(held.indptr, held.targets, held.starts[:-1] + before, after)]
+    children = np.flatnonzero(network.parents >= 0)
+    above = after[:, network.parents[children]]
+    together[:, children] = factor * network.cost(children, above, after[:, children], held.starts)
     orientations = space.decode(at)
     degrees = np.degrees(rot.angle(orientations[:-1], orientations[1:]))
-    names = tuple(tuple(space.label(chain, int(state)) for chain, state in enumerate(row)) for row in at)
+    names = tuple(tuple(space.label(chain, state) for chain, state in enumerate(row)) for row in at.tolist())
     return CostBreakdown(moves, together, guide, problem.rules.per_move, likelihood, degrees, names)
 
 
@@ -169,43 +167,39 @@ def trace_path(
         The share of moves that are attested, the bridges, the waits, and the sources [T][L], as in `Tween`.
     """
     graph = grammar.transitions
-    bridges, waits, sources = [], [], []
-    for move, ((before, after), edges) in enumerate(zip(pairwise(path), graph.edges(path), strict=True)):
-        row: list[Source | None] = []
-        for chain, joint in enumerate(grammar.chains):
-            edge = edges[chain]
-            seen = (int(graph.attests[edge]), int(graph.arrives[edge])) if edge >= 0 else None
-            row.append(source_of(corpus, *seen, joint) if seen else None)
-            holds_goal = before[chain] == after[chain] == path[-1, chain]
-            if holds_goal and (edge < 0 or wait < weights[edge]):
-                waits.append(Wait(joint, move, wait))
-            elif edge < 0:
-                degrees = grammar.bridges.span(graph.starts[chain] + before[chain], after[chain])
-                bridges.append(Bridge(joint, move, degrees, bridge_price * degrees))
-        sources.append(tuple(row))
-    attested = [source is not None for row in sources for source in row]
-    return float(np.mean(attested)) if attested else 1.0, tuple(bridges), tuple(waits), tuple(sources)
+    edges, holds_goal = graph.edges(path), (path[:-1] == path[1:]) & (path[1:] == path[-1])
+    attested, bridges, waits = edges >= 0, [], []
+    for move, chain in np.argwhere(holds_goal | ~attested).tolist():
+        joint, edge = grammar.chains[chain], edges[move, chain]
+        if holds_goal[move, chain] and (edge < 0 or wait < weights[edge]):
+            waits.append(Wait(joint, move, wait))
+        elif edge < 0:
+            degrees = grammar.bridges.span(graph.starts[chain] + path[move, chain], path[move + 1, chain])
+            bridges.append(Bridge(joint, move, degrees, bridge_price * degrees))
+    seen, joints = edges[attested], [grammar.chains[chain] for chain in np.nonzero(attested)[1]]
+    found = iter(sources_of(corpus, graph.attests[seen], graph.arrives[seen], joints))
+    sources = tuple(tuple(next(found) if known else None for known in row) for row in attested.tolist())
+    return float(np.mean(attested)) if attested.size else 1.0, tuple(bridges), tuple(waits), sources
 
 
-def source_of(corpus: Corpus, posture: int, to: int, joint: str = "") -> Source:
-    """Return the place in a corpus where a move leads from posture `posture` to posture `to`, by their numbers.
+def sources_of(corpus: Corpus, postures: Ints | Int32s, to: Ints | Int32s, joints: Sequence[str]) -> list[Source]:
+    """Return the places in a corpus where moves lead from some postures to others, by their numbers.
 
     Args:
         corpus: the corpus.
-        posture: number of the posture.
-        to: number of the posture that follows.
-        joint: the joint that moves; "" for the whole body.
+        postures: numbers of the postures [n].
+        to: numbers of the postures that follow [n].
+        joints: the joint that moves in each [n]; "" for the whole body.
     """
-    clip, times = corpus.clip_of(posture), sorted(corpus.times[[posture, to]].tolist())
-    return Source(
-        clip.name,
-        posture - clip.start,
-        clip.corpus or corpus.name,
-        clip.mirrored,
-        to < posture,
-        float(corpus.times[posture]),
-        clip.is_reconstructed(joint, *times),
-    )
+    clips, times = np.searchsorted(corpus.columns.starts, postures, side="right") - 1, corpus.times[[postures, to]]
+    columns = (column.tolist() for column in (clips, postures, to, times[0], times.min(axis=0), times.max(axis=0)))
+    out = []
+    for number, posture, other, seconds, first, last, joint in zip(*columns, joints, strict=True):
+        clip = corpus.clips[number]
+        whence, reconstructed = clip.corpus or corpus.name, clip.is_reconstructed(joint, first, last)
+        start, is_reversed = posture - clip.start, other < posture
+        out.append(Source(clip.name, start, whence, clip.mirrored, is_reversed, seconds, reconstructed))
+    return out
 
 
 def gap_of(cost: float, lower_bound: float) -> float:

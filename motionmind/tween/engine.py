@@ -31,7 +31,7 @@ from motionmind.search.apart import TooAlikeError, difference, solve_apart
 from motionmind.search.problem import places
 from motionmind.search.sample import sample_path
 from motionmind.search.solve import Certificate, Watch, solve
-from motionmind.tween.certificate import Bridge, Source, break_down_cost, source_of, trace_path
+from motionmind.tween.certificate import Bridge, Source, break_down_cost, sources_of, trace_path
 from motionmind.tween.constraints import find_conflicts
 from motionmind.tween.crediting import credit_tween
 from motionmind.tween.formulate import Formulation, formulate
@@ -283,7 +283,7 @@ class Engine(LearnedCorpus):
         path_degrees = self.space.distance(self.corpus.to_chains(reached), path)
         followed = path_degrees <= self.space.tolerances + SAME_ANGLE
         shown = _shown(sources, followed)
-        found = tuple(source_of(self.corpus, int(a), int(b)) for a, b in zip(moves.begins, moves.ends, strict=True))
+        found = tuple(sources_of(self.corpus, moves.begins, moves.ends, [""] * len(moves)))
         return Tween(
             motion=_credited(motion, credit_tween(self.corpus, shown, found, motion.insertions[0].times)),
             joints=self.corpus.chains,

@@ -15,7 +15,7 @@ from motionmind._typing import Floats, Ints
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.moves import Moves
 from motionmind.geometry import rotations as rot
-from motionmind.jit import jit
+from motionmind.jit import jit, read_only
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import postures_near
 from motionmind.walks.steps import steps_at
@@ -47,7 +47,7 @@ def likest_moves(moves: Moves, orientations: Floats, poses: Floats, among: Ints 
         poses: orientations of the movement's postures [T + 1, J, 4].
         among: numbers of the moves to choose from, rising [m] (`moves_near`); None for all.
     """
-    poses = np.ascontiguousarray(poses)
+    poses = read_only(np.ascontiguousarray(poses))
     some = moves if among is None else moves.take(among)
     if among is None:
         among, begins, ends = np.arange(len(moves)), moves.begins, moves.ends
@@ -55,7 +55,7 @@ def likest_moves(moves: Moves, orientations: Floats, poses: Floats, among: Ints 
     else:
         postures, which = np.unique([some.begins, some.ends], return_inverse=True)
         begins, ends = which.reshape(2, -1)
-    distances = _squared_distances(orientations, postures, poses) / poses.shape[1]
+    distances = _squared_distances(read_only(orientations), postures, poses) / poses.shape[1]
     cost = distances[:-1, begins] + distances[1:, ends]
     before = _predecessors(some, among)
     total, came_from = cost[0], []

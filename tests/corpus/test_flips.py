@@ -18,7 +18,7 @@ from motionmind.corpus.flips import find_flips, repair_flips
 from motionmind.corpus.gather import gather
 from motionmind.discretize import Codebook
 from motionmind.geometry import rotations as rot
-from motionmind.tween.certificate import source_of
+from motionmind.tween.certificate import sources_of
 
 ONE_LEG = np.array([[0.1, 0, 0], [0, -0.4, 0], [0, -0.4, 0], [0, -0.05, 0.15]])
 LEG = Skeleton(
@@ -243,10 +243,12 @@ def test_a_corpus_knows_what_was_mended_and_so_do_its_mirror_images_and_mixtures
 def test_sources_say_what_was_reconstructed() -> None:
     corpus = gather("legs", [mixed_faults()], rate=10.0)
     for posture in range(len(corpus) - 1):
-        ankle, hip = (source_of(corpus, posture, posture + 1, joint) for joint in ("left_ankle", "left_hip"))
+        places = np.array([posture, posture + 1])
+        ankle, hip = sources_of(corpus, places[[0, 0]], places[[1, 1]], ["left_ankle", "left_hip"])
         assert ankle.reconstructed == (posture in (9, 10))  # 0.9 to 1.1 s; the fault is at 1.0 to 1.1 s
         assert not hip.reconstructed
-        assert source_of(corpus, posture + 1, posture, "left_ankle").reconstructed == ankle.reconstructed
+        (back,) = sources_of(corpus, places[1:], places[:1], ["left_ankle"])
+        assert back.reconstructed == ankle.reconstructed
 
 
 def test_an_explanation_says_what_was_reconstructed() -> None:

@@ -6,6 +6,7 @@ import gc
 import weakref
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import Carriage, learn_carriage
 from motionmind.learned.neighbours import build_neighbours
 from motionmind.tween.engine import Engine
-from motionmind.walks import mean_walk, sparse
+from motionmind.walks import detail, mean_walk, sparse
 from motionmind.walks.detail import likest_moves, moves_near
 from motionmind.walks.expectation import Expectation, expect
 from motionmind.walks.steps import follow, steps_at
@@ -217,6 +218,18 @@ def test_fine_detail_is_found_among_few_moves(engine: Engine, carriage: Carriage
     few = likest_moves(moves, shown, poses, among[::3])
     assert np.isin(few, among[::3]).all()
     assert cost(engine, few, poses) >= cost(engine, every, poses)
+
+
+def test_one_loop_finds_the_detail_of_what_was_learned_loaded_and_made_just_now(engine: Engine) -> None:
+    """What is compiled ahead would else be compiled again in a tween."""
+    moves, loop = engine.corpus.moves, cast(Any, detail._squared_distances)
+    poses = engine.corpus.rotations[5:12]
+    assert not poses.flags.writeable
+    likest_moves(moves, engine.corpus.rotations, poses)
+    known = len(loop.signatures)
+    likest_moves(moves, engine.corpus.rotations, poses.copy())
+    likest_moves(moves, engine.corpus.rotations.copy(), poses, np.arange(len(moves)))
+    assert len(loop.signatures) == known
 
 
 def test_a_tween_of_a_corpus_with_trees_is_near_that_without(engine: Engine, carriage: Carriage) -> None:
