@@ -3,14 +3,14 @@
 The sums over all walks (`motionmind.walks.marginals`) take time in proportion to the corpus. Of a large corpus they
 are taken over a few thousand moments, which are found by the tree of the part (`motionmind.learned.neighbours`):
 
-- those nearest to the first posture, and those that follow on them in the clips for as long as a walk takes; those
-  nearest to the last, and those that lead there; those nearest to every other posture of a path to follow, and those
-  that follow on them within a move;
+- those nearest to the first posture, others among the thousand that are near it, and those that follow on them in the
+  clips for as long as a walk takes; as many near the last, and those that lead there; those nearest to every other
+  posture of a path to follow, and those that follow on them within a move;
 - for all others, one moment of each of a few hundred balls into which the tree is cut.
 
 What is nearest stands for itself. All else that is chosen in a ball stands for the rest of it, and has its weight. So
-the weights add up to those of the corpus. A step to a moment that is not chosen leads to one that stands for its ball:
-no walk is lost.
+the weights add up to those of the corpus, and walks begin and end wherever they would. A step to a moment that is not
+chosen leads to one that stands for its ball: no walk is lost.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ from motionmind.walks.steps import follow, place_of, steps_at
 
 SPLITS = 384  # balls that are cut in two
 ENDS = 64  # moments near each end, with those that follow on them or lead to them
+NEAREST = 8  # of these, that are the nearest; the others are spread evenly, from near to far,
+AMONG = 1024  # over so many: of a large corpus hundreds are as near as the nearest, and what they do next differs
 ALONG = 30  # steps for which these are followed, at most: 3 s of a corpus of five postures a second
 BY_PATH = 16  # moments near every other posture of a path, that are followed to the next
 PATH_LEAVES = 12  # of a tree that are searched for these
@@ -195,16 +197,20 @@ class _Kept(Generic[_Owner, _Asked, _Found]):
 
 @_Kept  # of all parts; the guide of a search and its motion ask for the same
 def _near_ends(carriage: Carriage, number: int, ends: bytes, steps: int) -> tuple[Ints, Ints]:
-    """Return the moments near both ends in one part of the body [2, n], and all that are chosen without a path, rising.
+    """Return the moments nearest to both ends in one part of the body [2, n], and all that are chosen without a path,
+    rising.
 
     Arguments are those of `choose`, but for `ends`, which are their bytes.
     """
     trees = carriage.trees
     assert trees is not None
     postures = np.frombuffer(ends).reshape(2, -1, 4)
-    near = find_near(trees, number, carriage.orientations, postures, ENDS)
+    found = find_near(trees, number, carriage.orientations, postures, AMONG)
+    ranks = np.concatenate([np.arange(NEAREST), np.linspace(NEAREST, len(found[0]) - 1, max(ENDS - NEAREST, 0))])
+    near = found[:, np.unique(ranks.astype(int).clip(max=len(found[0]) - 1))]
     chain = carriage.begins, carriage.ends, len(carriage.weights) - len(carriage.turn)
-    return near, _around(near, _balls(trees, number).middles, min(steps, ALONG), *chain)
+    chosen = _around(near, _balls(trees, number).middles, min(steps, ALONG), *chain)
+    return np.ascontiguousarray(found[:, :NEAREST]), chosen
 
 
 @jit

@@ -17,6 +17,7 @@ from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
 from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import Carriage, learn_carriage
+from motionmind.learned.nearest import find_near
 from motionmind.learned.neighbours import build_neighbours
 from motionmind.tween.engine import Engine
 from motionmind.walks import detail, mean_walk, sparse
@@ -65,7 +66,8 @@ def _nothing_kept() -> Iterator[None]:
 def test_over_all_moments_one_by_one_the_sums_are_the_same(
     engine: Engine, carriage: Carriage, path: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sparse, "ENDS", 10**6)
+    for name in ("ENDS", "NEAREST", "AMONG"):
+        monkeypatch.setattr(sparse, name, 10**6)
     for start in (0, 11):
         whole, few = (walk(engine, one, start, path) for one in (engine.carriage, carriage))
         assert len(few.moments[0]) == len(engine.carriage.weights)
@@ -113,6 +115,20 @@ def test_walks_begin_and_end_in_moments_that_stand_for_others(
         assert few.left_out > 0.5
         apart += [0.5 * np.abs(by_ball(whole, row) - by_ball(few, row)).sum() for row in (0, -1)]
     assert np.mean(apart) < 0.25  # 0.31 where walks begin and end only in what is near
+
+
+def test_what_is_chosen_near_an_end_is_spread_from_near_to_far(carriage: Carriage) -> None:
+    trees = carriage.trees
+    assert trees is not None
+    for number, part in enumerate(trees.parts):
+        ends = np.ascontiguousarray(carriage.orientations[[3, 40], : part.max() + 1])
+        found = find_near(trees, number, carriage.orientations, ends, sparse.AMONG)
+        near, chosen = sparse._near_ends(carriage, number, ends.tobytes(), 12)
+        np.testing.assert_array_equal(near, found[:, : sparse.NEAREST])
+        for ranked in found:
+            ranks = np.flatnonzero(np.isin(ranked, chosen))
+            assert set(range(sparse.NEAREST)) <= set(ranks)
+            assert np.diff(ranks).max() <= len(ranked) / (sparse.ENDS - sparse.NEAREST) + 1
 
 
 def test_what_is_chosen_stands_for_the_whole_corpus(engine: Engine, carriage: Carriage) -> None:
@@ -223,12 +239,12 @@ def test_fine_detail_is_found_among_few_moves(engine: Engine, carriage: Carriage
 def test_one_loop_finds_the_detail_of_what_was_learned_loaded_and_made_just_now(engine: Engine) -> None:
     """What is compiled ahead would else be compiled again in a tween."""
     moves, loop = engine.corpus.moves, cast(Any, detail._squared_distances)
-    poses = engine.corpus.rotations[5:12]
-    assert not poses.flags.writeable
-    likest_moves(moves, engine.corpus.rotations, poses)
+    shown = engine.corpus.rotations.copy()
+    shown.setflags(write=False)
+    likest_moves(moves, shown, shown[5:12])
     known = len(loop.signatures)
-    likest_moves(moves, engine.corpus.rotations, poses.copy())
-    likest_moves(moves, engine.corpus.rotations.copy(), poses, np.arange(len(moves)))
+    likest_moves(moves, shown, shown[5:12].copy())
+    likest_moves(moves, shown.copy(), shown[5:12], np.arange(len(moves)))
     assert len(loop.signatures) == known
 
 
