@@ -43,9 +43,14 @@ def main() -> None:
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     with tempfile.TemporaryDirectory() as scratch:
-        for by in options.by:
-            options.home = options.keep or Path(scratch)
-            table(by, [row for part in range(2) for row in measured(by, part, options)])
+        options.home = options.keep or Path(scratch)
+        found = {by: np.array([row for part in range(2) for row in measured(by, part, options)]) for by in options.by}
+    for by, rows in found.items():
+        print(f"\n{by} | windows | all | few | few less all, points")
+        for seconds in GAPS:
+            print(f"{seconds:g} s | {line(rows[rows[:, 0] == seconds])}")
+        print(f"all | {line(rows)}")
+    print(f"\nmean of {', '.join(found)}: few less all {difference(list(found.values()))}")
 
 
 def measured(by: str, part: int, options: argparse.Namespace) -> list[tuple[float, int, float, float, float]]:
@@ -89,24 +94,29 @@ def l2q(body: Skeleton, real: Floats, made: Floats) -> float:
     return float(np.sqrt(((one - sign * other) ** 2).sum(axis=(1, 2))).mean())
 
 
-def table(by: str, rows: list[tuple[float, int, float, float, float]]) -> None:
-    """Print how far below SLERP's both are, and the difference with its interval."""
-    found = np.array(rows)
-    print(f"\n{by} | windows | all | few | few less all, points", flush=True)
-    for seconds in (*GAPS, None):
-        here = found if seconds is None else found[found[:, 0] == seconds]
-        own = [here[here[:, 1] == family, 2:] for family in np.unique(here[:, 1])]
-        every, few = below(own)
-        rng = np.random.default_rng(0)
-        drawn = [below([own[k] for k in rng.integers(len(own), size=len(own))]) for _ in range(DRAWS)]
-        low, high = np.percentile(np.diff(drawn)[:, 0], [2.5, 97.5])
-        length = "all" if seconds is None else f"{seconds:g} s"
-        print(f"{length} | {len(here)} | {every:.1f} | {few:.1f} | {few - every:.1f} ({low:.1f} to {high:.1f})")
+def line(rows: Floats) -> str:
+    """Return a line of a table of windows."""
+    every, few = below([rows])
+    return f"{len(rows)} | {every:.1f} | {few:.1f} | {difference([rows])}"
+
+
+def difference(dancers: list[Floats]) -> str:
+    """Return by how many points few are nearer than all, in the mean of the dancers, and its interval by families."""
+    own = [[rows[rows[:, 1] == family] for family in np.unique(rows[:, 1])] for rows in dancers]
+    rng = np.random.default_rng(0)
+
+    def mean(drawn: list[list[Floats]]) -> float:
+        return float(np.mean([np.diff(below(families))[0] for families in drawn]))
+
+    low, high = np.percentile(
+        [mean([[of[k] for k in rng.integers(len(of), size=len(of))] for of in own]) for _ in range(DRAWS)], [2.5, 97.5]
+    )
+    return f"{mean(own):.1f} ({low:.1f} to {high:.1f})"
 
 
 def below(families: list[Floats]) -> Floats:
     """Return how far L2Q of all and of few is below SLERP's [2], per cent."""
-    every, few, straight = np.concatenate(families).mean(axis=0)
+    every, few, straight = np.concatenate(families)[:, 2:].mean(axis=0)
     return 100.0 * (1.0 - np.array([every, few]) / straight)
 
 

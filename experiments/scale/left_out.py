@@ -1,4 +1,4 @@
-"""How much of the walks' ends lies beyond the moments that are looked at, and what could be said of it for certain.
+"""How much of the walks' ends lies beyond the nearest moments, and what could be said of it for certain.
 
 python experiments/scale/left_out.py PATH/TO/cmu-05 [--times 1 10] [--pairs 20] [--keep FOLDER]
 

@@ -203,8 +203,12 @@ def search() -> None:
 
 
 def realise() -> None:
-    """Realise moves of the corpus, which no search has to find, see how deep limbs are in each other, and reach."""
+    """Realise moves of the corpus, which no search has to find, see how deep limbs are in each other, reach, and slow a
+    knee down, as few movements have to."""
+    import numpy as np
+
     from motionmind.body.capsules import penetration
+    from motionmind.footing.knees import slow_down
     from motionmind.footing.legs import find_legs, reach
     from motionmind.tween.engine import Engine
 
@@ -215,6 +219,8 @@ def realise() -> None:
     leg = find_legs(skeleton)[1][0][0][:3]
     places = skeleton.positions(rotations, engine.corpus.root[:2])[:, leg]
     reach(skeleton.global_rotations(rotations)[:, leg[0]], places, places[:, 2])
+    stands = np.arange(4) % 2 == 0
+    slow_down(np.linspace(0.0, 2.0, 4), stands, stands, 1.0, 30.0)
 
 
 def seek() -> None:

@@ -71,8 +71,8 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         sources: a place in the corpus that attests each move of each joint; null where none does, or the motion is not
             within the tolerance of both of its states [T][L].
         detail: where the fine detail was recorded.
-        left_out: share of the corpus's walks that begin or end in postures that were not looked at, for which others
-            stand, about; 0 of a small corpus.
+        left_out: share of the corpus's walks that begin or end in postures for which others stand, about; 0 of a small
+            corpus.
         shown: what the motion shows a viewer, beside what the corpus shows at most: "balance", "bounce", "flight",
             "crossed_limbs" and "pace"; empty in reports of 0.1.
         times: of the moves [T + 1], seconds.

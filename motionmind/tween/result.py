@@ -50,8 +50,8 @@ class Tween:
             motion is not within the tolerance of the states that the move joins [moves][L].
         detail: where the motion's fine detail was recorded, a place for each even part of its time; empty where the
             corpus has none to give.
-        left_out: share of the corpus's walks that begin or end in postures that were not looked at, for which others
-            stand, by these; in the part of the body where it is greatest; 0 of a small corpus, all of which counts.
+        left_out: share of the corpus's walks that begin or end in postures for which others stand, about, in the part
+            of the body where it is greatest; 0 of a small corpus, of which every posture counts for itself.
         expansions: nodes that A* expanded.
         peak_nodes: greatest number of nodes that A* held.
         costs: the cost, joint by joint and move by move.
