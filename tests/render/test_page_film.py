@@ -113,12 +113,14 @@ def test_a_film_has_the_shape_of_the_picture_whatever_becomes_of_the_page(
     still = replace(motion, rotations=motion.rotations[[0] * count], root=motion.root[[0] * count])
     tab = show(still, **SCREENS["upright"], is_drawn=True)
     box = tab.page.locator("#canvas").bounding_box()
+    hold_at_the_second_frame(tab)
     with tab.page.expect_download(timeout=120_000) as download:
         tab.page.tap("#film")
         tab.wait("motionmind.player.time > 0")
         tab.page.set_viewport_size(SCREENS["lying"]["viewport"])
         tab.picture()
         assert tab.page.inner_text("#film") == "Stop"
+        tab.get("delete performance.now")
     download.value.save_as(tmp_path / "film.webm")
     found = seen_by_a_browser(browser, tmp_path / "film.webm")
     assert found["width"] / found["height"] == pytest.approx(box["width"] / box["height"], abs=0.01)
@@ -127,6 +129,15 @@ def test_a_film_has_the_shape_of_the_picture_whatever_becomes_of_the_page(
     tab.wait("document.getElementById('film').textContent === 'Film'")
     assert tab.page.locator("#canvas").bounding_box()["width"] == 844  # and the page is drawn as it is now
     assert tab.get("motionmind.stage.camera.aspect") > 2
+
+
+def hold_at_the_second_frame(tab: Opened) -> None:
+    """Stop a page's clock when a film draws its second frame: the film goes on when `performance.now` is deleted."""
+    tab.get(
+        "(() => { const { stage } = motionmind, shoot = stage.shoot; let count = 0;"
+        "stage.shoot = function (...given) { shoot.apply(this, given);"
+        "const now = performance.now(); if (++count === 2) performance.now = () => now; } })()"
+    )
 
 
 def test_frames_that_a_recorder_left_out_move_none_of_the_others(show: Callable[..., Opened], tmp_path: Path) -> None:
