@@ -69,37 +69,52 @@ def squared_distances(orientations: Floats, members: Ints, parts: int, postures:
 
 
 @jit
-def measure(orientations: Floats, moments: Ints, part: Ints, postures: Floats) -> tuple[Floats, Floats]:
-    """Return what some moments show of a part of the body [n, m, 4], and its squared distances there from postures,
-    means over its joints [K, n], radians^2.
+def show(orientations: Floats, moments: Ints, part: Ints) -> Floats:
+    """Return what some moments show of a part of the body [m, n, 4].
 
     Args:
         orientations: of all chains in the corpus's N moments [N, L, 4].
         moments: some of them [n].
         part: the joints of the part [m].
-        postures: of the part [K, m, 4].
     """
-    shown, out = np.empty((len(part), len(moments), 4)), np.empty((len(postures), len(moments)))
-    own = np.empty((4, AT_ONCE))
+    out = np.empty((len(part), len(moments), 4))
     for first in range(0, len(moments), AT_ONCE):
         here = moments[first : first + AT_ONCE]
         for i in range(len(here)):  # so that the memory of all is on its way before that of the first is waited for
             touched = 0.0
             for j in range(0, len(part), 2):
                 touched += orientations[here[i], part[j], 0]
-            out[0, first + i] = touched
-        out[:, first : first + len(here)] = 0.0
+            out[0, first + i, 0] = touched
         for j in range(len(part)):
             for i in range(len(here)):
                 for c in range(4):
-                    own[c, i] = shown[j, first + i, c] = orientations[here[i], part[j], c]
+                    out[j, first + i, c] = orientations[here[i], part[j], c]
+    return out
+
+
+@jit
+def distances_of(shown: Floats, postures: Floats) -> Floats:
+    """Return squared distances of moments from postures, means over the joints of a part [K, n], radians^2.
+
+    Args:
+        shown: what the moments show of the part [m, n, 4].
+        postures: of the part [K, m, 4].
+    """
+    joints, count, _ = shown.shape
+    out, own = np.zeros((len(postures), count)), np.empty((4, AT_ONCE))
+    for first in range(0, count, AT_ONCE):
+        many = min(AT_ONCE, count - first)
+        for j in range(joints):
+            for i in range(many):
+                for c in range(4):
+                    own[c, i] = shown[j, first + i, c]
             for k in range(len(postures)):
                 x, y, z, w = postures[k, j]
-                sums = out[k, first : first + len(here)]
-                for i in range(len(here)):  # as `squared_turn`
+                sums = out[k, first : first + many]
+                for i in range(many):  # as `squared_turn`
                     cosine = own[0, i] * x + own[1, i] * y + own[2, i] * z + own[3, i] * w
                     sums[i] += 4.0 * max(1.0 - cosine * cosine, 0.0)
-    return shown.transpose(1, 0, 2), out / len(part)
+    return np.asarray(out / joints)
 
 
 @jit

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from functools import reduce
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -25,9 +25,9 @@ from motionmind.walks.likelihood import (
     TRAVELS_WITHIN,
     TURNS_WITHIN,
     by_step,
+    distances_of,
     in_variances,
     likelihoods,
-    measure,
     nearest_to_ends,
     share_of_others,
     squared_differences,
@@ -43,6 +43,9 @@ from motionmind.walks.stops import Rates, Stop
 STRIDE = 0.5  # radians a joint that go with travelling as far as the body is tall; chosen on cmu-05 and cmu-16
 THREADS = min(4, os.cpu_count() or 1)  # in which parts of the body are worked on; results do not depend on it
 BUSY = 4000  # moments of a corpus that keep a thread busy: for fewer, another costs more than it saves
+
+_Item = TypeVar("_Item")
+_Made = TypeVar("_Made")
 
 
 class MeanWalk(NamedTuple):
@@ -203,12 +206,9 @@ def _mean_between(
     def off(postures: Floats) -> Floats:
         return squared_distances(shown, members, len(parts), postures)
 
-    larger = sorted({number for numbers in groups for number in numbers[:-1]})
-    # Parts do not depend on each other, and compiled loops run side by side. What larger parts share is kept, what
-    # belongs to a limb alone is not: of a large corpus it is large.
     threads = min(THREADS, 1 + len(carriage.weights) // BUSY)
-    with ThreadPoolExecutor(threads) if threads > 1 else Here() as pool:
-        distances = [*pool.map(off, np.array_split(passed, threads))] if trees is None else []
+    with ThreadPoolExecutor(threads - 1) if threads > 1 else Here() as pool:
+        distances = _each(off, np.array_split(passed, threads), pool, threads) if trees is None else []
 
         def walk(number: int) -> _PartWalk:
             part, here = parts[number], shown
@@ -216,8 +216,10 @@ def _mean_between(
                 chosen = all_of(carriage, number)
                 own = distances[0][number] if threads == 1 else np.concatenate([of[number] for of in distances])
             else:
-                chosen = choose(trees, number, carriage, orientations, path, len(times) - 1)
-                here, own = measure(shown, np.asarray(chosen.moments), part, np.ascontiguousarray(passed[:, part]))
+                chosen, seen, own = choose(carriage, number, orientations, len(times) - 1)
+                here = seen.transpose(1, 0, 2)
+                if path is not None:
+                    own = np.concatenate([own, distances_of(seen, np.ascontiguousarray(path[:, part]))])
             likely, nearest, left_out = _likely(part, chosen, rates, ends, own)
             begins, goals, shares = steps_on(chosen, likely[0])
             steps = read_only(begins), read_only(goals), read_only(shares), chosen.clusters, read_only(chosen.weights)
@@ -225,29 +227,42 @@ def _mean_between(
             found = _marginals(*steps, likely, len(times), size, trees is not None)
             return _PartWalk(chosen, here, *found, trust(np.array(nearest), ways[number]), left_out)
 
-        known = {number: pool.submit(walk, number) for number in larger}
+        walks = _each(walk, range(len(parts)), pool, threads)
 
-        def move(number: int) -> float:
-            mine = known[number].result() if number in known else walk(number)
-            for numbers, here in groups.items():
-                if numbers[-1] != number:
-                    continue
-                walks = [*(known[n].result() for n in numbers[:-1]), mine]
-                about = np.ascontiguousarray(minimal[:, here])
-                if trees is None:
-                    weights = _mixed(*(one.marginals for one in walks))
-                    poses[:, here] = mean_rotations(weights, shown, np.array(here), about)
-                else:
-                    poses[:, here] = _mean_of_few(walks, [parts[n] for n in numbers], here, about)
-                trusted[here] = np.dot(SIZES, [one.trust for one in walks])
-            return mine.left_out
+        def move(numbers: tuple[int, ...]) -> None:
+            here, own = groups[numbers], [walks[number] for number in numbers]
+            about = np.ascontiguousarray(minimal[:, here])
+            if trees is None:
+                weights = _mixed(*(one.marginals for one in own))
+                poses[:, here] = mean_rotations(weights, shown, np.array(here), about)
+            else:
+                poses[:, here] = _mean_of_few(own, [parts[number] for number in numbers], here, about)
+            trusted[here] = np.dot(SIZES, [one.trust for one in own])
 
-        lost = [*pool.map(move, sorted({numbers[-1] for numbers in groups}))]
-        lost += [one.result().left_out for one in known.values()]
+        _each(move, [*groups], pool, threads)
     departs = _without_ends(rot.log(rot.inv_mul(minimal, poses)), times, leaving is not None, arriving is not None)
     poses = rot.mul(minimal, rot.exp(trusted[:, None] * departs))
-    moments = tuple((one.marginals, one.chosen.moments) for one in (known[0].result(), known[1].result()))
-    return _Walk(poses, moments, trusted, max(lost))
+    moments = tuple((one.marginals, one.chosen.moments) for one in walks[:2])
+    return _Walk(poses, moments, trusted, max(one.left_out for one in walks))
+
+
+def _each(work: Callable[[_Item], _Made], items: Sequence[_Item], pool: Executor, threads: int) -> list[_Made]:
+    """Return what `work` makes of each item, which this thread and those of a pool take one after another.
+
+    Parts of the body do not depend on each other, and compiled loops run side by side. To start a thread, and to wait
+    for it, costs as much as a part: so this one does not wait.
+    """
+    left, made = iter(range(len(items))), dict[int, _Made]()
+
+    def take() -> None:
+        for at in left:
+            made[at] = work(items[at])
+
+    others = [pool.submit(take) for _ in range(threads - 1)]
+    take()
+    for other in others:
+        other.result()
+    return [made[at] for at in range(len(items))]
 
 
 def _members(parts: tuple[Ints, ...], joints: int) -> tuple[Ints, dict[tuple[int, ...], list[int]]]:

@@ -4,13 +4,13 @@ The sums over all walks (`motionmind.walks.marginals`) take time in proportion t
 are taken over a few thousand moments, which are found by the tree of the part (`motionmind.learned.neighbours`):
 
 - those nearest to the first posture, others among the thousand that are near it, and those that follow on them in the
-  clips for as long as a walk takes; as many near the last, and those that lead there; those nearest to every other
-  posture of a path to follow, and those that follow on them within a move;
+  clips; as many near the last, and those that lead there;
 - for all others, one moment of each of a few hundred balls into which the tree is cut.
 
 What is nearest stands for itself. All else that is chosen in a ball stands for the rest of it, and has its weight. So
 the weights add up to those of the corpus, and walks begin and end wherever they would. A step to a moment that is not
-chosen leads to one that stands for its ball: no walk is lost.
+chosen leads to one that stands for its ball: no walk is lost. A path to follow makes no difference to what is chosen:
+walks of the guide and those of the motion are over the same moments.
 """
 
 from __future__ import annotations
@@ -28,17 +28,16 @@ from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import find_near
 from motionmind.learned.neighbours import Neighbours
+from motionmind.walks.likelihood import distances_of, show
 from motionmind.walks.steps import follow, place_of, steps_at
 
 SPLITS = 384  # balls that are cut in two
 ENDS = 64  # moments near each end, with those that follow on them or lead to them
 NEAREST = 8  # of these, that are the nearest; the others are spread evenly, from near to far,
 AMONG = 1024  # over so many: of a large corpus hundreds are as near as the nearest, and what they do next differs
-ALONG = 30  # steps for which these are followed, at most: 3 s of a corpus of five postures a second
-BY_PATH = 4  # moments near every other posture of a path, that are followed to the next
-PATH_LEAVES = 6  # of a tree that are searched for these
+ALONG = 15  # steps for which these are followed, at most: 1.5 s of a corpus of five postures a second
 COARSE = 32  # places in a tree's order for which one ball is kept
-KEPT = 32  # look-ups of parts that are kept: of a body of 16 parts those of a guide, and of its motion
+KEPT = 32  # look-ups of parts that are kept: of a body of 16 parts those from stop to stop, twice
 HARDLY = 1e-200  # of the likeliest moment: sums of such chances might be 0
 
 
@@ -72,32 +71,26 @@ def all_of(carriage: Carriage, number: int) -> Chosen:
     return Chosen(slice(None), carriage.weights, *steps, clusters, None)
 
 
-def choose(trees: Neighbours, number: int, carriage: Carriage, ends: Floats, path: Floats | None, steps: int) -> Chosen:
-    """Choose moments for the walks of one part of the body.
+class Found(NamedTuple):
+    """What is found of the corpus for the walks of one part of the body between two postures.
 
-    Args:
-        trees: of the corpus.
-        number: of the part.
-        carriage: the corpus's moments.
-        ends: orientations of the joints in both given postures [2, J, 4].
-        path: those that walks are to follow [K, J, 4], or None.
-        steps: of a walk.
+    Attributes:
+        chosen: the moments.
+        shown: what these show of the part [m, n, 4].
+        off: their squared distances there from both postures [2, n], radians^2.
     """
-    near, around = _near_ends(carriage, number, ends.tobytes(), steps)
-    by_path = near[:0]
-    if path is not None:
-        by_path = find_near(trees, number, carriage.orientations, path[::2], BY_PATH, PATH_LEAVES)
-    chain = carriage.begins, carriage.ends, len(carriage.weights) - len(carriage.turn), carriage.shares
-    found = near, around, by_path, _balls(trees, number)
-    return Chosen(*_chosen(*found, *chain, carriage.weights, carriage.clusters, number))
+
+    chosen: Chosen
+    shown: Floats
+    off: Floats
 
 
 @jit
 def _chosen(
     near: Ints,
-    around: Ints,
-    by_path: Ints,
+    nearest: Ints,
     balls: _Balls,
+    steps: int,
     begins: Ints,
     ends: Ints,
     postures: int,
@@ -110,22 +103,22 @@ def _chosen(
     at a time.
 
     Args:
-        near: moments near both ends [2, n].
-        around: all that are chosen without a path, rising.
-        by_path: moments near every other posture of the path [K, n].
+        near: moments near both ends, which are followed [2, n].
+        nearest: those of them that stand for themselves [2, m].
         balls: of the part's tree.
+        steps: for which the moments are followed.
         begins, ends, shares, weights, clusters: of the carriage.
         postures: how many moments are postures.
         number: of the part.
     """
-    beside = by_path.ravel()
-    moments = around
-    if len(beside) > 0:
-        moments = merged(around, _rising(np.concatenate((beside, follow(beside, True, 2, begins, ends, postures)))))
-    own, stands = _shares(moments, np.concatenate((near.ravel(), beside)), balls, weights)
-    leaves, leads, steps = steps_at(moments, True, begins, ends, postures)
+    on = follow(near[0], True, steps, begins, ends, postures)
+    back = follow(near[1], False, steps, begins, ends, postures)
+    moments = _rising(np.concatenate((near.ravel(), balls.middles, on, back)))
+    own, stands = _shares(moments, nearest.ravel(), balls, weights)
+    leaves, leads, which = steps_at(moments, True, begins, ends, postures)
     goals, here = _goals(moments, leads, stands, balls), _numbered(clusters, moments, number)
-    return moments, own, leaves, goals, shares[steps], here, (_among(moments, near[0]), _among(moments, near[1]))
+    both = _among(moments, nearest[0]), _among(moments, nearest[1])
+    return moments, own, leaves, goals, shares[which], here, both
 
 
 def steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
@@ -195,38 +188,33 @@ class _Kept(Generic[_Owner, _Asked, _Found]):
         self._kept.clear()
 
 
-@_Kept  # of all parts; the guide of a search and its motion ask for the same
-def _near_ends(carriage: Carriage, number: int, ends: bytes, steps: int) -> tuple[Ints, Ints]:
-    """Return the moments nearest to both ends in one part of the body [2, n], and all that are chosen without a path,
-    rising.
-
-    Arguments are those of `choose`, but for `ends`, which are their bytes.
-    """
-    trees = carriage.trees
-    assert trees is not None
-    postures = np.frombuffer(ends).reshape(2, -1, 4)
-    found = find_near(trees, number, carriage.orientations, postures, AMONG)
-    ranks = np.concatenate([np.arange(NEAREST), np.linspace(NEAREST, len(found[0]) - 1, max(ENDS - NEAREST, 0))])
-    near = found[:, np.unique(ranks.astype(int).clip(max=len(found[0]) - 1))]
-    chain = carriage.begins, carriage.ends, len(carriage.weights) - len(carriage.turn)
-    chosen = _around(near, _balls(trees, number).middles, min(steps, ALONG), *chain)
-    return np.ascontiguousarray(found[:, :NEAREST]), chosen
-
-
-@jit
-def _around(near: Ints, middles: Ints, steps: int, begins: Ints, ends: Ints, postures: int) -> Ints:
-    """Return moments of all balls, and those near both ends [2, n] with what follows on them or leads there, rising.
+def choose(carriage: Carriage, number: int, ends: Floats, steps: int) -> Found:
+    """Choose moments for the walks of one part of the body, and look at them.
 
     Args:
-        near: the moments.
-        middles: of the balls.
-        steps: for which they are followed.
-        begins, ends: of the carriage.
-        postures: how many moments are postures.
+        carriage: the corpus's moments, with trees.
+        number: of the part.
+        ends: orientations of the joints in both given postures [2, J, 4].
+        steps: of a walk.
     """
-    on = follow(near[0], True, steps, begins, ends, postures)
-    back = follow(near[1], False, steps, begins, ends, postures)
-    return _rising(np.concatenate((near.ravel(), middles, on, back)))
+    return _found(carriage, number, ends.tobytes(), min(steps, ALONG))
+
+
+@_Kept  # of all parts; the guide of a search and its motion ask for the same
+def _found(carriage: Carriage, number: int, ends: bytes, steps: int) -> Found:
+    """Return what `choose` does; the moments near the ends are followed for so many steps."""
+    trees = carriage.trees
+    assert trees is not None
+    postures, part = np.frombuffer(ends).reshape(2, -1, 4), trees.parts[number]
+    ranked = find_near(trees, number, carriage.orientations, postures, AMONG)
+    apart = np.linspace(NEAREST, ranked.shape[1] - 1, max(ENDS - NEAREST, 0))
+    ranks = np.unique(np.concatenate([np.arange(NEAREST), apart]).astype(int).clip(max=ranked.shape[1] - 1))
+    near, nearest, balls = ranked[:, ranks], np.ascontiguousarray(ranked[:, :NEAREST]), _balls(trees, number)
+    begins, ends_of, count = carriage.begins, carriage.ends, len(carriage.weights) - len(carriage.turn)
+    of_all = carriage.shares, carriage.weights, carriage.clusters
+    found = _chosen(near, nearest, balls, steps, begins, ends_of, count, *of_all, number)
+    shown = show(carriage.orientations, found[0], part)
+    return Found(Chosen(*found), shown, distances_of(shown, np.ascontiguousarray(postures[:, part])))
 
 
 class _Balls(NamedTuple):

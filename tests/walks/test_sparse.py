@@ -16,6 +16,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
 from motionmind.geometry import rotations as rot
+from motionmind.geometry.distances import squared_distance
 from motionmind.learned.carriage import Carriage, learn_carriage
 from motionmind.learned.nearest import find_near
 from motionmind.learned.neighbours import build_neighbours
@@ -55,10 +56,10 @@ def walk(engine: Engine, carriage: Carriage, start: int, path: bool) -> Expectat
 @pytest.fixture(autouse=True)
 def _nothing_kept() -> Iterator[None]:
     """Look-ups are kept by what is looked for; some tests change how much is looked up."""
-    for keeps in (sparse._near_ends, sparse._balls):
+    for keeps in (sparse._found, sparse._balls):
         keeps.cache_clear()
     yield
-    for keeps in (sparse._near_ends, sparse._balls):
+    for keeps in (sparse._found, sparse._balls):
         keeps.cache_clear()
 
 
@@ -83,8 +84,7 @@ def test_over_all_moments_one_by_one_the_sums_are_the_same(
 def test_over_few_moments_the_mean_is_near_that_over_all(
     engine: Engine, carriage: Carriage, path: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name, value in (("ENDS", 24), ("BY_PATH", 4)):
-        monkeypatch.setattr(sparse, name, value)
+    monkeypatch.setattr(sparse, "ENDS", 24)
     for start in (0, 11, 23):
         whole, few = (walk(engine, one, start, path) for one in (engine.carriage, carriage))
         straight = rot.slerp(whole.poses[:1], whole.poses[-1:], np.linspace(0.0, 1.0, 2 * MOVES + 1)[:, None])
@@ -123,10 +123,11 @@ def test_what_is_chosen_near_an_end_is_spread_from_near_to_far(carriage: Carriag
     for number, part in enumerate(trees.parts):
         ends = np.ascontiguousarray(carriage.orientations[[3, 40], : part.max() + 1])
         found = find_near(trees, number, carriage.orientations, ends, sparse.AMONG)
-        near, chosen = sparse._near_ends(carriage, number, ends.tobytes(), 12)
-        np.testing.assert_array_equal(near, found[:, : sparse.NEAREST])
-        for ranked in found:
-            ranks = np.flatnonzero(np.isin(ranked, chosen))
+        chosen = sparse.choose(carriage, number, ends, 12).chosen
+        assert chosen.near is not None
+        for ranked, near in zip(found, chosen.near, strict=True):
+            np.testing.assert_array_equal(np.asarray(chosen.moments)[near], np.sort(ranked[: sparse.NEAREST]))
+            ranks = np.flatnonzero(np.isin(ranked, chosen.moments))
             assert set(range(sparse.NEAREST)) <= set(ranks)
             assert np.diff(ranks).max() <= len(ranked) / (sparse.ENDS - sparse.NEAREST) + 1
 
@@ -137,8 +138,12 @@ def test_what_is_chosen_stands_for_the_whole_corpus(engine: Engine, carriage: Ca
     joints = len(engine.corpus.skeleton)
     ends = np.asarray(carriage.orientations[[3, 40], :joints])
     for number in range(len(trees.parts)):
-        chosen = sparse.choose(trees, number, carriage, ends, ends[:1], 12)
+        chosen, shown, off = sparse.choose(carriage, number, ends, 12)
         assert isinstance(chosen.moments, np.ndarray)
+        here = carriage.orientations[chosen.moments][:, trees.parts[number]]
+        np.testing.assert_array_equal(shown, here.transpose(1, 0, 2))
+        away = [squared_distance(one, end[trees.parts[number]]) / len(shown) for end in ends for one in here]
+        np.testing.assert_allclose(off.ravel(), away, atol=1e-12)
         assert chosen.weights.sum() == pytest.approx(carriage.weights.sum())
         assert (chosen.weights > 0.0).all()
         leave = np.bincount(carriage.begins, carriage.shares, len(carriage.weights))[chosen.moments]
@@ -262,10 +267,10 @@ def test_look_ups_are_kept_as_long_as_the_corpus_and_no_longer(engine: Engine, c
     own = replace(carriage)
     assert own.trees is not None
     own = replace(own, trees=replace(own.trees))
-    ends = own.orientations[:2][:, own.trees.parts[0]].tobytes()
-    first = sparse._near_ends(own, 0, ends, 12)
-    assert sparse._near_ends(own, 0, ends, 12) is first
-    assert sparse._near_ends(carriage, 0, ends, 12) is not first
+    ends = np.asarray(own.orientations[:2, : len(own.trees.parts[0])])
+    first = sparse.choose(own, 0, ends, 40)
+    assert sparse.choose(own, 0, ends, 50) is first  # what is near the ends is followed no farther
+    assert sparse.choose(carriage, 0, ends, 40) is not first
     assert sparse._balls(own.trees, 0) is sparse._balls(own.trees, 0)
     alive, trees = weakref.ref(own), weakref.ref(own.trees)
     del own
