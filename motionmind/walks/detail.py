@@ -21,8 +21,8 @@ from motionmind.learned.nearest import postures_near
 from motionmind.walks.steps import steps_at
 
 GOES_OVER = 0.4  # radians a joint, root mean square: how much nearer another posture must be to leave a run for it
-NEAREST = 48  # postures of a large corpus near each of a movement's whose moves are looked at
-BESIDE = 4  # moves before and after these
+NEAREST = 48  # postures of a large corpus near every other of a movement's whose moves are looked at
+BESIDE = 5  # moves before and after these
 LEAVES = 32  # of the tree over a large corpus that are searched for them
 # How many times as fast as a movement its copied moves may be before it gets less of their detail. Means of walks are
 # slower than any movement that was recorded, mostly by less than this. Chosen on `indian` and `cmu-05`: at 3, movement
@@ -72,14 +72,18 @@ def likest_moves(moves: Moves, orientations: Floats, poses: Floats, among: Ints 
 
 
 def moves_near(moves: Moves, carriage: Carriage, poses: Floats) -> Ints | None:
-    """Return the corpus's moves near a movement's postures [T + 1, J, 4], and those around them in the clips.
+    """Return the corpus's moves near every other of a movement's postures [T + 1, J, 4], and those around them in the
+    clips.
 
     None stands for all, of a corpus without trees.
     """
     if carriage.trees is None:
         return None
     count = len(carriage.weights) - len(carriage.turn)
-    near = [postures_near(carriage.trees, carriage.orientations, pose, NEAREST, count, LEAVES) for pose in poses]
+    near = [
+        postures_near(carriage.trees, carriage.orientations, pose, NEAREST, count, LEAVES)
+        for pose in (*poses[:-1:2], poses[-1])
+    ]
     leaving = steps_at(np.unique(np.concatenate(near)), True, carriage.begins, carriage.ends, count)[2]
     return np.unique(np.clip(leaving[:, None] + np.arange(-BESIDE, BESIDE + 1), 0, len(moves) - 1))
 
