@@ -100,12 +100,14 @@ def _theta(trellis: Trellis, messages: Messages, i: int) -> Floats:
     """Return the variable's own cost plus all messages to it, less their minimum, which becomes its constant."""
     first, last = trellis.dom_ptr[i], trellis.dom_ptr[i + 1]
     _ahead(trellis, messages, i)
-    theta = np.empty(last - first)
+    theta, least = np.empty(last - first), np.inf
     for p in range(first, last):
         theta[p - first] = messages.ahead[p] + messages.down_row[p] + messages.down_col[p]
-    least = np.min(theta)
+        least = min(least, theta[p - first])
     messages.constants[i] = least
-    return np.asarray(theta - least)
+    for k in range(len(theta)):
+        theta[k] -= least
+    return theta
 
 
 @jit
@@ -127,7 +129,8 @@ def forward(trellis: Trellis, messages: Messages) -> None:
     chains = trellis.chains
     for i in range(len(trellis.dom_ptr) - 1):
         chain = i % chains
-        theta = _gamma(trellis, i) * _theta(trellis, messages, i)
+        theta = _theta(trellis, messages, i)
+        theta *= _gamma(trellis, i)
         messages.before[i] = messages.constants[i]
         if i < chains * trellis.moves:
             messages.before[i] += _send_ahead(trellis, messages, i, theta)
