@@ -73,7 +73,7 @@ def in_part(carriage: Carriage, number: int, ends: Floats) -> Floats:
     trees = carriage.trees
     assert trees is not None
     part, weights = trees.parts[number], carriage.weights
-    chosen = choose(trees, number, carriage, ends, None, STEPS)
+    chosen = choose(carriage, number, ends, STEPS).chosen
     assert chosen.near is not None
     assert not isinstance(chosen.moments, slice)
     shown = np.ascontiguousarray(carriage.orientations[:, part])

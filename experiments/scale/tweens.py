@@ -13,6 +13,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from time import perf_counter, process_time
 
@@ -26,6 +27,7 @@ from motionmind.geometry.splines import natural_spline
 
 FPS, RATE = 30.0, 5.0  # frames a second of the copies, and postures a second that are learned from
 TEMPI = 0.8, 1.25
+AT_ONCE = 10  # tweens from one corpus, before those from the next
 DRIFT = 1.0  # seconds between the angles through which a joint's drift goes
 
 
@@ -42,18 +44,18 @@ def main() -> None:
     if options.part:
         {"build": build, "ask": ask}[options.part](options)
         return
-    print(
-        "times postures | load ms  MB more | first ms  median    95th | guide+search  realise | processor", flush=True
-    )
     with tempfile.TemporaryDirectory() as scratch:
         home = options.keep or Path(scratch)
+        words = [str(options.folder), "--keep", str(home)]
+        for name in ("degrees", "pairs", "seed"):
+            words += [f"--{name}", str(getattr(options, name))]
         for times in options.times:
-            words = [str(options.folder), "--times", str(times), "--keep", str(home)]
-            for name in ("degrees", "pairs", "seed"):
-                words += [f"--{name}", str(getattr(options, name))]
             if not (home / "corpora" / name_of(times)).exists():
-                subprocess.run([sys.executable, __file__, *words, "--part", "build"], check=True)
-            subprocess.run([sys.executable, __file__, *words, "--part", "ask"], check=True)
+                run = [sys.executable, __file__, *words, "--times", str(times), "--part", "build"]
+                subprocess.run(run, check=True)
+        subprocess.run(
+            [sys.executable, __file__, *words, "--times", *map(str, options.times), "--part", "ask"], check=True
+        )
 
 
 def name_of(times: int) -> str:
@@ -90,28 +92,48 @@ def performed(clip: Motion, number: int, degrees: float, rng: np.random.Generato
 
 
 def ask(options: argparse.Namespace) -> None:
-    """Load the corpus, and join random pairs of its postures."""
-    (times,) = options.times
+    """Load the corpora, and join random pairs of postures of each, some of one and some of the next in turn: so that a
+    machine that is slower for a while is slower for all."""
     Engine.load("ballet")  # imports what loading takes
-    before, began = resident(), perf_counter()
-    engine = Engine.load(name_of(times), options.keep)
-    loaded, more = perf_counter() - began, resident() - before
-    drawn = np.random.default_rng(options.seed).integers(len(engine.corpus), size=(options.pairs + 1, 2))
-    seconds, used, parts = [], [], []
-    for a, b in drawn:
-        began, before = perf_counter(), process_time()
-        tween = engine.tween(posture(engine, a), posture(engine, b))
-        seconds.append(perf_counter() - began)
-        used.append(process_time() - before)
-        spent = tween.seconds
-        parts.append((spent["problem"] + spent["bound"] + spent["search"], spent["realise"]))
-    ms = 1e3 * np.array(seconds)
-    searching, realising = 1e3 * np.median(parts[1:], axis=0)
-    print(
-        f"{times:5} {len(engine.corpus):8} | {1e3 * loaded:7.1f} {more:8.1f} | {ms[0]:8.0f} {np.median(ms[1:]):7.1f} "
-        f"{np.percentile(ms[1:], 95):7.1f} | {searching:12.1f} {realising:8.1f} | {1e3 * np.median(used[1:]):9.1f}",
-        flush=True,
-    )
+    asked = [Asked(times, options) for times in options.times]
+    for first in range(0, options.pairs, AT_ONCE):
+        for one in asked:
+            one.join(min(AT_ONCE, options.pairs - first))
+    print("times postures | load ms  MB more | first ms  median    95th | guide+search  realise | processor")
+    for one in asked:
+        print(one.row(), flush=True)
+
+
+class Asked:
+    """A corpus that is loaded, and what its tweens took."""
+
+    def __init__(self, times: int, options: argparse.Namespace) -> None:
+        self.times, before, began = times, resident(), perf_counter()
+        self.engine = Engine.load(name_of(times), options.keep)
+        self.loaded, self.more = perf_counter() - began, resident() - before
+        drawn = np.random.default_rng(options.seed).integers(len(self.engine.corpus), size=(options.pairs + 1, 2))
+        self.pairs = iter(drawn)
+        self.took: list[tuple[float, ...]] = []
+        self.join(1)
+        self.first = self.took.pop()[0]
+
+    def join(self, count: int) -> None:
+        """Join the postures of so many of the next pairs."""
+        for a, b in islice(self.pairs, count):
+            ends = posture(self.engine, a), posture(self.engine, b)
+            began, before = perf_counter(), process_time()
+            tween = self.engine.tween(*ends)
+            took, used, spent = perf_counter() - began, process_time() - before, tween.seconds
+            self.took.append((took, spent["problem"] + spent["bound"] + spent["search"], spent["realise"], used))
+
+    def row(self) -> str:
+        """Return a line of the table."""
+        took, searching, realising, used = 1e3 * np.median(self.took, axis=0)
+        late = 1e3 * np.percentile([one[0] for one in self.took], 95)
+        return (
+            f"{self.times:5} {len(self.engine.corpus):8} | {1e3 * self.loaded:7.1f} {self.more:8.1f} | "
+            f"{1e3 * self.first:8.0f} {took:7.1f} {late:7.1f} | {searching:12.1f} {realising:8.1f} | {used:9.1f}"
+        )
 
 
 def posture(engine: Engine, index: int) -> Posture:

@@ -72,7 +72,7 @@ def all_of(carriage: Carriage, number: int) -> Chosen:
 
 
 class Found(NamedTuple):
-    """What is found of the corpus for the walks of one part of the body between two postures.
+    """The moments of one part's walks between two postures, and what they show of it.
 
     Attributes:
         chosen: the moments.
