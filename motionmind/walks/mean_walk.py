@@ -227,23 +227,30 @@ def _mean_between(
             found = _marginals(*steps, likely, len(times), size, trees is not None)
             return _PartWalk(chosen, here, *found, trust(np.array(nearest), ways[number]), left_out)
 
-        walks = _each(walk, range(len(parts)), pool, threads)
+        larger, limbs = {number for numbers in groups for number in numbers[:-1]}, {numbers[-1] for numbers in groups}
+        # Where all moments are summed over, what a limb's walks are alone in is not kept: it may be large.
+        kept = sorted(larger if trees is None else larger | limbs)
+        walks = dict(zip(kept, _each(walk, kept, pool, threads), strict=True))
 
-        def move(numbers: tuple[int, ...]) -> None:
-            here, own = groups[numbers], [walks[number] for number in numbers]
-            about = np.ascontiguousarray(minimal[:, here])
-            if trees is None:
-                weights = _mixed(*(one.marginals for one in own))
-                poses[:, here] = mean_rotations(weights, shown, np.array(here), about)
-            else:
-                poses[:, here] = _mean_of_few(own, [parts[number] for number in numbers], here, about)
-            trusted[here] = np.dot(SIZES, [one.trust for one in own])
+        def move(number: int) -> float:
+            mine = walks[number] if number in walks else walk(number)
+            for numbers, here in groups.items():
+                if numbers[-1] != number:
+                    continue
+                own, about = [*(walks[n] for n in numbers[:-1]), mine], np.ascontiguousarray(minimal[:, here])
+                if trees is None:
+                    weights = _mixed(*(one.marginals for one in own))
+                    poses[:, here] = mean_rotations(weights, shown, np.array(here), about)
+                else:
+                    poses[:, here] = _mean_of_few(own, [parts[n] for n in numbers], here, about)
+                trusted[here] = np.dot(SIZES, [one.trust for one in own])
+            return mine.left_out
 
-        _each(move, [*groups], pool, threads)
+        lost = _each(move, sorted(limbs), pool, threads)
     departs = _without_ends(rot.log(rot.inv_mul(minimal, poses)), times, leaving is not None, arriving is not None)
     poses = rot.mul(minimal, rot.exp(trusted[:, None] * departs))
-    moments = tuple((one.marginals, one.chosen.moments) for one in walks[:2])
-    return _Walk(poses, moments, trusted, max(one.left_out for one in walks))
+    moments = tuple((one.marginals, one.chosen.moments) for one in (walks[0], walks[1]))
+    return _Walk(poses, moments, trusted, max(*lost, *(one.left_out for one in walks.values())))
 
 
 def _each(work: Callable[[_Item], _Made], items: Sequence[_Item], pool: Executor, threads: int) -> list[_Made]:
