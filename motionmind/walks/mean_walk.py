@@ -200,7 +200,6 @@ def _mean_between(
 
     members, groups = _members(parts, joints)
     ways = [_way(part, ends, float(times[-1] - times[0])) for part in parts]
-    passed = orientations if path is None else np.concatenate([orientations, path])
     shown, trees = carriage.orientations, carriage.trees
 
     def off(postures: Floats) -> Floats:
@@ -208,7 +207,10 @@ def _mean_between(
 
     threads = min(THREADS, 1 + len(carriage.weights) // BUSY)
     with ThreadPoolExecutor(threads - 1) if threads > 1 else Here() as pool:
-        distances = _each(off, np.array_split(passed, threads), pool, threads) if trees is None else []
+        distances = []
+        if trees is None:
+            passed = orientations if path is None else np.concatenate([orientations, path])
+            distances = _each(off, np.array_split(passed, threads), pool, threads)
 
         def walk(number: int) -> _PartWalk:
             part, here = parts[number], shown
