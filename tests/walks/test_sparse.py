@@ -241,6 +241,16 @@ def test_fine_detail_is_found_among_few_moves(engine: Engine, carriage: Carriage
     assert cost(engine, few, poses) >= cost(engine, every, poses)
 
 
+def test_fine_detail_is_looked_up_all_along_a_path(
+    engine: Engine, carriage: Carriage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("NEAREST", "BESIDE"):
+        monkeypatch.setattr(detail, name, 1)
+    path = np.asarray(carriage.orientations[11:15, : len(engine.corpus.skeleton)])  # postures that come but once
+    among = moves_near(engine.corpus.moves, carriage, path)
+    np.testing.assert_array_equal(engine.corpus.moves.begins[among], np.arange(10, 16))
+
+
 def test_one_loop_finds_the_detail_of_what_was_learned_loaded_and_made_just_now(engine: Engine) -> None:
     """What is compiled ahead would else be compiled again in a tween."""
     moves, loop = engine.corpus.moves, cast(Any, detail._squared_distances)
