@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM
 import pytest
 from command_line import Ran, Run
 from hypothesis import HealthCheck, settings
-from pages import Tabs
+from pages import Chromium, Tabs
 
 import motionmind
 from motionmind.cli import main
@@ -89,13 +90,34 @@ def pytest_xdist_auto_num_workers() -> int:
     return processors + (processors + 1) // 2
 
 
+def _shows_pages(item: pytest.Item) -> bool:
+    return "browser" in getattr(item, "fixturenames", ())
+
+
 @pytest.hookimpl(trylast=True)  # when the order is a random one
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Let workers begin with the files that wait for pages, and go on with those of most tests: they end together."""
     if hasattr(config, "workerinput"):
         sizes = Counter(item.path for item in items)
-        pages = {item.path for item in items if "browser" in getattr(item, "fixturenames", ())}
+        pages = {item.path for item in items if _shows_pages(item)}
         items.sort(key=lambda item: (item.path not in pages, -sizes[item.path]))
+
+
+@cache
+def _chromium() -> Chromium:
+    pytest.importorskip("playwright", reason="Playwright is not installed")
+    path = next(filter(None, map(shutil.which, _CHROMIUM)), None)
+    if path is None:
+        pytest.skip("no Chromium is installed")
+    return Chromium(path, _FLAGS)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(nextitem: pytest.Item | None) -> Iterator[None]:
+    """Close the browser after tests of pages: Playwright's event loop would be in the way of tests that run one."""
+    yield
+    if _chromium.cache_info().currsize and (nextitem is None or not _shows_pages(nextitem)):
+        _chromium().close()
 
 
 def pytest_collection_finish() -> None:
@@ -139,23 +161,16 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
     return call
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
+@pytest.fixture
+def browser() -> Any:
     """Chromium, with WebGL though there be no GPU."""
-    sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    chromium = next(filter(None, map(shutil.which, _CHROMIUM)), None)
-    if chromium is None:
-        pytest.skip("no Chromium is installed")
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=_FLAGS)
-        yield browser
-        browser.close()
+    return _chromium().browser
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def tabs(browser: Any) -> Tabs:
     """Tabs of Chromium, in which WebGL draws only where that is asked for."""
-    return Tabs(browser)
+    return _chromium().tabs
 
 
 _BAD = ["nan", "1e999", "1e300", "-", "{", "}", "[", "9" * 30, "End", "\0", "é", ":", ";", ",", "#", '"', "_", "0"]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from io import BytesIO
 from typing import Any
+from urllib.parse import urljoin
 
 import numpy as np
 from PIL import Image
@@ -82,7 +83,7 @@ class Tabs:
     """Tabs of a browser, which tests use one after the other: to begin one takes half the time of showing a page."""
 
     def __init__(self, browser: Any) -> None:
-        self._browser = browser
+        self.browser = browser
         self._free: dict[str, list[Any]] = defaultdict(list)
 
     @contextmanager
@@ -108,23 +109,71 @@ class Tabs:
             tab.on(event, hear)
         yield tab
         tab.unroute_all(behavior="wait")  # an answer still held back would fail in whatever test comes next
-        if script or not tab.url.startswith("file:"):  # a server's page keeps its process from those of others
+        if script:
             tab.context.close()
             return
         for event, hear in hearing.items():
             tab.remove_listener(event, hear)
-        tab.goto("about:blank")
-        tab.mouse.move(0, 0)
+        self._leave(tab)
         free.append(tab)
+
+    def _leave(self, tab: Any) -> None:
+        """Leave the page of a tab, and nothing of it: no other tabs of its context, cookies, or notes of its own."""
+        for other in tab.context.pages:
+            if other is not tab:
+                other.close()
+        if tab.url.startswith("http:"):
+            tab.evaluate("localStorage.clear(), sessionStorage.clear()")
+            tab.context.clear_cookies()
+            # A page of the same server: the next one is then shown by the same process, which knows its scripts. That
+            # and what the browser keeps of the server's files is more than half of what it takes to open a studio.
+            tab.goto(urljoin(tab.url, "/health"))
+        else:
+            tab.goto("about:blank")
+        tab.mouse.move(0, 0)
 
     def _begin(self, *scripts_and_options: Any) -> Any:
         *scripts, options = scripts_and_options
-        context = self._browser.new_context(**options)
+        context = self.browser.new_context(**options)
         for script in filter(None, scripts):
             context.add_init_script(script)
         tab = context.new_page()
         _fill_screen(tab)
         return tab
+
+
+class Chromium:
+    """The browser, from when it is first asked for until it is closed; it is started anew when it is needed again.
+
+    To start it takes as long as to show a page, so that tests of pages that follow each other share it.
+    """
+
+    def __init__(self, path: str, flags: Sequence[str]) -> None:
+        self._path, self._flags = path, [*flags]
+        self._open = ExitStack()
+        self._tabs: Tabs | None = None
+
+    @property
+    def browser(self) -> Any:
+        """Playwright's browser."""
+        return self.tabs.browser
+
+    @property
+    def tabs(self) -> Tabs:
+        """The browser's tabs."""
+        if self._tabs is None:
+            from playwright.sync_api import sync_playwright
+
+            playwright = self._open.enter_context(sync_playwright())
+            browser = playwright.chromium.launch(executable_path=self._path, args=self._flags)
+            self._open.callback(browser.close)
+            self._tabs = Tabs(browser)
+        return self._tabs
+
+    def close(self) -> None:
+        """End the browser."""
+        self._tabs = None
+        self._open.close()
 
 
 def _fill_screen(tab: Any) -> None:

@@ -23,7 +23,7 @@ from motionmind.studio.thumbnails import HEIGHT, thumbnail
 T = TypeVar("T")
 Window = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_-]{1,40}\Z")]
 _GONE = 10.0  # seconds after which a window that has closed does not come back: a reload takes less
-_FOREVER = "private, max-age=31536000, immutable"
+FOREVER = "private, max-age=31536000, immutable"
 
 
 class Edited(msgspec.Struct, forbid_unknown_fields=True):
@@ -161,7 +161,7 @@ def _movement_routes(studio: Studio) -> list[BaseRoute]:
             return error(str(missing), 404)
         answer = json(player_data(motion) | {"name": studio.movements.title(key)})
         if key.lstrip("~").startswith("m-"):
-            answer.headers["cache-control"] = _FOREVER
+            answer.headers["cache-control"] = FOREVER
         return answer
 
     async def picture(request: Request) -> Response:
@@ -176,7 +176,7 @@ def _movement_routes(studio: Studio) -> list[BaseRoute]:
             async with drawing:
                 drawn = await asyncio.to_thread(thumbnail, motion, frame, height)
             studio.thumbnails.hold(stable, frame, height, drawn)
-        lasting = _FOREVER if stable == key and stable.lstrip("~").startswith("m-") else "private, max-age=60"
+        lasting = FOREVER if stable == key and stable.lstrip("~").startswith("m-") else "private, max-age=60"
         return Response(drawn, media_type="image/png", headers={"cache-control": lasting})
 
     return [

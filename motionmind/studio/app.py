@@ -56,12 +56,13 @@ def app(studio: Studio, keys: Keys, host: str, port: int) -> Application:
 def _open_routes(keys: Keys, port: int) -> list[BaseRoute]:
     """Return the routes that tell nothing of the project."""
     page = read_page()
-    headers = {"cache-control": "no-cache", "content-security-policy": policy(page.script)}
+    headers = {"content-security-policy": policy(page.script)}
 
     async def file(request: Request) -> Response:
         if (found := page.files.get(request.url.path)) is None:
             return api.error("there is nothing here", 404)
-        sent = headers | {"etag": found.tag}
+        lasting = "no-cache" if request.url.path == "/" else api.FOREVER
+        sent = headers | {"etag": found.tag, "cache-control": lasting}
         if request.headers.get("if-none-match") == found.tag:
             return Response(status_code=304, headers=sent)
         return Response(found.data, media_type=found.type, headers=sent)

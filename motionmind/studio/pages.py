@@ -43,7 +43,8 @@ class Page(NamedTuple):
     """The page.
 
     Attributes:
-        files: all files by the path that they are asked for by.
+        files: all files by the path that they are asked for by. All but the page itself, "/", have the page's version
+            in their path, so that a browser may keep them for good and loads the page again without asking for one.
         script: hash of the import map, the only inline script, as the page's policy names it.
     """
 
@@ -53,26 +54,37 @@ class Page(NamedTuple):
 
 def read_page() -> Page:
     """Read all files of the page."""
-    files = {}
-    names = {name: f"/player/vendor/{file}" for name, file in _THREE.items()}
-    for prefix, folder in (("/page", _PAGE), ("/player", _PLAYER)):
-        for path in sorted(folder.rglob("*")):
-            relative = path.relative_to(folder).as_posix()
-            if path.suffix in _TYPES and not any(part.startswith((".", "node_modules")) for part in path.parts[-3:]):
-                files[f"{prefix}/{relative}"] = _file(path.read_bytes(), _TYPES[path.suffix])
-                if prefix == "/player" and path.suffix == ".js" and not relative.startswith("vendor/"):
-                    names[f"motionmind/{relative.removesuffix('.js')}"] = f"/player/{relative}"
+    own, players = _read(_PAGE), _read(_PLAYER)
+    index = Template((_PAGE / "index.html").read_text("utf-8"))
+    tags = [(name, file.tag) for files in (own, players) for name, file in files.items()]
+    version = hashlib.sha256(repr(tags).encode()).hexdigest()[:16]
+    page, player = f"/page/{version}", f"/player/{version}"
+    files = {f"{page}/{name}": file for name, file in own.items()}
+    files |= {f"{player}/{name}": file for name, file in players.items()}
+    names = {name: f"{player}/vendor/{file}" for name, file in _THREE.items()}
+    for name in players:
+        if name.endswith(".js") and not name.startswith("vendor/"):
+            names[f"motionmind/{name.removesuffix('.js')}"] = f"{player}/{name}"
     modules = msgspec.json.encode({"imports": names}).decode().replace("<", "\\u003c")
-    first = _loaded(files, names, "/page/begin.js")
-    later = [path for path in _loaded(files, names, "/page/main.js") if path not in first]
+    first = _loaded(files, names, f"{page}/begin.js")
+    later = [path for path in _loaded(files, names, f"{page}/main.js") if path not in first]
     # A browser asks for six files at a time: what `begin.js` asks for would wait for all others.
     links = [f'<link rel="modulepreload" href="{path}">' for path in first]
     links += [f'<link rel="modulepreload" fetchpriority="low" href="{path}">' for path in later]
     preloads = "\n".join(links)
-    index = Template((_PAGE / "index.html").read_text("utf-8")).substitute(modules=modules, preloads=preloads)
-    files["/"] = _file(index.encode(), "text/html; charset=utf-8")
+    whole = index.substitute(modules=modules, preloads=preloads, page=page)
+    files["/"] = _file(whole.encode(), "text/html; charset=utf-8")
     digest = b64encode(hashlib.sha256(modules.encode()).digest()).decode("ascii")
     return Page(files, f"sha256-{digest}")
+
+
+def _read(folder: Path) -> dict[str, File]:
+    """Return a folder's files for browsers by their paths within it."""
+    return {
+        path.relative_to(folder).as_posix(): _file(path.read_bytes(), _TYPES[path.suffix])
+        for path in sorted(folder.rglob("*"))
+        if path.suffix in _TYPES and not any(part.startswith((".", "node_modules")) for part in path.parts[-3:])
+    }
 
 
 def _loaded(files: Mapping[str, File], names: Mapping[str, str], start: str) -> list[str]:

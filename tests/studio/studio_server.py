@@ -194,11 +194,25 @@ class Served(Client):
         return client
 
 
+_ports: dict[str, int] = {}
+
+
+def _listening(host: str) -> socket.socket:
+    """Return a socket that listens at the port of the studio before, if that is free: to a browser, which has loaded
+    the page from there, it is the same server."""
+    try:
+        found = socket.create_server((host, _ports.get(host, 0)))
+    except OSError:  # the studio before still runs
+        return socket.create_server((host, 0))
+    _ports[host] = found.getsockname()[1]
+    return found
+
+
 @contextmanager
 def serving(project: Project, home: Path | None = None, host: str = "127.0.0.1") -> Iterator[Served]:
     """Serve a project in this process, with one worker; the project is closed at the end."""
     studio, keys, ready = Studio(project, home, 1), Keys(), threading.Event()
-    with socket.create_server((host, 0)) as listening:
+    with _listening(host) as listening:
         port = listening.getsockname()[1]
         server = Server(studio, keys, host, port, ready.set)
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)

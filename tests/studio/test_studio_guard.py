@@ -19,9 +19,12 @@ import pytest
 from studio_server import Client, Served, running, serving
 
 from motionmind.studio.guard import Guard
+from motionmind.studio.pages import read_page
 from motionmind.studio.project import Project
 from motionmind.studio.token import Keys
 
+PAGE = next(path for path in read_page().files if path.endswith("/main.js")).removesuffix("/main.js")
+PLAYER = PAGE.replace("page", "player", 1)
 EDIT = {"window": "w1", "edit": {"edit": "title", "title": "mine now"}}
 OUT = [
     "../../../../etc/passwd",
@@ -32,6 +35,8 @@ OUT = [
 ]
 OUT += ["....//....//etc/passwd", "..\\..\\windows\\win.ini", "%00", "a%00.png", "~~~~", "C:/", "own/../../x", "%ff%fe"]
 PATHS = [
+    f"{PAGE}/{{}}",
+    f"{PLAYER}/{{}}",
     "/page/{}",
     "/player/{}",
     "/{}",
@@ -70,7 +75,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
         "0x7f.1:{port}",
     ],
 )
-@pytest.mark.parametrize("path", ["/", "/health", "/api/project", "/page/main.js"])
+@pytest.mark.parametrize("path", ["/", "/health", "/api/project", f"{PAGE}/main.js"])
 def test_a_name_that_was_rebound_to_this_computer_gets_nothing(served: Served, host: str, path: str) -> None:
     port = urlsplit(served.url).port
     assert served.send("GET", path, Host=host.format(port=port)).status == 403
@@ -259,7 +264,7 @@ def test_the_page_runs_no_script_but_its_own(served: Served) -> None:
     assert not re.search(rb"\bon\w+=", answer.body)
 
 
-@pytest.mark.parametrize("path", ["/", "/health", "/page/main.js", "/api/project", "/api/nothing", "/nothing"])
+@pytest.mark.parametrize("path", ["/", "/health", f"{PAGE}/main.js", "/api/project", "/api/nothing", "/nothing"])
 def test_every_answer_says_what_browsers_may_do_with_it(served: Served, path: str) -> None:
     headers = served.send("GET", path).headers
     assert headers["x-content-type-options"] == "nosniff"
@@ -267,6 +272,19 @@ def test_every_answer_says_what_browsers_may_do_with_it(served: Served, path: st
     assert headers["cross-origin-resource-policy"] == "same-origin"
     assert "default-src 'none'" in headers["content-security-policy"]
     assert "server" not in headers
+
+
+def test_a_browser_keeps_the_files_of_the_page_and_asks_whether_the_page_is_another(served: Served) -> None:
+    page = served.send("GET", "/")
+    assert page.headers["cache-control"] == "no-cache"
+    assert served.send("GET", "/", If_None_Match=page.headers["etag"]).status == 304
+    files = re.findall(r'"(/(?:page|player)/[^"]+)"', page.body.decode())
+    assert len(files) > 70
+    for file in files:
+        answer = served.send("GET", file)
+        assert answer.status == 200, file
+        assert answer.headers["cache-control"].endswith("immutable"), file
+    assert served.send("GET", f"{PAGE[:-1]}_/main.js").status == 404, "the files of another version"
 
 
 def test_an_error_inside_shows_nothing_of_itself(

@@ -261,7 +261,7 @@ def test_own_movement_by_mouse(served: Served, open_page: Open, tmp_path: Path) 
 def test_own_movement_by_keyboard(served: Served, open_page: Open, tmp_path: Path) -> None:
     (tmp_path / "bends.score").write_text(BENDS)
     page = open_page(1024, 768, "dark")
-    page.on("filechooser", lambda chooser: chooser.set_files(tmp_path / "bends.score"))
+    page.once("filechooser", lambda chooser: chooser.set_files(tmp_path / "bends.score"))
     to_panel(page, "movement")
     tab_to(page, "choose")
     page.keyboard.press("Enter")

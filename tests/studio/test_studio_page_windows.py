@@ -40,6 +40,8 @@ def test_the_address_forgets_the_token_and_a_reload_keeps_the_window(
     studio_page.reload()
     expect(studio_page.get_by_test_id("posture-arabesque")).to_be_visible()
     assert studio_page.evaluate("studio.window") == window
+    asked = "performance.getEntriesByType('resource').filter(one => one.transferSize > 0).map(one => one.name)"
+    assert [name for name in studio_page.evaluate(asked) if "/api/" not in name] == [], "files that the browser has"
 
 
 def test_no_request_leaves_this_machine(studio_server: Served, tabs: Tabs, expect: Any) -> None:
