@@ -17,7 +17,10 @@ LEARNED_BY = (
 )
 
 
-def fingerprint(files: Iterable[Path], package: Path = Path(__file__).parents[1]) -> str:
+_PACKAGE = Path(__file__).parents[1]
+
+
+def fingerprint(files: Iterable[Path], package: Path = _PACKAGE) -> str:
     """Return a name [16 hexadecimal digits] for what is learned from these files, that changes whenever that may.
 
     It is a hash of the files, and of the code and the bodies' descriptions that learning uses (`LEARNED_BY`): a change
@@ -30,13 +33,30 @@ def fingerprint(files: Iterable[Path], package: Path = Path(__file__).parents[1]
     Raises:
         FormatError: a file cannot be read.
     """
+    digest = _own_code().copy() if package == _PACKAGE else _hash_code(package)
+    for path in files:
+        _add(digest, path)
+    return digest.hexdigest()[:16]
+
+
+@cache
+def _own_code() -> hashlib._Hash:
+    """Return the hash of this package's sources, as they are when it is asked for first: what this process runs."""
+    return _hash_code(_PACKAGE)
+
+
+def _hash_code(package: Path) -> hashlib._Hash:
     digest = hashlib.sha256()
     rooms = [package / name for name in LEARNED_BY]
     code = [path for room in rooms for path in ([room] if room.suffix else sorted(room.rglob("*.py")))]
-    for path in [*code, *sorted(package.glob("body/bodies/*.toml")), *files]:
-        data = read_bytes(path)
-        digest.update(f"{path.name}\0{len(data)}\0".encode() + data)
-    return digest.hexdigest()[:16]
+    for path in [*code, *sorted(package.glob("body/bodies/*.toml"))]:
+        _add(digest, path)
+    return digest
+
+
+def _add(digest: hashlib._Hash, path: Path) -> None:
+    data = read_bytes(path)
+    digest.update(f"{path.name}\0{len(data)}\0".encode() + data)
 
 
 @cache

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+import io
+import math
+import mmap
 import os
 import re
 import shlex
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -373,20 +377,42 @@ def _shapes_in(manifest: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 def _open_arrays(folder: Path, place: Path, shapes: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
     """Open a corpus's arrays in `place`; the manifest states each one's type and shape, as [type, *shape], or None."""
-    import numpy as np
 
     arrays = {}
     for name, shape in shapes.items():
         file = _array_file(place, name)
         try:
-            # A plain view: still mapped, but without the subclass, which slows every slice. A path would be resolved,
-            # link by link, which is a fifth of what it takes to load a corpus.
-            arrays[name] = np.asarray(np.lib.format.open_memmap(str(file), mode="r"))
+            arrays[name] = _open_array(str(file), shape)
         except Exception as error:  # the header is Python; parsing a damaged one can raise anything
             raise FormatError(f"cannot be read as an array: {error}; {remedy(folder)}", path=file) from error
         if shape is not None and [arrays[name].dtype.str, *arrays[name].shape] != shape:
             raise FormatError(f"is not the array that was saved; {remedy(folder)}", path=file)
     return arrays
+
+
+def _open_array(file: str, form: Sequence[Any] | None) -> NDArray[Any]:
+    """Map an array of a file, read-only; `form` is what the manifest states of it."""
+    import numpy as np
+
+    if form is not None:
+        kind, *shape = form
+        header, count = _header(kind, *shape), math.prod(shape)
+        with open(file, "rb") as stream:  # noqa: PTH123 - a path would be taken apart first, for each of many files
+            if count and stream.read(len(header)) == header:
+                data = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
+                return np.frombuffer(data, kind, count, len(header)).reshape(shape)
+    # A plain view: still mapped, but without the subclass, which slows every slice.
+    return np.asarray(np.lib.format.open_memmap(file, mode="r"))
+
+
+@lru_cache(maxsize=1000)
+def _header(kind: str, *shape: int) -> bytes:
+    """Return how a file of such an array begins: to compare it takes a fifth of the time of reading what it says."""
+    import numpy as np
+
+    written = io.BytesIO()
+    np.lib.format.write_array_header_1_0(written, {"descr": kind, "fortran_order": False, "shape": shape})
+    return written.getvalue()
 
 
 def _array_file(place: Path, name: str) -> Path:

@@ -19,6 +19,8 @@ def sources(path: Path) -> list[Path]:
     found = set(waiting)
     for score in waiting:  # the list grows during the loop
         for line in read_lines(score):
+            if not line.startswith(("include", "body")):  # most lines of most scores
+                continue
             word, _, rest = normalize("NFC", line).partition("#")[0].replace("\t", " ").partition(" ")
             file = rest.split(" as ")[0].strip()
             if word == "include" or (word == "body" and file.endswith(".toml")):
