@@ -18,7 +18,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 
-pytestmark = pytest.mark.usefixtures("_importable")
+pytestmark = [pytest.mark.long, pytest.mark.usefixtures("_importable")]
 
 
 @pytest.fixture

@@ -71,7 +71,7 @@ class Brush:
         from PIL import Image
 
         data = BytesIO()
-        self._image.resize(self._size, Image.Resampling.BOX).save(data, "PNG", optimize=True)
+        self._image.resize(self._size, Image.Resampling.BOX).save(data, "PNG")
         return data.getvalue()
 
 

@@ -21,6 +21,8 @@ from motionmind.errors import MotionMindError
 from motionmind.formats import write_motion
 from motionmind.tween.engine import Engine
 
+pytestmark = pytest.mark.long
+
 
 def dispatchers() -> dict[str, Any]:
     """All functions that are compiled, of the modules that are loaded, by name."""

@@ -248,6 +248,7 @@ def test_the_first_command_runs(here: Path) -> None:
     assert_same_picture(here / "tween.gif", ROOT / "docs" / "arabesque-to-fifth.gif")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("document", GUIDES, ids=name_of)
 def test_the_commands_and_the_python_of_a_guide_run(
     document: Path, here: Path, recordings: Path, run: Run, capsys: pytest.CaptureFixture[str]
@@ -277,6 +278,7 @@ def test_the_python_of_other_documents_compiles(document: Path) -> None:
             compile(block.text, name_of(document), "exec")
 
 
+@pytest.mark.long
 def test_the_gallery_shows_what_its_commands_make(here: Path, run: Run) -> None:
     text = GALLERY.read_text("utf-8")
     commands = [line for block in blocks(text) for line in commands_of(block)]

@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 import signal
+import tarfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -198,7 +199,8 @@ def republish(files: Files, change: Callable[[dict[str, Any], Path], None]) -> s
     """
     data = json.loads((files.folder / "index.json").read_text("utf-8"))
     entry, folder = data["corpora"][0], files.folder / "unpacked"
-    shutil.unpack_archive(files.folder / entry["archive"]["url"], folder, filter="data")
+    filtered = {"filter": "data"} if hasattr(tarfile, "data_filter") else {}  # since Python 3.11.4
+    shutil.unpack_archive(files.folder / entry["archive"]["url"], folder, **filtered)
     change(entry, folder)
     paths = {file["name"]: folder / file["name"] for file in entry["files"] if (folder / file["name"]).is_file()}
     for file in entry["files"]:

@@ -20,6 +20,8 @@ from motionmind.body.motion import Insertion, Motion
 from motionmind.render.palette import COLOURS, INSERTED
 from motionmind.render.timing import frame_times
 
+pytestmark = pytest.mark.long
+
 
 def briefly(name: str = "briefly", seconds: float = 0.777) -> Motion:
     """The start of the adagio; the middle third of it inserted."""

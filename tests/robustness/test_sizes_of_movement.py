@@ -22,6 +22,8 @@ from motionmind.geometry import rotations as rot
 from motionmind.render.pictures import write_picture
 from motionmind.render.timing import SLOWEST, film_rate, frame_times
 
+pytestmark = pytest.mark.long
+
 BODY = human23()
 MOST_FRAMES = MOST_PLACES // len(BODY)
 

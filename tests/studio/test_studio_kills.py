@@ -23,6 +23,8 @@ from motionmind.errors import MotionMindError
 from motionmind.studio.edits import Insert
 from motionmind.studio.project import Project
 
+pytestmark = pytest.mark.long
+
 _Found = TypeVar("_Found")
 _MOST = 400  # MB that a server with one worker takes
 

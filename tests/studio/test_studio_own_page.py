@@ -16,6 +16,8 @@ from studio_server import Served, serving
 
 from motionmind.studio.project import Project
 
+pytestmark = pytest.mark.long
+
 SIZES = {"large, light": (1440, 900, "light"), "small, dark": (1024, 768, "dark")}
 LONG = 60_000  # milliseconds: the machine may be busy
 

@@ -9,6 +9,8 @@ import pytest
 from piece_page import LONG, from_a_to_b, until, wait_for_alternatives
 from studio_server import LARGE, SMALL
 
+pytestmark = pytest.mark.long
+
 
 class Counted:
     """A mouse whose clicks are counted."""

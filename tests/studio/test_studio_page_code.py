@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[2]
 STUDIO = ROOT / "motionmind" / "studio"
 PAGE, PLAYER = STUDIO / "page", ROOT / "motionmind" / "render" / "player"

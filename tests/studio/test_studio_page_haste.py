@@ -6,11 +6,14 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pytest
 from piece_page import from_a_to_b, piece, until, wait_for, wait_for_alternatives
 from scores import BENDS
 
 if TYPE_CHECKING:
     from studio_server import Served
+
+pytestmark = pytest.mark.long
 
 
 def hold_up(page: Any, address: str, milliseconds: int = 200) -> None:

@@ -20,6 +20,8 @@ from pages import RESTING, Tabs
 if TYPE_CHECKING:
     from studio_server import Served
 
+pytestmark = pytest.mark.long
+
 Enter = Callable[[Literal["light", "dark"], int], Any]
 
 PANELS = ("between", "vary", "pose", "movement", "take")

@@ -13,6 +13,8 @@ from pages import RESTING, Tabs
 from piece_page import until
 from studio_server import LARGE, SMALL, Client, Served
 
+pytestmark = pytest.mark.long
+
 
 class Elsewhere(BaseHTTPRequestHandler):
     """An empty page of another server."""

@@ -17,6 +17,8 @@ from motionmind.studio.placement import performance
 from motionmind.studio.project import Project
 from motionmind.studio.view import layout_of
 
+pytestmark = pytest.mark.long
+
 BEGIN = [("b1", "plies", 0, 12), ("b2", "adagio-barre", 9, 15), ("b3", "tendus", 11, 18)]
 POSTURE = "application/x-motionmind-posture"
 

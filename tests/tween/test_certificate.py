@@ -21,6 +21,8 @@ from motionmind.tween.engine import Engine
 from motionmind.tween.problem import build_model
 from motionmind.tween.progression import lift_to_moves
 
+pytestmark = pytest.mark.long
+
 pytoulbar2 = pytest.importorskip("pytoulbar2", reason="toulbar2 is not installed: no outside solver to compare with")
 
 PAIRS = 50
