@@ -382,7 +382,7 @@ def _open_arrays(folder: Path, place: Path, shapes: Mapping[str, Any]) -> dict[s
     for name, shape in shapes.items():
         file = _array_file(place, name)
         try:
-            arrays[name] = _open_array(str(file), shape)
+            arrays[name] = _open_array(file, shape)
         except Exception as error:  # the header is Python; parsing a damaged one can raise anything
             raise FormatError(f"cannot be read as an array: {error}; {remedy(folder)}", path=file) from error
         if shape is not None and [arrays[name].dtype.str, *arrays[name].shape] != shape:
@@ -390,19 +390,20 @@ def _open_arrays(folder: Path, place: Path, shapes: Mapping[str, Any]) -> dict[s
     return arrays
 
 
-def _open_array(file: str, form: Sequence[Any] | None) -> NDArray[Any]:
+def _open_array(file: Path, form: Sequence[Any] | None) -> NDArray[Any]:
     """Map an array of a file, read-only; `form` is what the manifest states of it."""
     import numpy as np
 
     if form is not None:
         kind, *shape = form
         header, count = _header(kind, *shape), math.prod(shape)
-        with open(file, "rb") as stream:  # noqa: PTH123 - a path would be taken apart first, for each of many files
+        with file.open("rb") as stream:
             if count and stream.read(len(header)) == header:
                 data = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
                 return np.frombuffer(data, kind, count, len(header)).reshape(shape)
-    # A plain view: still mapped, but without the subclass, which slows every slice.
-    return np.asarray(np.lib.format.open_memmap(file, mode="r"))
+    # A plain view: still mapped, but without the subclass, which slows every slice. A path would be resolved, link by
+    # link.
+    return np.asarray(np.lib.format.open_memmap(str(file), mode="r"))
 
 
 @lru_cache(maxsize=1000)

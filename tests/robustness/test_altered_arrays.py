@@ -120,6 +120,18 @@ def test_an_index_of_what_is_not_there_is_refused_wherever_it_stands(
             Engine.load(str(folder))
 
 
+@pytest.mark.parametrize("name", ["transitions.attests", "transitions.arrives"])
+def test_the_posture_after_the_last_is_refused(built: Path, tmp_path: Path, name: str) -> None:
+    folder = tmp_path / "altered"
+    shutil.copytree(built, folder)
+    file = store.load(folder).place / f"{name}.npy"
+    array = np.load(file)
+    array[0] = len(Engine.load(str(built)).corpus)
+    np.save(file, array)
+    with pytest.raises(FormatError, match=f"{name} holds an index of what is not there"):
+        Engine.load(str(folder))
+
+
 @pytest.mark.parametrize("name", ["transitions.targets", "bridges.targets", "coordination.pair_states"])
 def test_the_index_after_the_last_and_one_twice_in_a_row_are_refused(built: Path, tmp_path: Path, name: str) -> None:
     folder = tmp_path / "altered"
