@@ -31,6 +31,7 @@ _F = TypeVar("_F", bound=Callable[..., object])
 _Array = TypeVar("_Array", bound=np.ndarray[Any, Any])
 _HERE = Path(__file__).parent
 _HASH = 32  # bytes of a hash
+_IMPORT = re.compile(r"^from motionmind(?:\.([\w.]+))? import (\([^)]*\)|.*)$", re.M)  # as a module is loaded
 _MONTH = 30 * 86400.0  # seconds
 # Of numba's core, which is not typed.
 _normalise: Any = sigutils.normalize_signature
@@ -59,7 +60,7 @@ _bytecode.FunctionIdentity._unique_ids = _Numbers()
 def jit(function: _F) -> _F:
     """Compile `function` to machine code on its first call; arithmetic as written, so the same bytes every time.
 
-    It may call other compiled functions of its own folder and of `geometry`, and runs beside other threads.
+    It may call other compiled functions that its module imports, and runs beside other threads.
     """
     compiled: Any = numba.njit(error_model="numpy", nogil=True)(function)
     compiled._cache = _Kept(function)
@@ -108,15 +109,15 @@ def decorated_names() -> frozenset[str]:
     """Return the functions of this package that are to be compiled, as "search/astar.search"; none need be loaded."""
     return frozenset(
         f"{source.parent.name}/{source.stem}.{name}"
-        for source in _HERE.glob("*/*.py")
-        for name in re.findall(r"^@jit\ndef (\w+)", source.read_text("utf-8"), re.M)
+        for source in _compiling_sources()
+        for name in re.findall(r"^@jit\ndef (\w+)", _text(source), re.M)
     )
 
 
 def compiled_names() -> frozenset[str]:
     """Return those of them whose compiled code is on disk."""
     return frozenset(
-        f"{folder.name.rpartition('-')[0]}/{file.name.rsplit('-', 1)[0]}"
+        f"{_module(folder).replace('.', '/')}.{file.name.rsplit('-', 1)[0]}"
         for folder in _folders()
         for file in folder.glob("*.nbc")
     )
@@ -141,7 +142,7 @@ def note_all_compiled() -> None:
 
 def place_of_code() -> Path | None:
     """Return the folder that compiled code is kept in; None if there is none that can be written."""
-    folder = _folder(_HERE / "search")
+    folder = _folder(_HERE / "search" / "astar.py")
     return folder and folder.parent
 
 
@@ -159,7 +160,7 @@ class _Kept:
     @property
     def cache_path(self) -> Path | None:
         """The folder; None if there is none that can be written."""
-        return _folder(Path(self._function.__code__.co_filename).parent)
+        return _folder(Path(self._function.__code__.co_filename))
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         """Return the code for a signature; None if it is not there, or damaged."""
@@ -198,7 +199,7 @@ class _Kept:
             return None
         values = _dumps(tuple(cell.cell_contents for cell in self._function.__closure__ or ()))
         key = (numba.__version__, sys.version_info, str(signature), codegen.magic_tuple(), values)
-        name = re.sub(r"[^\w.]", "", f"{Path(code.co_filename).stem}.{code.co_qualname}")
+        name = re.sub(r"[^\w.]", "", code.co_qualname)
         return folder / f"{name}-{code.co_firstlineno}.{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.nbc"
 
 
@@ -251,10 +252,19 @@ def _link(context: Any, symbols: frozenset[str], state: Any, *reduced: Any) -> A
     )
 
 
+def _compiling_sources() -> list[Path]:
+    """Return the modules of this package that have functions to compile."""
+    return [source for source in sorted(_HERE.glob("*/*.py")) if re.search(r"^@jit$", _text(source), re.M)]
+
+
 def _folders() -> list[Path]:
-    """Return the folders of compiled code of all subpackages that have some."""
-    packages = sorted({name.partition("/")[0] for name in decorated_names()})
-    return [folder for package in packages if (folder := _folder(_HERE / package))]
+    """Return the folders of compiled code of all modules that have some."""
+    return [folder for source in _compiling_sources() if (folder := _folder(source))]
+
+
+def _module(folder: Path) -> str:
+    """Return the module whose compiled code a folder holds, as "search.astar"."""
+    return folder.name.rpartition("-")[0]
 
 
 def _note() -> Path | None:
@@ -273,30 +283,83 @@ def _say(message: str) -> None:
 
 
 @cache
-def _folder(source: Path) -> Path | None:
-    """Return the folder of compiled code, named after the state of all sources in `source` and in `geometry`.
+def _text(source: Path) -> str:
+    """Return the text of a module."""
+    return source.read_text("utf-8")
 
-    A function's own file does not tell whether another that it calls into has changed. The folder is in
-    $NUMBA_CACHE_DIR, else in the user's cache directory or, if that cannot be written, in the system's temporary one,
-    where nobody else may write to it; None if there is none of them.
+
+@cache
+def _hash(source: Path) -> str:
+    """Return a hash of a module's name and text."""
+    return hashlib.sha256(f"{source.parent.name}/{source.name}\n{_text(source)}".encode()).hexdigest()
+
+
+@cache
+def _imported(source: Path) -> frozenset[Path]:
+    """Return the modules of this package that a module imports as it is loaded."""
+    found: set[Path] = set()
+    for package, names in _IMPORT.findall(_text(source)):
+        module = _HERE.joinpath(*package.split(".")) if package else _HERE
+        one, named = module.with_suffix(".py"), [module / f"{name}.py" for name in re.findall(r"\w+", names)]
+        found.update([one] if one.is_file() else filter(Path.is_file, named))
+    return frozenset(found)
+
+
+def _state(source: Path) -> str:
+    """Return a hash of the contents of a module and of all that it imports from this package, directly or not.
+
+    Compiled code holds what it calls and the constants that it reads, and these may be in other modules.
     """
-    here = Path(__file__)
-    files = [here, *sorted(here.parent.glob("geometry/*.py")), *sorted(source.glob("*.py"))]
-    state = hashlib.sha256(repr([(str(file), file.stat().st_mtime_ns) for file in files]).encode()).hexdigest()[:16]
+    found, left = {source}, [source]
+    while left:
+        new = _imported(left.pop()) - found
+        found |= new
+        left += new
+    return hashlib.sha256("".join(sorted(map(_hash, found))).encode()).hexdigest()[:16]
+
+
+@cache
+def _folder(source: Path) -> Path | None:
+    """Return the folder of a module's compiled code, named after the module and its state.
+
+    Neither the path of the package nor the age of its files matters, so environments share compiled code. The folder is
+    in $NUMBA_CACHE_DIR, else in the user's cache directory, else in the system's temporary one; None if none of
+    them can be written.
+    """
+    name = f"{source.parent.name}.{source.stem}-{_state(source)}"
     own = os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("motionmind", appauthor=False)
     for temporary in (False, True):
         with suppress(OSError, ValueError):
-            place = _temporary() if temporary else Path(own)
-            folder = place / "compiled" / f"{source.name}-{state}"
+            place = (_temporary() if temporary else Path(own)) / "compiled"
+            folder = place / name
+            _make_private(place)
             is_new = not folder.is_dir()
             make_folder(folder)
             if os.access(folder, os.W_OK):
                 os.utime(folder)
                 if is_new:
-                    _remove_unused(folder.parent)
+                    _remove_unused(place)
                 return folder
     _say(f"compiled code can be kept neither in {own} nor among temporary files; each run compiles it again")
     return None
+
+
+def _make_private(place: Path) -> None:
+    """Make a folder that nobody else may write to, since loading compiled code runs it; OSError if it is another's.
+
+    The content of one that others could have written to is removed.
+    """
+    make_folder(place.parent)
+    with suppress(FileExistsError):
+        place.mkdir(mode=0o700)
+    if not hasattr(os, "getuid"):
+        return
+    found = place.lstat()
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid not in (os.getuid(), 0):
+        raise PermissionError(f"{place} belongs to somebody else")
+    if found.st_mode & 0o022 and found.st_uid == os.getuid():
+        shutil.rmtree(place)
+        place.mkdir(mode=0o700)
 
 
 def _remove_unused(place: Path) -> None:
@@ -304,7 +367,7 @@ def _remove_unused(place: Path) -> None:
 
     Whoever comes for it now compiles it again.
     """
-    for found in [*place.glob("*-" + "[0-9a-f]" * 16), *place.glob("all-" + "[0-9a-f]" * 24)]:
+    for found in [*place.glob("*.*-" + "[0-9a-f]" * 16), *place.glob("all-" + "[0-9a-f]" * 24)]:
         with suppress(OSError):
             if time.time() - found.lstat().st_mtime > _MONTH:
                 if found.is_dir():

@@ -17,26 +17,59 @@ from motionmind import jit as door
 DAY = 86400.0  # seconds
 
 
-def state(folder: Path) -> Path | None:
-    """Where code of a folder is kept, as a new process would find it."""
-    return door._folder.__wrapped__(folder)
+def state(source: Path) -> Path | None:
+    """Where code of a module is kept, as a new process would find it."""
+    for cached in (door._text, door._hash, door._imported):
+        cached.cache_clear()
+    return door._folder.__wrapped__(source)
 
 
-def test_a_source_that_changes_has_all_of_its_folder_compiled_anew_and_no_other(
+def test_code_is_compiled_anew_for_the_contents_of_its_module_and_of_what_that_imports(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    one, other = tmp_path / "one", tmp_path / "other"
-    for folder in (one, other):
-        folder.mkdir()
-        for name in ("loops.py", "helpers.py"):
-            (folder / name).write_text("")
-    before = state(one), state(other)
-    assert before[0] != before[1]
-    assert before == (state(one), state(other))
-    os.utime(one / "helpers.py", ns=(1, 1))
-    assert state(one) != before[0]
-    assert state(other) == before[1]
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    names = ("loops", "limits", "plain")
+    here, there = tmp_path / "here/motionmind", tmp_path / "there/motionmind"
+    for package in (here, there):
+        (package / "search").mkdir(parents=True)
+        monkeypatch.setattr(door, "_HERE", package)
+        (package / "search/limits.py").write_text("MOST = 1\n")
+        (package / "search/loops.py").write_text("from motionmind.search.limits import (\n    MOST,\n)\n")
+        (package / "search/plain.py").write_text("from motionmind.search import loops\n")
+
+    def states(package: Path) -> list[Path | None]:
+        monkeypatch.setattr(door, "_HERE", package)
+        return [state(package / f"search/{name}.py") for name in names]
+
+    before = states(here)
+    assert len(set(before)) == 3
+    os.utime(here / "search/loops.py", ns=(1, 1))
+    assert states(here) == states(there) == before  # neither age nor place matters
+    (here / "search/plain.py").write_text("from motionmind.search import loops\nx = 1\n")
+    assert [one == other for one, other in zip(states(here), before, strict=True)] == [True, True, False]
+    (here / "search/limits.py").write_text("MOST = 2\n")
+    assert [one == other for one, other in zip(states(here), before, strict=True)] == [False, False, False]
+
+
+def test_compiled_code_that_others_could_have_written_is_removed_and_another_owners_is_not_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    source = Path(door.__file__).parent / "search/astar.py"
+    folder = state(source)
+    assert folder is not None
+    assert folder.parent == tmp_path / "compiled"
+    (folder / "f-1.nbc").write_bytes(b"code")
+    assert state(source) == folder
+    assert (folder / "f-1.nbc").exists()
+    folder.parent.chmod(0o777)
+    assert state(source) == folder
+    assert not (folder / "f-1.nbc").exists()
+    assert folder.parent.stat().st_mode & 0o777 == 0o700
+    if os.getuid() == 0:
+        os.chown(folder.parent, 12345, 12345)
+        monkeypatch.setattr(door, "_temporary", lambda: tmp_path / "elsewhere")
+        assert state(source) == tmp_path / "elsewhere/compiled" / folder.name
 
 
 @pytest.fixture
@@ -82,11 +115,11 @@ def test_what_was_not_used_for_a_month_is_removed_when_something_else_is_compile
         os.utime(found, (time.time() - days * DAY,) * 2)
         return found
 
-    old, recent = made(f"search-{1:016x}", 31.0), made(f"search-{2:016x}", 29.0)
+    old, recent = made(f"search.astar-{1:016x}", 31.0), made(f"search.astar-{2:016x}", 29.0)
     others = made("search-of-somebody-else", 400.0)
     (place / f"all-{1:024x}").touch()
     os.utime(place / f"all-{1:024x}", (0.0, 0.0))
-    mine = door._folder(Path(door.__file__).parent / "search")
+    mine = door._folder(Path(door.__file__).parent / "search/astar.py")
     assert mine is not None
     assert (old.exists(), recent.exists(), others.exists()) == (False, True, True)
     assert not list(place.glob("all-*"))
@@ -95,8 +128,8 @@ def test_what_was_not_used_for_a_month_is_removed_when_something_else_is_compile
     (mine / "code.nbc").write_bytes(b"code")
     os.utime(mine, (0.0, 0.0))
     door._folder.cache_clear()
-    assert door._folder(Path(door.__file__).parent / "search") == mine
-    assert door._folder(Path(door.__file__).parent / "render") is not None
+    assert door._folder(Path(door.__file__).parent / "search/astar.py") == mine
+    assert door._folder(Path(door.__file__).parent / "render/raster.py") is not None
     assert (mine / "code.nbc").exists()
 
 

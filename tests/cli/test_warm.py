@@ -110,6 +110,7 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
     place = jit.place_of_code()
     assert place is not None
     folder = tmp_path / "cache"
+    (folder / place.name).mkdir(0o700, parents=True)
     for one in [*jit._folders(), *place.glob("all-*")]:  # not what earlier states of the sources have left
         copy = shutil.copytree if one.is_dir() else shutil.copy
         copy(one, folder / place.name / one.name)
@@ -138,8 +139,8 @@ def test_the_first_search_alone_says_what_it_waits_for(is_first: bool, tmp_path:
     command = [sys.executable, "-m", "motionmind", "tween", "ballet/fifth", "ballet/fifth", "-o", "still.json"]
     warming.search()
     if is_first:  # all is there but what is compiled last, and so compiling takes the test no time
-        package, _, name = warming._LAST.partition("/")
-        for file in [*own_cache.glob("all-*"), *own_cache.glob(f"{package}-*/{name}-*.nbc")]:
+        module, _, name = warming._LAST.replace("/", ".").rpartition(".")
+        for file in [*own_cache.glob("all-*"), *own_cache.glob(f"{module}-*/{name}-*.nbc")]:
             file.unlink()
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert ("compiling" in done.stderr) == is_first

@@ -108,29 +108,20 @@ class Copy:
 
     @contextmanager
     def changed(self, mutant: Mutant) -> Iterator[None]:
-        """Make a mistake, and unmake it; the file is then as old as it was, so that code compiled from it is found."""
+        """Make a mistake, and unmake it."""
         path = self.folder / "motionmind" / mutant.file
-        source, was = path.read_text(encoding="utf-8"), path.stat()
+        source = path.read_text(encoding="utf-8")
         self._write(path, mutant.apply(source))
-        if not self._is_compiled(path):  # else it takes half a minute to compile what has not changed
-            os.utime(path, ns=(was.st_atime_ns, was.st_mtime_ns))
         try:
             yield
         finally:
             self._write(path, source)
-            os.utime(path, ns=(was.st_atime_ns, was.st_mtime_ns))
 
     def _write(self, path: Path, source: str) -> None:
         """Replace a module, and remove its bytecode."""
         path.write_text(source, encoding="utf-8")
         for bytecode in (path.parent / "__pycache__").glob(f"{path.stem}.*"):
             bytecode.unlink()
-
-    def _is_compiled(self, path: Path) -> bool:
-        """Return whether compiled code may come from a module: it, or one that compiles and imports from it."""
-        name = ".".join(path.relative_to(self.folder).with_suffix("").parts)
-        texts = {one: one.read_text(encoding="utf-8") for one in (self.folder / "motionmind").rglob("*.py")}
-        return any("motionmind.jit" in text and (one == path or name in text) for one, text in texts.items())
 
     def run(self, tests: Sequence[str], longest: float | None) -> int | None:
         """Run tests until one fails, and return pytest's exit code; None if they take too long, in seconds."""
