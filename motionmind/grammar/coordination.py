@@ -8,15 +8,15 @@ marginal and a the pseudo-count,
 
     P(c | p) = (N(p, c) + a m(c)) / (N(p) + a)
 
-If N(p, c) = 0, then -log P(c | p) = -log(a m(c)) + log(N(p) + a): a term of c and a term of p. Learning and search have
-it in that form, which is as large as the pairs that were seen. A pgmpy network (`fit_network`) says the same in dense
-tables, for whoever wants to ask other things of it.
+The network is a pgmpy one (`fit_network`), and the search's costs are read out of its tables. An unseen pair has
+N(p, c) = 0, and costs -log P(c | p) = -log(a m(c)) + log(N(p) + a): a term of c and a term of p. `Coordination` has
+that form, which is as large as the pairs that were seen, so a search loads neither pgmpy nor dense tables.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -27,11 +27,12 @@ from motionmind.executors.team import Team
 from motionmind.grammar.rows import insertion_points
 
 if TYPE_CHECKING:
+    from pgmpy.factors.discrete import TabularCPD
     from pgmpy.models import DiscreteBayesianNetwork
 
 
 PSEUDO_COUNT = 1.0  # virtual postures in the Dirichlet prior
-MOST_CELLS = 100_000_000  # of the dense tables of a network: 0.8 GB, and pgmpy copies them
+MOST_CELLS = 100_000_000  # in the dense tables of a network: 0.8 GB
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,56 +93,61 @@ class Coordination:
         return np.asarray(out)
 
 
-def count_coordination(
+def learn_coordination(
+    names: tuple[str, ...],
     parents: Ints,
     states: Int32s,
     sizes: Ints,
-    joints: int,
     weights: Floats | None = None,
     team: Team | None = None,
 ) -> Coordination:
-    """Count how joints coordinate.
+    """Learn how joints coordinate: fit the network, and read the search's costs out of its tables.
+
+    A network of more than MOST_CELLS cells is not built; the same formula then gives the costs of the pairs seen.
 
     Args:
+        names: names of the joints, which are the first J of L chains; other chains get no coordination.
         parents: parent chain [L], or -1.
         states: state of each chain in each posture [N, L].
         sizes: number of states of each chain [L].
-        joints: number of the first chains, which are joints; others get no coordination.
         weights: weight of each posture [N]; None for 1.
         team: threads, for which each joint is a job; None for this one.
     """
-    weights = np.ones(len(states)) if weights is None else np.asarray(weights)
+    coupled = np.where(np.arange(len(parents)) < len(names), parents, -1).astype(np.int64)
+    counted = _count(parents[: len(names)], states, sizes, weights, team)
+    is_dense = _cells(parents[: len(names)], sizes) <= MOST_CELLS
+    network = _network(names, parents, sizes, counted) if is_dense else None
+
     starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-    coupled = np.where(np.arange(len(parents)) < joints, parents, -1).astype(np.int64)
+    child_costs, parent_costs = np.zeros(starts[-1]), [np.zeros(0)]
+    pair_counts, pair_states, pair_costs = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
+    for j in np.flatnonzero(coupled >= 0):
+        pairs = counted[j]
+        likely, normaliser = _read(network.get_cpds(names[j]), pairs) if network else (pairs.likely(), pairs.normaliser)
+        child_costs[starts[j] : starts[j + 1]] = -np.log(pairs.prior)
+        parent_costs.append(np.log(normaliser))
+        pair_counts.append(np.bincount(pairs.above, minlength=len(pairs.visits)))
+        pair_states.append(pairs.below)
+        pair_costs.append(-np.log(likely))
     rows = np.where(coupled >= 0, np.asarray(sizes)[coupled], 0)
-    child_costs = np.zeros(starts[-1])
-
-    def count_pairs(j: int) -> tuple[Ints, Ints, Floats, Floats]:
-        parent = coupled[j]
-        prior = PSEUDO_COUNT * np.bincount(states[:, j], weights, sizes[j]) / weights.sum()
-        visits = np.bincount(states[:, parent], weights, sizes[parent]) + PSEUDO_COUNT
-        keys, which = np.unique(states[:, parent].astype(np.int64) * sizes[j] + states[:, j], return_inverse=True)
-        p, c = keys // sizes[j], keys % sizes[j]
-        costs = np.log(visits[p]) - np.log(np.bincount(which, weights, len(keys)) + prior[c])
-        child_costs[starts[j] : starts[j + 1]] = -np.log(prior)
-        return np.bincount(p, minlength=sizes[parent]), c, costs, np.log(visits)
-
-    none = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0)
-    found = (team or this_process()).map(count_pairs, np.flatnonzero(coupled >= 0).tolist())
-    pair_counts, pair_states, pair_costs, parent_costs = map(np.concatenate, zip(none, *found, strict=True))
     return Coordination(
         coupled,
         np.concatenate([[0], np.cumsum(rows)]).astype(np.int64),
-        np.concatenate([[0], np.cumsum(pair_counts)]).astype(np.int64),
-        pair_states.astype(np.int32),
-        pair_costs,
+        np.concatenate([[0], np.cumsum(np.concatenate(pair_counts))]).astype(np.int64),
+        np.concatenate(pair_states).astype(np.int32),
+        np.concatenate(pair_costs),
         child_costs,
-        parent_costs,
+        np.concatenate(parent_costs),
     )
 
 
 def fit_network(
-    names: tuple[str, ...], parents: Ints, states: Int32s, sizes: Ints, weights: Floats | None = None
+    names: tuple[str, ...],
+    parents: Ints,
+    states: Int32s,
+    sizes: Ints,
+    weights: Floats | None = None,
+    team: Team | None = None,
 ) -> DiscreteBayesianNetwork:
     """Fit a pgmpy network to a corpus's postures.
 
@@ -153,34 +159,107 @@ def fit_network(
         states: state of each joint in each posture [N, J].
         sizes: number of states of each joint [J].
         weights: weight of each posture [N]; None for 1.
+        team: threads, for which each joint is a job; None for this one.
 
     Raises:
         CorpusError: the network's tables would have more than MOST_CELLS cells.
     """
-    cells = sum(int(sizes[j]) * int(sizes[p]) for j, p in enumerate(parents) if p >= 0)
+    cells = _cells(parents, sizes)
     if cells > MOST_CELLS:
         raise CorpusError(
             f"a network over these states has {cells:,} cells, and can have {MOST_CELLS:,}: learn with a coarser "
             "tolerance, or read the coordination's lists of pairs"
         )
-    import pandas as pd
+    return _network(names, parents, sizes, _count(parents, states, sizes, weights, team))
+
+
+class _Pairs(NamedTuple):
+    """A joint's C states counted beside its parent's P states, of which Q pairs were seen; a root has one "parent".
+
+    Attributes:
+        above: the parent's state p in each pair, not decreasing [Q].
+        below: the joint's state c in each pair, increasing with the same p [Q].
+        together: N(p, c), the weight of the postures in both [Q].
+        visits: N(p), the weight of the postures in each state of the parent [P].
+        prior: a m(c), the virtual postures in each state of the joint [C].
+    """
+
+    above: Ints
+    below: Ints
+    together: Floats
+    visits: Floats
+    prior: Floats
+
+    @property
+    def normaliser(self) -> Floats:
+        """N(p) + a [P]."""
+        return self.visits + PSEUDO_COUNT
+
+    def likely(self) -> Floats:
+        """Return P(c | p) of each pair [Q]."""
+        return (self.together + self.prior[self.below]) / self.normaliser[self.above]
+
+    def table(self) -> Floats:
+        """Return P(c | p) of all pairs, seen or not [C, P]."""
+        table = self.prior[:, None] / self.normaliser
+        table[self.below, self.above] = self.likely()
+        return table
+
+
+def _count(parents: Ints, states: Int32s, sizes: Ints, weights: Floats | None, team: Team | None) -> tuple[_Pairs, ...]:
+    """Count each joint's states beside its parent's; arguments as of `fit_network`."""
+    weights = np.ones(len(states)) if weights is None else np.asarray(weights)
+
+    def count(j: int) -> _Pairs:
+        above = states[:, parents[j]].astype(np.int64) if parents[j] >= 0 else np.zeros(len(states), dtype=np.int64)
+        most = sizes[parents[j]] if parents[j] >= 0 else 1
+        visits = np.asarray(np.bincount(above, weights, most), dtype=np.float64)
+        keys, which = np.unique(above * sizes[j] + states[:, j], return_inverse=True)
+        together = np.asarray(np.bincount(which, weights, len(keys)), dtype=np.float64)
+        prior = PSEUDO_COUNT * np.bincount(states[:, j], weights, sizes[j]) / weights.sum()
+        return _Pairs(keys // sizes[j], keys % sizes[j], together, visits, prior)
+
+    return tuple((team or this_process()).map(count, range(len(parents))))
+
+
+def _cells(parents: Ints, sizes: Ints) -> int:
+    """Return how many cells the tables of joints with parents have."""
+    return sum(int(sizes[j]) * int(sizes[p]) for j, p in enumerate(parents) if p >= 0)
+
+
+def _network(
+    names: tuple[str, ...], parents: Ints, sizes: Ints, counted: tuple[_Pairs, ...]
+) -> DiscreteBayesianNetwork:
+    """Return the network of joints whose states are counted, checked by pgmpy; other arguments as of `fit_network`."""
+    from pgmpy.factors.discrete import TabularCPD
     from pgmpy.models import DiscreteBayesianNetwork
-    from pgmpy.parameter_estimator import DiscreteBayesianEstimator
 
     network = DiscreteBayesianNetwork()
     network.add_nodes_from(names)
-    network.add_edges_from((names[p], name) for name, p in zip(names, parents, strict=True) if p >= 0)
-    prior = {}
-    weights = np.ones(len(states)) if weights is None else np.asarray(weights)
+    network.add_edges_from((names[parents[j]], name) for j, name in enumerate(names) if parents[j] >= 0)
+    state_names = {name: list(range(sizes[j])) for j, name in enumerate(names)}
     for j, name in enumerate(names):
-        marginal = np.bincount(states[:, j], weights, sizes[j]) / weights.sum()
-        columns = sizes[parents[j]] if parents[j] >= 0 else 1
-        prior[name] = np.repeat(PSEUDO_COUNT * marginal[:, None], columns, axis=1)
-    estimator = DiscreteBayesianEstimator(
-        state_names={name: list(range(sizes[j])) for j, name in enumerate(names)},
-        prior_type="dirichlet",
-        pseudo_counts=prior,
-    )
-    frame = pd.DataFrame({name: states[:, j] for j, name in enumerate(names)})
-    network.add_cpds(*estimator.fit(network, frame, sample_weight=weights).parameters_)
+        above = [names[parents[j]]] if parents[j] >= 0 else []
+        network.add_cpds(
+            TabularCPD(
+                name,
+                len(state_names[name]),
+                counted[j].table(),
+                evidence=above,
+                evidence_card=[len(state_names[parent]) for parent in above],
+                state_names={one: state_names[one] for one in (name, *above)},
+            )
+        )
+    network.check_model()
     return network
+
+
+def _read(cpd: TabularCPD, pairs: _Pairs) -> tuple[Floats, Floats]:
+    """Read out of a joint's table P(c | p) of the pairs seen [Q], and N(p) + a for each state of the parent [P]."""
+    table = np.asarray(cpd.get_values(), dtype=np.float64)
+    seen = np.zeros(table.shape, dtype=np.bool_)
+    seen[pairs.below, pairs.above] = True
+    unseen, columns = np.argmin(seen, axis=0), np.arange(table.shape[1])
+    # An unseen pair's probability is a m(c) / (N(p) + a); a column without one has no use for its normaliser.
+    normaliser = np.where(seen.all(axis=0), pairs.normaliser, pairs.prior[unseen] / table[unseen, columns])
+    return table[pairs.below, pairs.above], normaliser

@@ -8,7 +8,7 @@ from motionmind._typing import Floats, Int32s, Ints
 from motionmind.executors.here import this_process
 from motionmind.executors.team import Team
 from motionmind.grammar.bridges import Bridges, find_bridges
-from motionmind.grammar.coordination import Coordination, count_coordination
+from motionmind.grammar.coordination import Coordination, learn_coordination
 from motionmind.grammar.transitions import Transitions, count_transitions
 
 
@@ -74,5 +74,5 @@ def learn(
         posture_weights=posture_weights,
         team=team,
     )
-    coordination = count_coordination(parents, states, sizes, joints, posture_weights, team)
+    coordination = learn_coordination(chains[:joints], parents, states, sizes, posture_weights, team)
     return Grammar(chains, centres, transitions, find_bridges(centres, transitions, team), coordination)

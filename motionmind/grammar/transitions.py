@@ -1,22 +1,26 @@
 """Joint graphs: the transitions between states in a corpus, their counts, and the postures that attest them.
 
-A *chain* is a joint, or the body's facing if that is a chain of its own. States are numbered from 0 in each chain;
-state s of chain j has the row `starts[j] + s` in flat arrays.
+A *chain* is a joint, or the body's facing if that is a chain of its own. Learning builds a networkx graph of the states
+of each chain, and flattens the graphs into the arrays that a search reads (`Transitions`), so a search need not load
+networkx. States are numbered from 0 in each chain; state s of chain j has the row `starts[j] + s` in flat arrays.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.executors.here import this_process
 from motionmind.executors.team import Team
 from motionmind.grammar.schemes import Weights
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +69,26 @@ class Transitions:
     def _width(self) -> int:
         """More than the number of states in any chain."""
         return int(self.sizes().max()) + 1
+
+    def graph(self, chain: int) -> nx.DiGraph:
+        """Return the joint graph of a chain, as learning built it.
+
+        Nodes are states, with `visits`. Edges are transitions, with `count`, `weight` (-log P(next | state), nats),
+        `seconds`, and the postures that they lead from and to where first made, `attests` and `arrives`.
+        """
+        first, last = self.starts[chain], self.starts[chain + 1]
+        edges = slice(self.indptr[first], self.indptr[last])
+        return _graph(
+            self.visits[first:last],
+            _Counted(
+                self.sources[edges] - first,
+                self.targets[edges],
+                self.counts[edges],
+                self.seconds[edges],
+                self.attests[edges],
+                self.arrives[edges],
+            ),
+        )
 
     def sizes(self) -> Ints:
         """Number of states in each chain [L]."""
@@ -151,60 +175,98 @@ def count_transitions(
     posture_weights = np.ones(len(states)) if posture_weights is None else posture_weights
     size = np.asarray(sizes, dtype=np.int64)
 
-    def count_chain(chain: int) -> tuple[_Counted, NDArray[Any]]:
+    def graph_of(chain: int) -> nx.DiGraph:
         src, dst = states[begins, chain].astype(np.int64), states[ends, chain].astype(np.int64)
         if chain == pooled:
-            turns = _count(np.zeros_like(src), (dst - src) % size[chain], size[chain], seconds, weights)
-            return _pool(turns), np.full(size[chain], posture_weights.sum() / size[chain])
-        visits = np.bincount(states[:, chain], weights=posture_weights, minlength=size[chain])
-        return _count(src, dst, size[chain], seconds, weights), visits
+            turns = _count(np.zeros_like(src), (dst - src) % size[chain], size[chain], begins, ends, seconds, weights)
+            return _graph(np.full(size[chain], posture_weights.sum() / size[chain]), _pool(turns, size[chain]))
+        visits = np.bincount(states[:, chain], weights=posture_weights, minlength=size[chain]).astype(np.float64)
+        return _graph(visits, _count(src, dst, size[chain], begins, ends, seconds, weights))
 
-    chains = range(states.shape[1])
-    counted, visits = zip(*(team or this_process()).map(count_chain, chains), strict=True)
-    starts = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
-    rows = np.concatenate([starts[chain] + one.sources for chain, one in enumerate(counted)])
-    leaving = np.bincount(rows, minlength=starts[-1])
+    return flatten((team or this_process()).map(graph_of, range(states.shape[1])))
+
+
+def flatten(graphs: Iterable[nx.DiGraph]) -> Transitions:
+    """Return the joint graphs of all chains, as `Transitions.graph` returns each, in flat arrays.
+
+    Args:
+        graphs: a graph for each chain, with its nodes, and the edges of each, in increasing order.
+    """
+    visits, leaving, counted = list[Floats](), list[Ints](), [_Counted.none()]
+    for graph in graphs:
+        visits.append(np.array([visited for _, visited in graph.nodes(data="visits")], dtype=np.float64))
+        leaving.append(np.array([degree for _, degree in graph.out_degree()], dtype=np.int64))
+        edges = graph.edges(data=True)
+        columns = zip(*((s, t, *(values[key] for key in _EDGE)) for s, t, values in edges), strict=True)
+        counted.append(_Counted(*map(np.array, columns)) if edges else _Counted.none())
+    _, targets, counts, seconds, attests, arrives = map(np.concatenate, zip(*counted, strict=True))
     return Transitions(
-        starts,
-        np.concatenate([[0], np.cumsum(leaving)]).astype(np.int64),
-        np.concatenate([one.targets for one in counted]).astype(np.int32),
-        np.concatenate([one.counts for one in counted]).astype(np.float64),
-        np.concatenate(visits).astype(np.float64),
-        np.concatenate([begins[one.first] for one in counted]).astype(np.int32),
-        np.concatenate([ends[one.first] for one in counted]).astype(np.int32),
-        np.concatenate([one.seconds for one in counted]).astype(np.float64),
+        np.cumsum([0, *map(len, visits)], dtype=np.int64),
+        np.cumsum(np.concatenate([np.zeros(1, np.int64), *leaving])),
+        targets.astype(np.int32),
+        counts,
+        np.concatenate(visits),
+        attests.astype(np.int32),
+        arrives.astype(np.int32),
+        seconds,
     )
+
+
+_EDGE = ("count", "seconds", "attests", "arrives")  # attributes of an edge that `_Counted` has
 
 
 class _Counted(NamedTuple):
-    """The transitions of one chain with `size` states, in the order of sources, then targets, each array [E_j]."""
+    """The transitions of one chain, in the order of sources, then targets, each [E_j]; fields as in `Transitions`."""
 
-    size: int
     sources: Ints
-    targets: Ints
+    targets: Ints | Int32s
     counts: Floats
-    first: Ints  # the first move that makes it
     seconds: Floats
+    attests: Ints | Int32s
+    arrives: Ints | Int32s
+
+    @classmethod
+    def none(cls) -> _Counted:
+        whole, real = np.zeros(0, np.int64), np.zeros(0)
+        return cls(whole, whole, real, real, whole, whole)
 
 
-def _count(sources: Ints, targets: Ints, size: int, seconds: Floats, weights: Floats) -> _Counted:
-    """Count the transitions that one chain makes in the moves [M] from `sources` to `targets`."""
+def _count(
+    sources: Ints, targets: Ints, size: int, begins: Ints, ends: Ints, seconds: Floats, weights: Floats
+) -> _Counted:
+    """Count the transitions that a chain of `size` states makes in the moves [M] from `sources` to `targets`."""
     keys, first, which = np.unique(sources * size + targets, return_index=True, return_inverse=True)
     counts = np.asarray(np.bincount(which, weights=weights, minlength=len(keys)), dtype=np.float64)
     mean = np.bincount(which, weights=weights * seconds, minlength=len(keys)) / counts
-    return _Counted(size, keys // size, keys % size, counts, first, mean)
+    return _Counted(keys // size, keys % size, counts, mean, begins[first], ends[first])
 
 
-def _pool(turns: _Counted) -> _Counted:
-    """Let every state of a circle make the turns that were counted as transitions from state 0."""
-    size = turns.size
+def _pool(turns: _Counted, size: int) -> _Counted:
+    """Let every state of a circle of `size` states make the turns that were counted as transitions from state 0."""
     targets = (np.arange(size)[:, None] + turns.targets[None, :]) % size
     order = np.argsort(targets, axis=1)
     return _Counted(
-        size,
         np.repeat(np.arange(size), len(turns.targets)),
         np.take_along_axis(targets, order, 1).ravel(),
         turns.counts[order].ravel(),
-        turns.first[order].ravel(),
         turns.seconds[order].ravel(),
+        turns.attests[order].ravel(),
+        turns.arrives[order].ravel(),
     )
+
+
+def _graph(visits: Floats, counted: _Counted) -> nx.DiGraph:
+    """Return the joint graph of a chain; its states' visits are [S]."""
+    import networkx as nx
+
+    leaving = np.bincount(counted.sources, counted.counts, len(visits))
+    weights = np.log(leaving[counted.sources]) - np.log(counted.counts)
+    graph = nx.DiGraph()
+    graph.add_nodes_from((state, {"visits": visited}) for state, visited in enumerate(visits.tolist()))
+    graph.add_edges_from(
+        (source, target, {"weight": weight, **dict(zip(_EDGE, values, strict=True))})
+        for weight, source, target, *values in zip(
+            weights.tolist(), *(array.tolist() for array in counted), strict=True
+        )
+    )
+    return graph

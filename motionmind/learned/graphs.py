@@ -23,44 +23,29 @@ def joint_graph(learned: LearnedCorpus, joint: str) -> nx.DiGraph:
 
     Nodes are states, with `orientation` (x, y, z, w), `visits`, `label` and `given`: the states of the parent joint
     that make it likeliest, each with P(state | parent's state), of those seen with it. Edges are attested transitions,
-    with `count`, `weight` (-log P(next | state), nats) and `seconds`. The graph knows its `corpus`, `joint` and
-    `parent`, None where it has none.
+    with `count`, `weight` (-log P(next | state), nats), `seconds`, and the postures of the corpus that they lead from
+    and to where first made, `attests` and `arrives`. The graph knows its `corpus`, `joint` and `parent`, None where it
+    has none.
 
     Raises:
         SkeletonError: the corpus has no such joint.
     """
-    import networkx as nx
-
     check_text("joint", joint)
-    graph, chain = learned.grammar.transitions, learned.space.index(joint)
-    first, last = graph.starts[chain], graph.starts[chain + 1]
-    weights = graph.weights("conditional")
+    chain = learned.space.index(joint)
     parent = int(learned.grammar.coordination.parents[chain])
-    above = learned.corpus.chains[parent] if parent >= 0 else None
-    out = nx.DiGraph(corpus=learned.corpus.name, joint=joint, parent=above)
+    graph = learned.grammar.transitions.graph(chain)
+    graph.graph.update(
+        corpus=learned.corpus.name, joint=joint, parent=learned.corpus.chains[parent] if parent >= 0 else None
+    )
     given = _likeliest_parents(learned, chain, parent)
-    for state, row in enumerate(range(first, last)):
-        out.add_node(
-            state,
-            orientation=tuple(map(float, learned.space.centres[row])),
-            visits=float(graph.visits[row]),
-            label=learned.space.label(chain, state),
-            given=given[state],
-        )
-    for row in range(first, last):
-        for edge in range(graph.indptr[row], graph.indptr[row + 1]):
-            out.add_edge(
-                row - int(first),
-                int(graph.targets[edge]),
-                count=float(graph.counts[edge]),
-                weight=float(weights[edge]),
-                seconds=float(graph.seconds[edge]),
-            )
-    return out
+    for state, values in graph.nodes(data=True):
+        values["orientation"] = tuple(map(float, learned.space.of(chain)[state]))
+        values["label"], values["given"] = learned.space.label(chain, state), given[state]
+    return graph
 
 
 def network(learned: LearnedCorpus) -> DiscreteBayesianNetwork:
-    """Return the coordination as a pgmpy network over the joints, whose tables say the same as the search's costs."""
+    """Return the coordination as a pgmpy network over the joints: the one whose tables gave the search its costs."""
     joints = len(learned.corpus.skeleton)
     parents, sizes = learned.corpus.chain_parents[:joints], learned.space.sizes[:joints]
     states, weights = np.asarray(learned.states[:, :joints]), learned.corpus.weights

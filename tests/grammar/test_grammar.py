@@ -22,10 +22,11 @@ from toys import solution
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.errors import CorpusError
 from motionmind.geometry import rotations as rot
+from motionmind.grammar import coordination
 from motionmind.grammar.bridges import NEAREST, WITHIN, Bridges, _Neighbours, find_bridges
-from motionmind.grammar.coordination import PSEUDO_COUNT, Coordination, count_coordination, fit_network
+from motionmind.grammar.coordination import PSEUDO_COUNT, Coordination, fit_network, learn_coordination
 from motionmind.grammar.grammar import Grammar, learn
-from motionmind.grammar.transitions import Transitions, Weights, count_transitions
+from motionmind.grammar.transitions import Transitions, Weights, count_transitions, flatten
 from motionmind.search.problem import Model, Problem, Rules
 from motionmind.tween.problem import build_model, couplings
 
@@ -210,6 +211,20 @@ def test_postures_without_moves_teach_no_transitions() -> None:
     np.testing.assert_array_equal(graph.edges(np.zeros((3, 2), np.int32)), -1)
 
 
+def test_flat_arrays_are_those_of_the_networkx_graphs_and_back(seed: int) -> None:
+    graph = grammar(seed).transitions
+    graphs = [graph.graph(chain) for chain in range(len(graph.sizes()))]
+    for name, array in vars(flatten(graphs)).items():
+        np.testing.assert_array_equal(array, getattr(graph, name), strict=True)
+    for chain, one in enumerate(graphs):
+        first = graph.starts[chain]
+        assert list(one.nodes) == list(range(graph.sizes()[chain]))
+        assert dict(one.nodes(data="visits")) == dict(enumerate(graph.visits[first : graph.starts[chain + 1]]))
+        assert {(s, t): count for s, t, count in one.edges(data="count")} == edges(graph, chain)
+        for s, t, weight in one.edges(data="weight"):
+            assert weight == graph.weights("conditional")[graph.edge(chain, s, t)]
+
+
 # --- bridges ---------------------------------------------------------------------------------------------------------
 
 
@@ -354,6 +369,56 @@ def test_the_facing_coordinates_with_nothing(seed: int) -> None:
     assert net.pair_starts[facing] == net.pair_starts[facing + 1]
 
 
+def test_the_network_is_what_pgmpys_own_estimator_fits(seed: int) -> None:
+    import pandas as pd
+    from pgmpy.models import DiscreteBayesianNetwork
+    from pgmpy.parameter_estimator import DiscreteBayesianEstimator
+
+    body = corpus(seed)
+    names = body.names[: body.joints]
+    columns = [body.sizes[p] if p >= 0 else 1 for p in body.parents[: body.joints]]
+    priors = {
+        name: np.repeat(np.bincount(body.states[:, j], minlength=body.sizes[j])[:, None], columns[j], axis=1)
+        for j, name in enumerate(names)
+    }
+    estimator = DiscreteBayesianEstimator(
+        state_names={name: list(range(body.sizes[j])) for j, name in enumerate(names)},
+        prior_type="dirichlet",
+        pseudo_counts={name: PSEUDO_COUNT * prior / len(body.states) for name, prior in priors.items()},
+    )
+    network = DiscreteBayesianNetwork()
+    network.add_nodes_from(names)
+    network.add_edges_from((names[p], names[j]) for j, p in enumerate(body.parents[: body.joints]) if p >= 0)
+    frame = pd.DataFrame({name: body.states[:, j] for j, name in enumerate(names)})
+    for theirs in estimator.fit(network, frame).parameters_:
+        np.testing.assert_allclose(
+            cpds(body)[names.index(theirs.variable)], theirs.get_values(), rtol=0.0, atol=5e-15, err_msg=theirs.variable
+        )
+
+
+def test_costs_are_read_out_of_the_networks_tables(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Halve each entry of each table on the way, and every cost of a pair rises by log 2."""
+    from pgmpy.factors.discrete import TabularCPD
+
+    before, values = corpus(seed).learned().coordination, TabularCPD.get_values
+    monkeypatch.setattr(TabularCPD, "get_values", lambda cpd: 0.5 * values(cpd))
+    after, body = corpus(seed).learned().coordination, corpus(seed)
+    starts = grammar(seed).transitions.starts
+    for chain in np.flatnonzero(before.parents >= 0):
+        seen = set(zip(body.states[:, body.parents[chain]].tolist(), body.states[:, chain].tolist(), strict=True))
+        for p, c in product(range(body.sizes[body.parents[chain]]), range(body.sizes[chain])):
+            rise = after.cost(chain, p, c, starts) - before.cost(chain, p, c, starts)
+            assert rise == pytest.approx(np.log(2.0)), (chain, p, c, (p, c) in seen)
+
+
+def test_costs_are_the_same_where_the_tables_are_too_large_to_build(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = grammar(seed).coordination
+    monkeypatch.setattr(coordination, "MOST_CELLS", 0)
+    after = corpus(seed).learned().coordination
+    for name, array in vars(before).items():
+        np.testing.assert_allclose(getattr(after, name), array, rtol=0.0, atol=5e-15)
+
+
 def test_a_network_that_is_too_large_is_refused_before_it_is_made() -> None:
     sizes = np.array([20_000, 20_000])
     with pytest.raises(CorpusError, match=r"has 400,000,000 cells, and can have 100,000,000: learn with a coarser"):
@@ -363,7 +428,7 @@ def test_a_network_that_is_too_large_is_refused_before_it_is_made() -> None:
 def test_coordination_takes_no_more_than_what_was_seen() -> None:
     """The dense table of these states would take 80 GB."""
     states = np.stack([np.arange(100_000), np.arange(100_000)[::-1]], axis=1).astype(np.int32)
-    found = count_coordination(np.array([-1, 0]), states, np.array([100_000, 100_000]), 2)
+    found = learn_coordination(("hip", "knee"), np.array([-1, 0]), states, np.array([100_000, 100_000]))
     assert found.pair_costs.shape == (100_000,)
     starts = np.array([0, 100_000, 200_000])
     assert found.cost(1, 0, 99_999, starts) == pytest.approx(-np.log((1.0 + 1e-5) / 2.0))

@@ -510,7 +510,7 @@ engine = Engine.load(sys.argv[1])
 tween = engine.tween(read_posture(sys.argv[2]), read_posture(sys.argv[3]))
 write_motion(sys.argv[4] + ".bvh", tween.motion)
 write_motion(sys.argv[4] + ".json", tween.motion)
-heavy = {"pgmpy", "pandas", "matplotlib", "torch", "sklearn"} & set(sys.modules)
+heavy = {"pgmpy", "networkx", "pandas", "matplotlib", "torch", "sklearn"} & set(sys.modules)
 assert not heavy, heavy
 """
 
@@ -529,6 +529,45 @@ def test_fresh_processes_write_the_same_bytes_and_import_nothing_heavy(six_segme
         )
     for suffix in ("bvh", "json"):
         assert (tmp_path / f"1.{suffix}").read_bytes() == (tmp_path / f"2.{suffix}").read_bytes()
+
+
+STUBBED = """
+import sys
+from motionmind import Engine, read_motion
+sys.modules[sys.argv[3]] = None  # importing it raises ModuleNotFoundError
+motion = read_motion(sys.argv[2])
+print(Engine.load(sys.argv[1]).tween(motion.posture(0), motion.posture(3)).status)
+try:
+    Engine.fit([motion])
+except ModuleNotFoundError as error:
+    print("no", error.name.partition(".")[0])
+"""
+
+
+@pytest.mark.parametrize("library", ["pgmpy", "networkx"])
+def test_a_corpus_is_learned_with_pgmpy_and_networkx_and_a_tween_found_without(
+    six_segments: Engine, tmp_path: Path, library: str
+) -> None:
+    six_segments.save(tmp_path / "insects")
+    write_motion(tmp_path / "clip.json", CLIPS[0])
+    command = [sys.executable, "-c", STUBBED, str(tmp_path / "insects"), str(tmp_path / "clip.json"), library]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert done.stdout.split("\n") == ["optimal", f"no {library}", ""]
+
+
+def test_the_network_and_the_joint_graphs_of_a_loaded_corpus_are_those_that_were_learned(
+    six_segments: Engine, tmp_path: Path
+) -> None:
+    six_segments.save(tmp_path / "insects")
+    loaded = Engine.load(str(tmp_path / "insects"))
+    for joint in six_segments.corpus.chains:
+        one, other = (engine.joint_graph(joint) for engine in (six_segments, loaded))
+        assert (one.graph, one.nodes, one.adj) == (other.graph, other.nodes, other.adj)
+    theirs = loaded.network()
+    assert theirs.check_model()
+    for cpd in six_segments.network().get_cpds():
+        assert cpd == theirs.get_cpds(cpd.variable)
+        np.testing.assert_array_equal(cpd.get_values(), theirs.get_cpds(cpd.variable).get_values())
 
 
 # --- recorded movement ------------------------------------------------------------------------------------------------
