@@ -28,14 +28,17 @@ DIRECTIONS = 6  # in which postures are seen by a tree; it finds little in more
 LOOKED_AT = 32  # founders that are compared with a posture at most, those that look nearest
 BLOCK = 2048  # postures that are compared at a time
 SHOWN = 4096  # postures that show the directions
-SLACK = 1e-6  # of rounding, in squared distances
+SLACK = 1e-6  # of rounding, in squared distances seen along few directions
+# Squared distances, radians^2, that differ by less are a tie. Rounding makes differences of 1e-15, and of 13,932
+# memberships in recordings of one dancer (cmu-05) 15 are exact ties, from frames that the recording repeats.
+TIE = 1e-12
 
 
 def clusters_of(skeleton: Skeleton, orientations: Floats, workshop: Workshop | None = None) -> Int32s:
     """Cluster the postures of each part of a body: [N, P], with parts as in `parts_of` and clusters numbered from 0.
 
     In order, a posture founds a cluster unless a founder lies within ALIKE; then each joins its nearest founder, the
-    first of those that are equally near.
+    first of those that are equally near (TIE).
 
     Args:
         skeleton: the body.
@@ -64,7 +67,7 @@ def clusters(orientations: Floats, within: float, workshop: Workshop | None = No
     for start in range(0, len(orientations), BLOCK):
         far = np.arange(start, min(start + BLOCK, len(orientations)))
         for tree in forest:
-            far = far[_nearest(tree, orientations, seen, far, within)[0] > within]
+            far = far[_nearest(tree, orientations, seen, far, within)[0] > within + TIE]
         founding = _found(np.ascontiguousarray(orientations[far]), np.ascontiguousarray(seen[far]), within)
         _plant(forest, far[founding], seen)
         founders = np.concatenate([founders, far[founding]])
@@ -131,7 +134,8 @@ def _points(orientations: Floats) -> Floats:
 def _nearest(
     tree: _Tree, orientations: Floats, seen: Floats, postures: Ints, enough: float = -1.0
 ) -> tuple[Floats, Ints]:
-    """Return the least squared distance of each of n postures to a founder [n], and the first such founder's place [n].
+    """Return the least squared distance of each of n postures to a founder [n], and the place of the first founder that
+    is as near [n].
 
     Args:
         tree: of the founders.
@@ -199,7 +203,7 @@ def _search(
 ) -> int:
     """Write the least distances of postures, and the first founder each is of (`_nearest`); return how many founders
     were compared. Those that look nearest are compared, `most` at most, until no other can be nearer."""
-    compared, near, at = 0, np.empty(most), np.empty(most, np.int64)
+    compared, near, at, distances = 0, np.empty(most), np.empty(most, np.int64), np.empty(most)
     nodes, gaps = np.empty(64, np.int64), np.empty(64)  # twice as many as there are levels
     for i in range(len(postures)):
         here, own = seen[postures[i]], orientations[postures[i]]
@@ -230,13 +234,16 @@ def _search(
                 first = at[0]
                 compared += 1
                 limit = min(limit, squared_distance(own, orientations[founders[first]]) * (1.0 + SLACK) + SLACK)
-        for k in range(count):
-            if near[k] > least[i] * (1.0 + SLACK) + SLACK or least[i] <= enough:
-                break
-            compared += 1
-            distance = _distance_within(own, orientations[founders[at[k]]], least[i])
-            if distance < least[i] or (distance == least[i] and at[k] < place[i]):
-                least[i], place[i] = distance, at[k]
+        tried = 0
+        while tried < count and near[tried] <= least[i] * (1.0 + SLACK) + SLACK and least[i] > enough + TIE:
+            distances[tried] = _distance_within(own, orientations[founders[at[tried]]], least[i] + TIE)
+            least[i] = min(least[i], distances[tried])
+            tried += 1
+        compared += tried
+        place[i] = len(founders)
+        for k in range(tried):
+            if distances[k] <= least[i] + TIE:
+                place[i] = min(place[i], at[k])
     return compared
 
 
@@ -287,7 +294,7 @@ def _found(orientations: Floats, seen: Floats, within: float) -> Ints:
             for d in range(seen.shape[1]):
                 bound += (seen[i, d] - seen[founders[k], d]) ** 2
             if bound <= within * (1.0 + SLACK) + SLACK and (
-                squared_distance(orientations[i], orientations[founders[k]]) <= within
+                squared_distance(orientations[i], orientations[founders[k]]) <= within + TIE
             ):
                 alone = False
                 break

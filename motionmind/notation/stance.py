@@ -247,7 +247,8 @@ def _reach(bones: _Bones, target: Floats, towards: Floats) -> tuple[Floats, Floa
     slant = np.arctan2(bones.ankle[2], -bones.ankle[1])
     far = np.linalg.norm(target, axis=-1)
     cosine = (far**2 - thigh**2 - shank**2) / (2.0 * thigh * shank)
-    bend = np.arccos(np.clip(cosine, -1.0, 1.0)) + slant
+    # Rounded: near a straight leg the arc cosine would turn the last bit of its argument into 1e-8 radians.
+    bend = np.arccos(np.clip(np.round(cosine, 12), -1.0, 1.0)) + slant
     knee = rot.from_axis_angle([1.0, 0.0, 0.0], bend)
     end = bones.knee + rot.mul_vec(knee, bones.ankle)
     down = target / np.maximum(far, 1e-9)[:, None]

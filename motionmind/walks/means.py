@@ -7,7 +7,9 @@ import numpy as np
 from motionmind._typing import Floats, Ints
 from motionmind.jit import jit
 
-COUNTS = 1e-6  # the least weight that counts in a mean
+# Orientations of less weight are left out of a mean; from here to twice as much, their weight rises from 0 to its own.
+# At a sudden threshold the last bit of a weight would decide whether the orientation is in the mean.
+COUNTS = 1e-6
 
 
 @jit
@@ -54,12 +56,12 @@ def mean_of_parts(
 
 @jit
 def that_count(weights: Floats) -> Ints:
-    """Return which of some orientations have a weight that counts in any of the means [S, N]: [n]."""
+    """Return which of some orientations have a weight of more than COUNTS in any of the means [S, N]: [n]."""
     most = weights[0].copy()
     for t in range(1, len(weights)):
         for i in range(len(most)):
             most[i] = max(most[i], weights[t, i])
-    return np.flatnonzero(most >= COUNTS)
+    return np.flatnonzero(most > COUNTS)
 
 
 @jit
@@ -78,7 +80,7 @@ def counted(size: float, weights: Floats, counts: Ints) -> Floats:
     for i in range(len(counts)):
         for t in range(len(weights)):
             weight = size * weights[t, counts[i]]
-            out[i, t] = weight if weight >= COUNTS else 0.0
+            out[i, t] = max(min(weight, 2.0 * (weight - COUNTS)), 0.0)
     return out
 
 

@@ -51,6 +51,20 @@ def test_clusters_are_those_of_all_comparisons(seed: int, joints: int, pace: flo
     np.testing.assert_array_equal(found[17:23], found[40:46])
 
 
+@given(seed=st.integers(0, 2**32 - 1), joints=st.integers(1, 4))
+def test_of_founders_that_are_equally_near_the_first_has_the_posture_whatever_the_last_digit(
+    seed: int, joints: int
+) -> None:
+    """Founders lie on both sides of a posture, at equal angles, which rounding makes unequal either way."""
+    rng = np.random.default_rng(seed)
+    middle, turn = rot.exp(rng.normal(0.0, 1.0, (joints, 3))), rng.normal(0.0, 1.0, (joints, 3))
+    turn *= 0.9 * ALIKE / np.linalg.norm(turn, axis=-1, keepdims=True)
+    ends = [rot.mul(middle, rot.exp(sign * turn)) for sign in (1.0, -1.0)]
+    noise = rng.normal(0.0, 1e-16, (20, joints, 4))
+    postures = np.stack([*ends, *(middle + noise)])
+    np.testing.assert_array_equal(clusters.clusters(postures, joints * ALIKE**2), [0, 1, *[0] * 20])
+
+
 def test_of_many_that_all_differ_few_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of twice as many postures, all of them clusters of their own, no more than twice as many are compared."""
     compared, search = [0], clusters._search
