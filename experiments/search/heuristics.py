@@ -88,12 +88,11 @@ def weaken(model: Model, pairs: list[Ends], expansions: int) -> None:
         optimum = answer.cost - RULES.per_move * moves
         for name, estimate in heuristics(trellis):
             path = np.zeros(len(trellis.dom_ptr) - 1, np.int64)
-            best, lower, expanded, _ = astar.search(
-                trellis, estimate, np.inf, astar.SAME, path, expansions, expansions, ON
-            )
-            assert lower <= optimum + bounding.PROVEN <= best + 2 * bounding.PROVEN
+            found = astar.search(trellis, estimate, np.inf, astar.SAME, path, expansions, expansions, ON)
+            assert found.lower_bound <= optimum + bounding.PROVEN <= found.cost + 2 * bounding.PROVEN
             short = max(1.0 - heuristic.from_start(estimate) / optimum, 0.0) if optimum else 0.0
-            rows.setdefault(name, []).append((short, expanded, lower > best - bounding.PROVEN))
+            proved = found.lower_bound > found.cost - bounding.PROVEN
+            rows.setdefault(name, []).append((short, found.expansions, proved))
     for name, row in rows.items():
         short, expanded, proved = zip(*row, strict=True)
         print(f"| {len(model.parents)} chains: {name} | {np.median(short):.2%} |", end=" ")

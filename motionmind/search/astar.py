@@ -31,7 +31,7 @@ SAME = 1e-9
 KEPT = 0.75  # share of the memory that is kept when it is full; more costs time, less makes more nodes anew
 FEWEST_BUCKETS = 1 << 10  # of the hash table; their number grows with the nodes
 
-_FREE, _FRESH, _HEAPED, _NODES, _PEAK, _EXPANDED, _BUCKETS = range(7)  # entries of the tally
+_FREE, _FRESH, _HEAPED, _NODES, _PEAK, _EXPANDED, _FORGOTTEN, _BUCKETS = range(8)  # entries of the tally
 
 
 class _Nodes(NamedTuple):
@@ -54,6 +54,24 @@ class _Nodes(NamedTuple):
     tally: Ints
 
 
+class Found(NamedTuple):
+    """The result of a search.
+
+    Attributes:
+        cost: of the best path found, nats; what it had to be cheaper than if none was.
+        lower_bound: no path costs less than this, nats.
+        expansions: number of nodes expanded.
+        peak_nodes: greatest number of nodes held at once.
+        forgotten: number of nodes forgotten because memory was full; 0 if it never was.
+    """
+
+    cost: float
+    lower_bound: float
+    expansions: int
+    peak_nodes: int
+    forgotten: int
+
+
 @jit
 def search(
     trellis: Trellis,
@@ -64,7 +82,7 @@ def search(
     budget: int,
     expansions: int,
     ended: Bools,
-) -> tuple[float, float, int, int]:
+) -> Found:
     """Search for a path that costs less than `cost`.
 
     Args:
@@ -77,10 +95,6 @@ def search(
         budget: nodes held at most.
         expansions: nodes expanded at most.
         ended: set from another thread to stop the search after the next expansion [1].
-
-    Returns:
-        The cost of the best path found, or `cost`; a lower bound on the cost of every path; the number of expansions;
-        and the greatest number of nodes held.
     """
     nodes = _root(trellis, from_start(heuristic), budget)
     known = lower = cost
@@ -99,7 +113,8 @@ def search(
             lower = min(nodes.key[node], nodes.key[nodes.heap[0]] if nodes.tally[_HEAPED] else np.inf)
             break
         _release(nodes, node)
-    return cost, min(lower, cost), nodes.tally[_EXPANDED], nodes.tally[_PEAK]
+    tally = nodes.tally
+    return Found(cost, min(lower, cost), tally[_EXPANDED], tally[_PEAK], tally[_FORGOTTEN])
 
 
 @jit
@@ -161,7 +176,7 @@ def _root(trellis: Trellis, bound: float, budget: int) -> _Nodes:
         np.empty(buckets, np.int32),
         np.empty(budget, np.int32),
         np.empty(budget, np.int32),
-        np.zeros(7, np.int64),
+        np.zeros(8, np.int64),
     )
     nodes.tally[_BUCKETS] = min(buckets, FEWEST_BUCKETS)
     nodes.bucket[: nodes.tally[_BUCKETS]] = -1
@@ -223,6 +238,7 @@ def _forget(nodes: _Nodes, current: int) -> bool:
             nodes.slot[parent] = max(nodes.slot[parent], 0)
             nodes.slot[node] = -1
             _drop(nodes, node)
+            nodes.tally[_FORGOTTEN] += 1
             node = parent
         if listed and kept[node]:
             nodes.heap[nodes.tally[_HEAPED]], nodes.slot[node] = node, nodes.tally[_HEAPED]

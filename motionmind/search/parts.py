@@ -69,14 +69,12 @@ def _search_at_once(state: Bounded, nodes: int, budget: int, attention: Attentio
         return Effort()
     chosen = np.zeros(len(state.trellis.dom_ptr) - 1, dtype=np.int64)
     slack = PROVEN + 2.0 * HAIR if state.closed else astar.SAME
-    cost, lower_bound, expansions, held = attention.run(
-        astar.search, state.trellis, state.heuristic, state.limit, slack, chosen, nodes, budget
-    )
-    if cost < state.limit:
-        state.take(path_cost(state.trellis, chosen), states_of(state.trellis, chosen), lower_bound)
+    found = attention.run(astar.search, state.trellis, state.heuristic, state.limit, slack, chosen, nodes, budget)
+    if found.cost < state.limit:
+        state.take(path_cost(state.trellis, chosen), states_of(state.trellis, chosen), found.lower_bound)
     else:
-        state.lower_bound = min(max(state.lower_bound, lower_bound), state.cost)
-    return Effort(expansions, held)
+        state.lower_bound = min(max(state.lower_bound, found.lower_bound), state.cost)
+    return Effort(found.expansions, found.peak_nodes)
 
 
 def _descend(state: Bounded) -> Ints:

@@ -36,8 +36,7 @@ class Case:
     bound: float
     optimum: float
 
-    def search(self, budget: int, expansions: int = ENOUGH, cost: float = np.inf) -> tuple[float, float, int, int]:
-        """Cost, bound, expansions and peak of nodes of A*."""
+    def search(self, budget: int, expansions: int = ENOUGH, cost: float = np.inf) -> astar.Found:
         path = np.zeros(len(self.trellis.dom_ptr) - 1, np.int64)
         on = np.zeros(1, dtype=bool)
         return astar.search(self.trellis, self.heuristic, cost, astar.SAME, path, budget, expansions, on)
@@ -73,7 +72,7 @@ def cases(even: bool = False) -> tuple[Case, ...]:
 @pytest.mark.parametrize("budget", [1, 2, 3, 5, 10, 20, 50, 100, 1000])
 def test_nodes_held_never_exceed_the_budget_and_the_bound_is_true(budget: int, even: bool) -> None:
     for case in cases(even):
-        cost, lower, expansions, peak = case.search(budget, 2000)
+        cost, lower, expansions, peak, _ = case.search(budget, 2000)
         assert peak <= budget
         assert expansions <= 2000
         assert case.bound - ROUNDING <= lower <= case.optimum + ROUNDING
@@ -83,7 +82,8 @@ def test_nodes_held_never_exceed_the_budget_and_the_bound_is_true(budget: int, e
 @pytest.mark.parametrize("even", [False, True])
 def test_with_enough_memory_the_answer_is_the_optimum_and_proven(even: bool) -> None:
     for case in cases(even):
-        cost, lower, _, _ = case.search(ENOUGH)
+        cost, lower, _, _, forgotten = case.search(ENOUGH)
+        assert forgotten == 0
         assert cost == pytest.approx(case.optimum, abs=ROUNDING)
         assert lower == pytest.approx(case.optimum, abs=ROUNDING)
 
@@ -92,11 +92,13 @@ def test_with_enough_memory_the_answer_is_the_optimum_and_proven(even: bool) -> 
 def test_what_is_forgotten_is_not_lost_from_the_proof(even: bool) -> None:
     proven_in_little = 0
     for case in cases(even):
-        needed = case.search(ENOUGH)[3]
+        needed = case.search(ENOUGH).peak_nodes
         for budget in (case.depth + 5, case.depth + 10, 2 * case.depth, 3 * case.depth):
-            cost, lower, expansions, peak = case.search(budget)
+            cost, lower, expansions, peak, forgotten = case.search(budget)
+            assert forgotten == 0 or peak == budget < needed
             if budget < needed and expansions < ENOUGH and cost < np.inf:
                 assert peak == budget
+                assert forgotten > 0
                 assert lower <= case.optimum + ROUNDING
                 if lower >= cost - ROUNDING:
                     assert cost == pytest.approx(case.optimum, abs=ROUNDING)
@@ -106,14 +108,14 @@ def test_what_is_forgotten_is_not_lost_from_the_proof(even: bool) -> None:
 
 def test_a_known_cost_that_is_the_optimum_is_proven_so_and_not_undercut() -> None:
     for case in cases():
-        cost, lower, _, _ = case.search(ENOUGH, cost=case.optimum)
+        cost, lower, *_ = case.search(ENOUGH, cost=case.optimum)
         assert cost == case.optimum
         assert lower == pytest.approx(case.optimum, abs=ROUNDING)
 
 
 def test_a_search_that_is_cut_short_states_a_bound_that_grows_with_the_effort() -> None:
     for case in cases():
-        bounds = [case.search(ENOUGH, expansions)[1] for expansions in (0, 1, 2, 5, 20, 100, 500, ENOUGH)]
+        bounds = [case.search(ENOUGH, expansions).lower_bound for expansions in (0, 1, 2, 5, 20, 100, 500, ENOUGH)]
         assert bounds[0] == case.bound
         assert all(before <= after + ROUNDING for before, after in pairwise(bounds))
         assert bounds[-1] == pytest.approx(case.optimum, abs=ROUNDING)
@@ -122,7 +124,7 @@ def test_a_search_that_is_cut_short_states_a_bound_that_grows_with_the_effort() 
 def test_nodes_with_the_same_frontier_are_one_so_hardly_any_is_expanded_twice() -> None:
     """Only those are that were freed, because all that lies behind them was reached otherwise, and met again."""
     for case in cases() + cases(even=True):
-        expansions = case.search(ENOUGH)[2]
+        expansions = case.search(ENOUGH).expansions
         assert expansions <= 1.05 * frontiers(case.trellis)
 
 
@@ -180,11 +182,13 @@ def test_when_memory_is_full_a_quarter_of_it_is_forgotten_and_what_is_proven_sta
         current = nodes.heap[0]
         astar._close(nodes, current)
         before = {float(nodes.key[node]) for node in nodes.heap[: nodes.tally[astar._HEAPED]]}
+        held, forgotten = nodes.tally[[astar._NODES, astar._FORGOTTEN]]
         assert astar._forget(nodes, current)
         opened = nodes.heap[: nodes.tally[astar._HEAPED]]
         assert nodes.tally[astar._NODES] <= max(astar.KEPT * budget, case.depth)
         assert nodes.tally[astar._NODES] > astar.KEPT * budget - case.depth  # a leaf more, and its way, are too many
         assert nodes.tally[astar._NODES] + nodes.tally[astar._FREE] == budget
+        assert nodes.tally[astar._FORGOTTEN] - forgotten == held - nodes.tally[astar._NODES] > 0
         assert min(nodes.key[opened]) == min(before)
         assert {float(key) for key in nodes.key[opened]} <= before
         assert (nodes.slot[opened] == np.arange(len(opened))).all()
@@ -243,9 +247,9 @@ def test_the_compiled_search_proves_what_the_plain_one_proves() -> None:
     for case in cases():
         for budget in (3 * case.depth, ENOUGH):
             ours, book = case.search(budget, 1500), ByTheBook(case, budget, 1500)
-            if ours[2] < 1500 and book.expansions < 1500:
-                assert ours[0] == pytest.approx(book.cost, abs=ROUNDING)
-                assert ours[1] == pytest.approx(book.lower, abs=ROUNDING)
+            if ours.expansions < 1500 and book.expansions < 1500:
+                assert ours.cost == pytest.approx(book.cost, abs=ROUNDING)
+                assert ours.lower_bound == pytest.approx(book.lower, abs=ROUNDING)
 
 
 def test_without_backing_up_forgetting_claims_bounds_that_are_false() -> None:
@@ -257,7 +261,7 @@ def test_without_backing_up_forgetting_claims_bounds_that_are_false() -> None:
             if unsound.lower > case.optimum + 0.01:
                 assert unsound.forgotten > 0
                 fooled.append(case)
-                assert case.search(budget)[1] <= case.optimum + ROUNDING
+                assert case.search(budget).lower_bound <= case.optimum + ROUNDING
     assert len(fooled) > 3
 
 

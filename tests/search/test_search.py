@@ -248,9 +248,9 @@ def test_under_messages_alone_the_search_finds_the_optimum_too(sweeps: int, kind
         messages, path = trws.no_messages(trellis), np.zeros((MOVES + 1) * trellis.chains, np.int64)
         trws.tighten(trellis, messages, path, sweeps, np.inf)
         heuristic = Heuristic.of_messages(messages)
-        cost, lower, _, _ = astar.search(trellis, heuristic, np.inf, astar.SAME, path, 50_000, 50_000, ON)
-        assert cost == pytest.approx(optimum, abs=PROVEN), seed
-        assert lower == pytest.approx(optimum, abs=PROVEN), seed
+        found = astar.search(trellis, heuristic, np.inf, astar.SAME, path, 50_000, 50_000, ON)
+        assert found.cost == pytest.approx(optimum, abs=PROVEN), seed
+        assert found.lower_bound == pytest.approx(optimum, abs=PROVEN), seed
         assert path_cost(trellis, path) == pytest.approx(optimum, abs=PROVEN), seed
 
 
@@ -368,11 +368,10 @@ def test_narrowed_pair_chains_keep_every_path_that_is_cheaper_and_what_was_prove
             trellis = smaller
         path = some_path(trellis, seed)
         assert shares(trellis, tables, path) == pytest.approx(path_cost(trellis, path), abs=ROUNDING), seed
-        cost, lower, _, _ = astar.search(
-            trellis, Heuristic.of_pair_chains(tables), np.inf, astar.SAME, path, 50_000, 50_000, ON
-        )
-        assert cost == pytest.approx(optimum, abs=PROVEN), seed
-        assert lower == pytest.approx(optimum, abs=PROVEN), seed
+        heuristic = Heuristic.of_pair_chains(tables)
+        found = astar.search(trellis, heuristic, np.inf, astar.SAME, path, 50_000, 50_000, ON)
+        assert found.cost == pytest.approx(optimum, abs=PROVEN), seed
+        assert found.lower_bound == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0
 
 
@@ -420,11 +419,10 @@ def test_a_narrowed_trellis_keeps_every_path_that_is_cheaper(spare: float) -> No
         if trellis.chains == 1:
             continue
         tables = pair_chains.build(trellis, messages)
-        cost, lower, _, _ = astar.search(
-            trellis, Heuristic.of_pair_chains(tables), np.inf, astar.SAME, path, 50_000, 50_000, ON
-        )
-        assert cost == pytest.approx(optimum, abs=PROVEN), seed
-        assert lower == pytest.approx(optimum, abs=PROVEN), seed
+        heuristic = Heuristic.of_pair_chains(tables)
+        found = astar.search(trellis, heuristic, np.inf, astar.SAME, path, 50_000, 50_000, ON)
+        assert found.cost == pytest.approx(optimum, abs=PROVEN), seed
+        assert found.lower_bound == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0
 
 
