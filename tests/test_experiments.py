@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
 import subprocess
 import sys
@@ -102,6 +103,20 @@ def test_large_numbers_are_written_without_exponents() -> None:
 
     drawn = svg([Panel("growth", "postures", "MB", {"memory": [(784.0, 0.25), (80_379.0, 26_000.0)]}, log=True)])
     assert {">784<", ">80,379<", ">30,000<"} <= set(re.findall(r">[\d,.e+-]+<", drawn))
+
+
+@pytest.mark.parametrize("script", ["search/expansions.py", "search/heuristics.py"], ids=lambda script: script)
+def test_scripts_run_quickly_on_what_is_bundled(script: str) -> None:
+    done = subprocess.run(
+        [sys.executable, f"experiments/{script}", "--quick"],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "| ballet" in done.stdout or "| 23 chains" in done.stdout
 
 
 def test_a_name_that_is_no_question_is_refused() -> None:
@@ -534,6 +549,31 @@ def test_what_leads_into_the_air_ends_in_the_air() -> None:
         moved = nearer(a, b, 1.0)
         assert np.hypot(*(moved.root - a.root)[[0, 2]]) <= 1.0 + 1e-9
         assert moved.root[1] == b.root[1]
+
+
+# --- A* ---------------------------------------------------------------------------------------------------------------
+
+
+def test_searches_are_listened_to_and_kept_to_their_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "experiments" / "search"))
+    import expansions
+
+    from motionmind import Engine
+
+    engine, (case, *_) = Engine.load("ballet"), expansions.FORGETFUL
+    for one in expansions.posed(case, engine, 3, 0):
+        best = one.solve(5_000)
+        assert best.status == "optimal"
+        assert expansions.effort(case._replace(sweeps=None), one, 5_000).ratio == 1.0
+        with expansions.listening(500) as walks, expansions.bounded(case, one.problem) as problem:
+            answer = one._replace(problem=problem).solve(5_000)
+        assert answer.lower_bound <= best.cost + 1e-6
+        assert sum(walk.found.expansions for walk in walks) == answer.expansions
+        assert all(walk.straight == (len(answer.path) - 1) * answer.path.shape[1] for walk in walks)
+        assert max(walk.found.peak_nodes for walk in walks) <= 500
+        assert any(walk.found.forgotten for walk in walks) == (answer.peak_nodes == 500)
+    assert expansions.astar.search.__module__ == "motionmind.search.astar"
+    assert expansions.bounding.MOST_PAIRS > 0
 
 
 # --- growth -----------------------------------------------------------------------------------------------------------
