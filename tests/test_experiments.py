@@ -105,7 +105,9 @@ def test_large_numbers_are_written_without_exponents() -> None:
     assert {">784<", ">80,379<", ">30,000<"} <= set(re.findall(r">[\d,.e+-]+<", drawn))
 
 
-@pytest.mark.parametrize("script", ["search/expansions.py", "search/heuristics.py"], ids=lambda script: script)
+@pytest.mark.parametrize(
+    "script", ["search/expansions.py", "search/heuristics.py", "wince/followed.py"], ids=lambda script: script
+)
 def test_scripts_run_quickly_on_what_is_bundled(script: str) -> None:
     done = subprocess.run(
         [sys.executable, f"experiments/{script}", "--quick"],
@@ -549,6 +551,32 @@ def test_what_leads_into_the_air_ends_in_the_air() -> None:
         moved = nearer(a, b, 1.0)
         assert np.hypot(*(moved.root - a.root)[[0, 2]]) <= 1.0 + 1e-9
         assert moved.root[1] == b.root[1]
+
+
+def test_joint_moves_within_tolerance_are_those_between_the_ends() -> None:
+    from experiments.wince.followed import near
+    from motionmind import Engine
+
+    engine = Engine.load("ballet")
+    tween = engine.tween("ballet/arabesque", "ballet/fifth")
+    tolerances = engine.space.tolerances
+    count, within, within_three = near(tween, tolerances)
+    off = [list(zip(row, tolerances, strict=True)) for row in tween.path_degrees[1:-1]]
+    assert count == (tween.moves - 1) * len(tween.joints) == sum(map(len, off))
+    assert within == sum(degrees <= tolerance + 0.1 for row in off for degrees, tolerance in row)
+    assert within_three == sum(degrees <= 3.0 * tolerance + 0.1 for row in off for degrees, tolerance in row)
+    assert 0 < within < within_three <= count
+
+
+def test_shares_are_of_sums_and_their_interval_is_over_pairs() -> None:
+    from experiments.wince.followed import share
+
+    found, low, high = share(np.array([10, 45]), np.array([10, 90]))
+    assert (found, low, high) == (0.55, 0.5, 1.0)
+    assert share(np.array([3, 6]), np.array([4, 8])) == (0.75, 0.75, 0.75)
+    rng = np.random.default_rng(1)
+    drawn = np.array([share(rng.binomial(50, 0.8, 100), np.full(100, 50)) for _ in range(200)])
+    assert 0.9 < np.mean((drawn[:, 1] <= 0.8) & (drawn[:, 2] >= 0.8)) <= 1.0
 
 
 # --- A* ---------------------------------------------------------------------------------------------------------------
