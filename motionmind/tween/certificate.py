@@ -15,6 +15,7 @@ from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.rows import insertion_points
 from motionmind.search.problem import Problem, places
+from motionmind.tween.problem import TRANSITION, WAIT, kinds_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,12 +169,13 @@ def trace_path(
     """
     graph = grammar.transitions
     edges, holds_goal = graph.edges(path), (path[:-1] == path[1:]) & (path[1:] == path[-1])
+    kinds = kinds_of(edges, holds_goal, weights, wait)
     attested, bridges, waits = edges >= 0, [], []
-    for move, chain in np.argwhere(holds_goal | ~attested).tolist():
-        joint, edge = grammar.chains[chain], edges[move, chain]
-        if holds_goal[move, chain] and (edge < 0 or wait < weights[edge]):
+    for move, chain in np.argwhere(kinds != TRANSITION).tolist():
+        joint = grammar.chains[chain]
+        if kinds[move, chain] == WAIT:
             waits.append(Wait(joint, move, wait))
-        elif edge < 0:
+        else:
             degrees = grammar.bridges.span(graph.starts[chain] + path[move, chain], path[move + 1, chain])
             bridges.append(Bridge(joint, move, degrees, bridge_price * degrees))
     seen, joints = edges[attested], [grammar.chains[chain] for chain in np.nonzero(attested)[1]]

@@ -1,4 +1,4 @@
-"""Building a model from a grammar: every edge and coupling of the search with its cost in nats."""
+"""Building a model from a grammar: every edge and coupling of the search with its cost in nats, and its kind."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motionmind._typing import Floats, Int32s, Ints
+from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.schemes import Weights
 from motionmind.search.problem import Model
+
+KINDS = ("transition", "bridge", "wait")  # of moves
+TRANSITION, BRIDGE, WAIT = range(3)
 
 
 def build_model(
@@ -84,3 +87,16 @@ def couplings(net: Coordination, starts: Ints, factor: float) -> Couplings:
         alone[mine] = factor * least
     pair_starts, pair_ptr, parents = (np.array(part) for part in (net.pair_starts, net.pair_ptr, net.parents))
     return Couplings(parents, unary, alone, pair_starts, pair_ptr, np.array(net.pair_states), corrections)
+
+
+def kinds_of(edges: Ints, is_at_goal: Bools, weights: Floats, wait: float) -> Ints:
+    """Return the kind of each move, an index of `KINDS`: at its goal a chain waits where that is cheaper than to hold.
+
+    Args:
+        edges: index of the transition that attests each move, of any shape; -1 where none does.
+        is_at_goal: whether it stays in the goal's state, in the same shape.
+        weights: weight of each transition in the scheme that is searched, nats [E].
+        wait: nats for each move that a chain waits at its goal.
+    """
+    attested = np.append(weights, np.inf)[edges]  # infinite where nothing attests the move
+    return np.where(is_at_goal & (wait < attested), WAIT, np.where(edges >= 0, TRANSITION, BRIDGE))
