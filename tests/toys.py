@@ -17,6 +17,7 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.errors import InfeasibleError
+from motionmind.search.cfn import Ingredients
 from motionmind.search.problem import Model, Problem, Rules, Via, costs_to_go
 from motionmind.search.solve import Certificate, Watch, solve
 from motionmind.search.trellis import Trellis, build_trellis
@@ -104,6 +105,12 @@ class Toy:
     ) -> Problem:
         """The problem from start to goal; `changes` are made to the model, such as in what is allowed."""
         return Problem(self.model._replace(**changes), *self.ends(), rules, vias, guide)
+
+    def ingredients(self, problem: Problem) -> Ingredients:
+        """What the costs of one of its problems are made of; edges are of one kind or the other, whatever they cost."""
+        kind = np.random.default_rng(len(self.model.costs)).integers(2, size=len(problem.model_with_waits().costs))
+        coupled = [own * (parent >= 0) for own, parent in zip(self.children, self.parents, strict=True)]
+        return Ingredients(("one", "other"), kind, np.concatenate(coupled), np.concatenate(self.above))
 
     def cost(self, path: Int32s, guide: Floats | None = None) -> float:
         """Cost of a path of states [T + 1, L], summed as it is defined; infinite where it breaks a rule.
@@ -294,17 +301,26 @@ def _pointer(rows: list[Ints]) -> Ints:
     return np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64)
 
 
-def evaluate(text: str, states: np.ndarray, chains: list[str]) -> float:
-    """Cost of a path of states [T + 1, L] in a cost function network, by the format's own definition."""
+def evaluate(text: str, states: np.ndarray, chains: Sequence[str]) -> float:
+    """Cost of a path of states, or of the places that moves lead to, in a cost function network."""
+    return sum(costs_by_function(text, states, chains).values())
+
+
+def costs_by_function(text: str, states: np.ndarray, chains: Sequence[str]) -> dict[str, float]:
+    """What each function of a cost function network costs on a path [T + 1, L], by the format's own definition."""
     network = json.loads(text)
-    chosen = {f"{name}_{t}": row[chain] for t, row in enumerate(states) for chain, name in enumerate(chains)}
-    total = 0.0
-    for function in network["functions"].values():
-        at = [network["variables"][name].index(f"s{chosen[name]}") for name in function["scope"]]
-        costs = function["costs"]
+    chosen = {}
+    for name, values in network["variables"].items():
+        chain, _, move = name.removesuffix("_on").rpartition("_")
+        t, j = int(move), list(chains).index(chain)
+        before, after = states[max(t - 1, 0), j], states[t, j]
+        chosen[name] = values.index(f"s{after}" if f"s{after}" in values else f"s{before}_s{after}")
+    out = {}
+    for name, function in network["functions"].items():
+        at, costs = [chosen[variable] for variable in function["scope"]], function["costs"]
         if len(at) == 2:
             listed = dict(zip(zip(costs[0::3], costs[1::3], strict=True), costs[2::3], strict=True))
-            total += listed.get(tuple(at), function["defaultcost"])
+            out[name] = listed.get(tuple(at), function["defaultcost"])
         else:
-            total += costs[at[0] if at else 0]
-    return total
+            out[name] = costs[at[0] if at else 0]
+    return out

@@ -19,12 +19,13 @@ import pytoulbar2
 
 from motionmind import Engine, make_discretization, own_skeleton, read_motion
 from motionmind._typing import Floats, Int32s, Ints
+from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.progression import fit_progression
 from motionmind.search import bounding, solve
 from motionmind.search.cfn import cfn
 from motionmind.search.problem import Model, Problem, Rules, costs_to_go, with_waits
 from motionmind.search.solve import Certificate
-from motionmind.tween.problem import build_model
+from motionmind.tween.problem import build_model, ingredients_of
 from motionmind.tween.progression import lift_to_moves
 
 TIME_LIMIT = 20  # seconds that toulbar2 gets for one problem
@@ -70,7 +71,7 @@ def main() -> None:
         prove_moves(engine, pairs[: options.moves])
     few = list(zip(pairs[: options.few], found, strict=False))
     trade(model, [ends for ends, _ in few], options.plot)
-    compare_solvers(model, few, engine.grammar.chains)
+    compare_solvers(model, few, engine.grammar)
 
 
 def joinable(model: Model, states: Int32s, count: int, seed: int) -> Iterator[Ends]:
@@ -213,7 +214,7 @@ def drawing(rows: list[tuple[str, float, Floats]]) -> str:
 # --- another solver --------------------------------------------------------------------------------------------------
 
 
-def compare_solvers(model: Model, few: list[tuple[Ends, Certificate]], chains: tuple[str, ...]) -> None:
+def compare_solvers(model: Model, few: list[tuple[Ends, Certificate]], grammar: Grammar) -> None:
     """The problem of as many moves as were found, solved here and by toulbar2."""
     ours, theirs, left, agree, disagree = [], [], [], 0, 0
     for (start, goal), answer in few:
@@ -223,7 +224,7 @@ def compare_solvers(model: Model, few: list[tuple[Ends, Certificate]], chains: t
         problem = Problem(model, start, goal, rules)
         again = solve.solve(problem)
         ours.append(perf_counter() - began)
-        seconds, optimum, short = toulbar2(cfn(problem, moves, chains))
+        seconds, optimum, short = toulbar2(written(problem, moves, grammar))
         theirs.append(seconds)
         if optimum is None:
             left.append(short)
@@ -235,6 +236,12 @@ def compare_solvers(model: Model, few: list[tuple[Ends, Certificate]], chains: t
     print(f", with a gap of {', '.join(f'{short:.2%}' for short in left)}" if left else "")
     print(f"median {1e3 * np.median(ours):.0f} ms here, {1e3 * np.median(theirs):.0f} ms toulbar2 (solving);", end=" ")
     print(f"toulbar2 / here: median {np.median(ratios):.1f}, in all {sum(theirs) / sum(ours):.1f}")
+
+
+def written(problem: Problem, moves: int, grammar: Grammar) -> str:
+    """The problem of so many moves as toulbar2 reads it."""
+    ingredients = ingredients_of(problem, grammar, "conditional", grammar.coordination, 1.0, problem.rules.wait)
+    return cfn(problem, moves, grammar.chains, ingredients)
 
 
 def toulbar2(problem: str) -> tuple[float, float | None, float]:

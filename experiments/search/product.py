@@ -18,11 +18,11 @@ from typing import NamedTuple
 
 import networkx as nx
 import numpy as np
-from bench import RULES, Ends, joinable, moves_of, toulbar2
+from bench import RULES, Ends, joinable, moves_of, toulbar2, written
 
 from motionmind import Engine, Motion, Skeleton, make_discretization, own_skeleton, read_motion
+from motionmind.grammar.grammar import Grammar
 from motionmind.search import solve
-from motionmind.search.cfn import cfn
 from motionmind.search.problem import Model, Problem, Rules, costs_to_go, with_waits
 from motionmind.tween.problem import build_model
 
@@ -127,7 +127,7 @@ class Compared(NamedTuple):
     by_toulbar2: bool | None
 
 
-def compare(model: Model, pairs: list[Ends], limit: int, chains: tuple[str, ...]) -> Iterator[Compared]:
+def compare(model: Model, pairs: list[Ends], limit: int, grammar: Grammar) -> Iterator[Compared]:
     """Each pair's problem in the number of moves that is best."""
     for ends in pairs:
         moves = moves_of(solve.solve(Problem(model, *ends, RULES)))
@@ -140,7 +140,7 @@ def compare(model: Model, pairs: list[Ends], limit: int, chains: tuple[str, ...]
         began = perf_counter()
         cost, expanded, made = best(model, ends, moves, limit)
         theirs = perf_counter() - began
-        outside = toulbar2(cfn(problem, moves, chains))[1]
+        outside = toulbar2(written(problem, moves, grammar))[1]
         by_networkx = None if cost is None else abs(cost + RULES.per_move * moves - ours.cost) < SAME
         by_toulbar2 = None if outside is None else abs(outside - ours.cost) < WRITTEN
         yield Compared(seconds, theirs, expanded, made, by_networkx, by_toulbar2)
@@ -169,12 +169,12 @@ def main() -> None:
         book = make_discretization("codebook", tolerance)
         engine = Engine.fit(part, name="part", rate=rate, skip=1, discretization=book)
         model, states = build_model(engine.grammar, "conditional", 1.0, 1.0), np.asarray(engine.states)
-        chains = engine.grammar.chains
-        list(compare(model, list(joinable(model, states, 2, options.seed + 1)), 1000, chains))  # compiled, or loaded
-        rows = list(compare(model, list(joinable(model, states, options.pairs, options.seed)), options.limit, chains))
+        grammar = engine.grammar
+        list(compare(model, list(joinable(model, states, 2, options.seed + 1)), 1000, grammar))  # compiled, or loaded
+        rows = list(compare(model, list(joinable(model, states, options.pairs, options.seed)), options.limit, grammar))
         ratio = np.array([row.theirs / row.ours for row in rows])
         nodes, edges = np.median([(row.expanded, row.made) for row in rows], axis=0)
-        print(f"| {len(chains)} | {verdicts([row.by_networkx for row in rows])}", end=" | ")
+        print(f"| {len(grammar.chains)} | {verdicts([row.by_networkx for row in rows])}", end=" | ")
         print(f"{verdicts([row.by_toulbar2 for row in rows])} | {nodes:,.0f} | {edges:,.0f}", end=" | ")
         print(f"{np.median(ratio):,.1f}, {ratio.max():,.0f} |", flush=True)
 

@@ -138,7 +138,16 @@ class Transitions:
         Args:
             path: states [T + 1, L].
         """
-        keys, wanted = self._keys, (self.starts[:-1] + path[:-1]) * self._width + path[1:]
+        return self.find(self.starts[:-1] + path[:-1], path[1:])
+
+    def find(self, rows: Ints, targets: Ints | Int32s) -> Ints:
+        """Return the indices of transitions; -1 for those that are not attested.
+
+        Args:
+            rows: row of the state that each leaves, of any shape.
+            targets: the state of the same chain that each leads to, in the same shape.
+        """
+        keys, wanted = self._keys, rows * self._width + targets
         at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
         return np.where(keys[at] == wanted, at, -1) if len(keys) else np.full(wanted.shape, -1)
 

@@ -2,6 +2,20 @@
 
 The format: "cost function network", JSON with `problem`, `variables` and `functions`
 (toulbar2's documentation, "User guide: file formats, cfn format"). A cost at or above `mustbe` forbids.
+
+A path costs the sum of all functions. Each ingredient of the cost has its own, named after the variable chain_t, the
+state of a chain after move t:
+
+    moves                   the price of all moves
+    allowed_chain_t         lists the edges into chain_t, at no cost, and forbids all others
+    KIND_chain_t            lists the edges of one kind, such as bridges, with their costs
+    network_chain_t         corrects the coupling to the parent chain for pairs of states
+    network_chain_t_child   the separable part of the coupling: what the chain's state costs
+    network_chain_t_parent  and what the parent's state costs
+    guide_chain_t           what the state costs at this move alone
+
+The word before the first underscore names the ingredient. A kind without edges has no function, nor has a network or
+guide that is 0 throughout.
 """
 
 from __future__ import annotations
@@ -11,31 +25,61 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
+import numpy as np
+
+from motionmind._typing import Floats, Int32s, Ints
 from motionmind.search.problem import Model, Problem
 from motionmind.search.trellis import Trellis, segment_trellises
 
 DECIMALS = 6
 
 
+class Ingredients(NamedTuple):
+    """The ingredients of a model's costs, as far as the model does not keep them apart.
+
+    Attributes:
+        kinds: names of the kinds of edges [K], without underscores.
+        kind: the kind of each edge of the problem's model with waits, from 0 to K - 1 [E].
+        child: the share of `Model.unary` that each state owes to the coupling of its chain to the parent, nats [G].
+        parent: the share that a parent's state owes to the coupling, for each pair row of the model, nats [sum].
+    """
+
+    kinds: Sequence[str]
+    kind: Ints
+    child: Floats
+    parent: Floats
+
+
 class _Function(NamedTuple):
-    """A cost function: its name, the variables in its scope, and its body in the format's terms."""
+    """A cost function.
+
+    Attributes:
+        name: its name.
+        scope: its variables.
+        costs: nats of the listed pairs; without pairs, of each value, or of all paths where there is no variable [n].
+        pairs: values of two variables [n, 2], or None.
+        forbids: whether other pairs are forbidden; else they cost 0.
+    """
 
     name: str
     scope: list[str]
-    body: dict[str, object]
+    costs: Floats
+    pairs: Ints | None = None
+    forbids: bool = False
 
 
-def cfn(problem: Problem, moves: int, names: Sequence[str]) -> str:
+def cfn(problem: Problem, moves: int, names: Sequence[str], ingredients: Ingredients) -> str:
     """Write the problem of exactly `moves` moves, with the costs that the search minimises.
 
-    Variables are named chain_t, and their values after the chain's states, such as "s12"; where states are moves, after
-    the number of the move and the state that it leads to, "m40_s12". The optimum is the cost that a certificate states,
-    the price of the moves themselves included. Where states are moves, chains go on from a via as variables chain_t_on.
+    Variables are named chain_t, and their values after the chain's states, such as "s12". Where states are moves, they
+    are named after the places that they join, such as "s7_s12", and chains go on from a via as variables chain_t_on,
+    with values such as "s12". The optimum is the cost that a certificate states, the price of the moves included.
 
     Args:
         problem: the problem; each via names the move at which it is passed.
         moves: number of moves T.
         names: names of the chains [L].
+        ingredients: the ingredients of its costs.
 
     Raises:
         ValueError: a via names no move.
@@ -45,90 +89,168 @@ def cfn(problem: Problem, moves: int, names: Sequence[str]) -> str:
         if via.move is None:
             raise ValueError(f"via {number} names no move; cfn writes the problem with vias at given moves")
         stops.append(via.move)
+    model, timed = problem.model_with_waits(), problem.timed_costs(moves)
+    words = _value_names(model)
     variables: dict[str, list[str]] = {}
-    functions = [_Function("moves", [], {"costs": [_round(problem.rules.per_move * moves)]})]
+    functions = [_Function("moves", [], np.array([problem.rules.per_move * moves]))]
     for first, trellis in zip(stops, segment_trellises(problem, [*stops, moves]), strict=True):
-        functions += _functions(problem.model, trellis, first, names, variables)
+        segment = _segment(model, trellis, first, names, words, variables)
+        kind = ingredients.kind[_model_edges(model, segment)]
+        for i in range(trellis.chains, len(segment.names)):
+            functions += _edges(segment, i, ingredients.kinds, kind)
+            functions += _couplings(model, segment, i, ingredients)
+            if timed is not None:
+                functions += _guide(segment, i, timed[first + i // trellis.chains])
+    return _write(f"tween_{moves}_moves", variables, functions)
+
+
+# --- variables -------------------------------------------------------------------------------------------------------
+
+
+class _Segment(NamedTuple):
+    """A segment of the problem.
+
+    Attributes:
+        trellis: its trellis.
+        names: names of its variables [n].
+        domains: positions of each variable [n].
+        rows: row of each position in the model [P].
+    """
+
+    trellis: Trellis
+    names: list[str]
+    domains: list[slice]
+    rows: Ints
+
+
+def _segment(
+    model: Model,
+    trellis: Trellis,
+    first: int,
+    chains: Sequence[str],
+    words: Sequence[str],
+    variables: dict[str, list[str]],
+) -> _Segment:
+    """Return the segment that starts at move `first`, and add its variables with their values to `variables`.
+
+    Args:
+        model: the costs, waits included.
+        trellis: the segment.
+        first: number of the move.
+        chains: names of the chains [L].
+        words: names of the model's states [G].
+        variables: those of the segments before.
+    """
+    domains = [slice(*span) for span in pairwise(trellis.dom_ptr.tolist())]
+    chain = np.repeat(np.arange(len(domains)) % trellis.chains, np.diff(trellis.dom_ptr))
+    rows = model.starts[chain] + trellis.dom
+    names = []
+    for i, domain in enumerate(domains):
+        name = f"{chains[i % trellis.chains]}_{first + i // trellis.chains}"
+        values = [words[row] for row in rows[domain]]
+        # A segment starts where the one before ends: in the same states, unless these are moves.
+        names.append(name if variables.setdefault(name, values) == values else f"{name}_on")
+        variables[names[-1]] = values
+    return _Segment(trellis, names, domains, rows)
+
+
+def _value_names(model: Model) -> list[str]:
+    """Return the name of each state [G]."""
+    first = np.repeat(model.starts[:-1], np.diff(model.starts))
+    sources = np.repeat(np.arange(len(first)), np.diff(model.indptr))
+    left = np.zeros(len(first), dtype=np.int64)  # the place that a move leads from
+    left[first[sources] + model.targets] = model.place[sources]
+    named = zip(np.arange(len(first)) - first, left.tolist(), model.place.tolist(), strict=True)
+    return [f"s{place}" if state == place else f"s{before}_s{place}" for state, before, place in named]
+
+
+# --- functions -------------------------------------------------------------------------------------------------------
+
+
+def _edges(segment: _Segment, i: int, kinds: Sequence[str], kind: Ints) -> Iterator[_Function]:
+    """Yield the functions of the edges into variable i; `kind` is that of each edge of the segment [R]."""
+    trellis, name, before = segment.trellis, segment.names[i], i - segment.trellis.chains
+    scope, source = [segment.names[before], name], segment.domains[before]
+    pairs, listed = _entries(trellis.row_ptr, trellis.row_to, source.start, source.stop, segment.domains[i].start)
+    yield _Function(f"allowed_{name}", scope, np.zeros(len(pairs)), pairs, forbids=True)
+    for number, word in enumerate(kinds):
+        own = kind[listed] == number
+        if own.any():
+            yield _Function(f"{word}_{name}", scope, trellis.row_cost[listed][own], pairs[own])
+
+
+def _couplings(model: Model, segment: _Segment, i: int, ingredients: Ingredients) -> Iterator[_Function]:
+    """Yield the functions of the coupling of variable i to its parent."""
+    trellis, name, chain = segment.trellis, segment.names[i], i % segment.trellis.chains
+    if trellis.parents[chain] < 0:
+        return
+    above = i - chain + int(trellis.parents[chain])
+    here, there = segment.domains[i], segment.domains[above]
+    pairs, listed = _entries(trellis.col_ptr, trellis.col_to, trellis.up_ptr[i], trellis.up_ptr[i + 1], here.start)
+    parent = ingredients.parent[model.pair_starts[chain] + trellis.dom[there]]
+    for function in (
+        _Function(f"network_{name}", [segment.names[above], name], trellis.col_cost[listed], pairs),
+        _Function(f"network_{name}_child", [name], ingredients.child[segment.rows[here]]),
+        _Function(f"network_{name}_parent", [segment.names[above]], parent),
+    ):
+        if np.any(function.costs):
+            yield function
+
+
+def _guide(segment: _Segment, i: int, costs: Floats) -> Iterator[_Function]:
+    """Yield the guide's function of variable i, given what states cost at its move [G]."""
+    own = costs[segment.rows[segment.domains[i]]]
+    if own.any():
+        yield _Function(f"guide_{segment.names[i]}", [segment.names[i]], own)
+
+
+def _entries(ptr: Ints, columns: Int32s, first: int, last: int, start: int) -> tuple[Ints, slice]:
+    """Return entries of a matrix as pairs of values [n, 2], and where they lie.
+
+    Args:
+        ptr: entries of each row.
+        columns: their columns, which are positions.
+        first: the first of the rows whose entries are wanted.
+        last: the row after the last of them.
+        start: the first position of the columns' variable.
+    """
+    listed = slice(int(ptr[first]), int(ptr[last]))
+    values = np.repeat(np.arange(last - first), np.diff(ptr[first : last + 1]))
+    return np.column_stack([values, columns[listed] - start]), listed
+
+
+def _model_edges(model: Model, segment: _Segment) -> Ints:
+    """Return the number of each edge of a segment [R] among those of the model."""
+    trellis, width = segment.trellis, int(np.diff(model.starts).max())
+    keys = np.repeat(np.arange(len(model.place)) * width, np.diff(model.indptr)) + model.targets
+    wanted = np.repeat(segment.rows * width, np.diff(trellis.row_ptr)) + trellis.dom[trellis.row_to]
+    return np.searchsorted(keys, wanted)
+
+
+# --- text ------------------------------------------------------------------------------------------------------------
+
+
+def _write(title: str, variables: dict[str, list[str]], functions: Sequence[_Function]) -> str:
+    """Return the text of a network."""
     # Above what any path can cost: the sum of the greatest costs of all functions.
-    forbidden = 1.0 + sum(max(map(abs, _costs(scope, body)), default=0.0) for _, scope, body in functions)
-    lines = []
-    for name, scope, body in functions:
-        default = {"defaultcost": forbidden} if body.get("defaultcost", 0.0) is None else {}
-        head = json.dumps({"scope": scope, **{key: body[key] for key in body if key != "costs"}, **default})
-        lines.append(f'{json.dumps(name)}: {head[:-1]}, "costs": {_numbers(_listed(body))}}}')
-    values = [f"{json.dumps(name)}: {json.dumps(states)}" for name, states in variables.items()]
-    header = {"name": f"tween_{moves}_moves", "mustbe": f"<{forbidden:.{DECIMALS}f}"}
+    forbidden = f"{1.0 + sum(np.abs(one.costs).max(initial=0.0) for one in functions):.{DECIMALS}f}"
+    header = {"name": title, "mustbe": f"<{forbidden}"}
+    values = (f"{json.dumps(name)}: {json.dumps(states)}" for name, states in variables.items())
     return (
         f'{{"problem": {json.dumps(header)},\n"variables": {{\n'
         + ",\n".join(values)
         + '\n},\n"functions": {\n'
-        + ",\n".join(lines)
+        + ",\n".join(_line(function, forbidden) for function in functions)
         + "\n}}\n"
     )
 
 
-def _functions(
-    model: Model, trellis: Trellis, first: int, chains: Sequence[str], variables: dict[str, list[str]]
-) -> Iterator[_Function]:
-    """Yield the cost functions of a segment that starts at move `first`, and add its variables to `variables`."""
-    domains = [slice(*span) for span in pairwise(trellis.dom_ptr)]
-    names = [f"{chains[i % trellis.chains]}_{first + i // trellis.chains}" for i in range(len(domains))]
-    values = [[_value(model, i % trellis.chains, int(s)) for s in trellis.dom[d]] for i, d in enumerate(domains)]
-    if first > 0:  # a segment starts where the one before ends: in the same states, unless these are moves
-        starts = zip(names[: trellis.chains], values, strict=False)
-        names[: trellis.chains] = [name if variables[name] == here else f"{name}_on" for name, here in starts]
-    for i, name in enumerate(names):
-        if name not in variables:  # else the segment before has paid for it
-            variables[name] = values[i]
-            yield _Function(f"stand_{name}", [name], {"costs": [_round(cost) for cost in trellis.unary[domains[i]]]})
-        after, above = i + trellis.chains, i - i % trellis.chains + trellis.parents[i % trellis.chains]
-        if after < len(names):
-            costs = _edges(trellis, domains[i], domains[after])
-            yield _Function(f"move_{name}", [name, names[after]], {"defaultcost": None, "costs": costs})
-        if trellis.up_ptr[i + 1] > trellis.up_ptr[i]:
-            costs = _pairs(trellis, i, domains[i])
-            yield _Function(f"coordinate_{name}", [names[above], name], {"defaultcost": 0.0, "costs": costs})
-
-
-def _edges(trellis: Trellis, here: slice, after: slice) -> list[float]:
-    """Return the edges between two domains of a chain, as (value, value, cost) one after another."""
-    edges = [(p, e) for p in range(here.start, here.stop) for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1])]
-    return _flat([(p - here.start, trellis.row_to[e] - after.start, trellis.row_cost[e]) for p, e in edges])
-
-
-def _pairs(trellis: Trellis, i: int, here: slice) -> list[float]:
-    """Return the listed pairs of variable i and its parent, as (parent's value, value, cost) one after another."""
-    rows = range(trellis.up_ptr[i], trellis.up_ptr[i + 1])
-    pairs = [(u, q) for u in rows for q in range(trellis.col_ptr[u], trellis.col_ptr[u + 1])]
-    return _flat([(u - rows.start, trellis.col_to[q] - here.start, trellis.col_cost[q]) for u, q in pairs])
-
-
-def _value(model: Model, chain: int, state: int) -> str:
-    place = model.place[model.starts[chain] + state]
-    return f"s{state}" if place == state else f"m{state}_s{place}"
-
-
-def _flat(listed: list[tuple[int, int, float]]) -> list[float]:
-    """Return entries one after another, as the format wants them, costs rounded."""
-    return [number for a, b, cost in listed for number in (int(a), int(b), _round(cost))]
-
-
-def _costs(scope: list[str], body: dict[str, object]) -> list[float]:
-    costs = _listed(body)
-    return costs[2::3] if len(scope) == 2 else costs
-
-
-def _listed(body: dict[str, object]) -> list[float]:
-    costs = body["costs"]
-    assert isinstance(costs, list)
-    return costs
-
-
-def _numbers(numbers: list[float]) -> str:
-    """Return a list as the format has it: numbers such as 2e-06, which JSON knows, are none to toulbar2."""
-    written = (f"{number:.{DECIMALS}f}" if isinstance(number, float) else str(number) for number in numbers)
-    return f"[{', '.join(written)}]"
-
-
-def _round(cost: float) -> float:
-    return round(float(cost), DECIMALS)
+def _line(function: _Function, forbidden: str) -> str:
+    """Return a function as the format has it: numbers such as 2e-06, which JSON knows, are none to toulbar2."""
+    rounded = np.round(function.costs, DECIMALS).tolist()
+    costs, default = [f"{cost:.{DECIMALS}f}" if cost else "0" for cost in rounded], ""
+    if function.pairs is not None:
+        costs = [f"{a}, {b}, {cost}" for (a, b), cost in zip(function.pairs.tolist(), costs, strict=True)]
+        default = f'"defaultcost": {forbidden if function.forbids else 0}, '
+    scope = json.dumps(function.scope)
+    return f'{json.dumps(function.name)}: {{"scope": {scope}, {default}"costs": [{", ".join(costs)}]}}'

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Literal
@@ -37,6 +37,7 @@ from motionmind.tween.crediting import credit_tween
 from motionmind.tween.formulate import Formulation, formulate
 from motionmind.tween.nearest_body import diagnose_posturewise
 from motionmind.tween.pacing import tempo_of, worded
+from motionmind.tween.problem import ingredients_of
 from motionmind.tween.request import TweenRequest
 from motionmind.tween.result import Tween
 from motionmind.tween.what_if import Answer, WhatIf, find_what_if
@@ -309,6 +310,16 @@ class Engine(LearnedCorpus):
             costs=costs,
             seconds=seconds,
             search_problem=searched,
+            ingredients=partial(
+                ingredients_of,
+                searched,
+                self.grammar,
+                request.weights,
+                formulation.coordination,
+                request.coordination_factor,
+                request.beta,
+                request.novelty,
+            ),
             request=request,
             length=certificate.length,
             times=formulation.times,

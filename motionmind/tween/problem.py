@@ -10,7 +10,8 @@ from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.schemes import Weights
-from motionmind.search.problem import Model
+from motionmind.search.cfn import Ingredients
+from motionmind.search.problem import Model, Problem
 
 KINDS = ("transition", "bridge", "wait")  # of moves
 TRANSITION, BRIDGE, WAIT = range(3)
@@ -100,3 +101,36 @@ def kinds_of(edges: Ints, is_at_goal: Bools, weights: Floats, wait: float) -> In
     """
     attested = np.append(weights, np.inf)[edges]  # infinite where nothing attests the move
     return np.where(is_at_goal & (wait < attested), WAIT, np.where(edges >= 0, TRANSITION, BRIDGE))
+
+
+def ingredients_of(
+    problem: Problem,
+    grammar: Grammar,
+    weights: Weights,
+    network: Coordination,
+    factor: float,
+    wait: float,
+    novelty: float = 0.0,
+) -> Ingredients:
+    """Return the ingredients of a problem's costs: the kind of each edge, and the parts of the network.
+
+    Args:
+        problem: the problem that is searched; its states are the grammar's, or moves between these.
+        grammar: what was learned.
+        weights: scheme of the transitions' costs.
+        network: how the chains' states of the problem coordinate.
+        factor: factor of the network's -log P in the problem's costs.
+        wait: nats for each move that a chain waits at its goal.
+        novelty: as for `build_model`.
+    """
+    model, graph = problem.model_with_waits(), grammar.transitions
+    sizes = np.diff(model.starts)
+    first = np.repeat(model.starts[:-1], sizes)  # row of the first state of each state's chain
+    rows = np.repeat(graph.starts[:-1], sizes) + model.place  # of each state, among the grammar's
+    is_goal = model.place == np.repeat(problem.goal, sizes)
+    sources = np.repeat(np.arange(len(first)), np.diff(model.indptr))
+    targets = first[sources] + model.targets
+    edges = graph.find(rows[sources], model.place[targets])
+    is_at_goal = (rows[sources] == rows[targets]) & is_goal[targets]
+    kind = kinds_of(edges, is_at_goal, graph.weights(weights, novelty), wait)
+    return Ingredients(KINDS, kind, factor * network.child_costs, factor * network.parent_costs)

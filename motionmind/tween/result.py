@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -13,7 +13,7 @@ from motionmind.body.motion import Motion
 from motionmind.credits.credit import Credit
 from motionmind.credits.ledger import ledger_of
 from motionmind.learned.plausibility import Plausibility, Sighting
-from motionmind.search.cfn import cfn
+from motionmind.search.cfn import Ingredients, cfn
 from motionmind.search.length import LengthChoice
 from motionmind.search.problem import Problem, Via
 from motionmind.search.solve import Status
@@ -58,6 +58,7 @@ class Tween:
         seconds: seconds spent on "load", "problem", "bound", "search" and "realise"; measured, so they differ from run
             to run.
         search_problem: the problem that was searched.
+        ingredients: returns the ingredients of its costs.
         request: what was asked.
         length: how the number of moves was chosen; None where it was given, and without a guide.
         times: the corpus's usual time from each posture that is passed exactly to the next.
@@ -98,6 +99,7 @@ class Tween:
     costs: CostBreakdown
     seconds: dict[str, float]
     search_problem: Problem
+    ingredients: Callable[[], Ingredients]
     request: TweenRequest
     length: LengthChoice | None
     times: tuple[UsualTime, ...]
@@ -153,11 +155,13 @@ class Tween:
     def problem(self) -> str:
         """Return the problem of this number of moves in toulbar2's cfn format; its optimum should be `cost`.
 
-        Postures to pass through are passed at the moves at which this tween passes them. That it differs from other
-        tweens is no part of what is written: without that, an alternative's optimum may be less.
+        Each ingredient of the cost has functions of its own, which docs/formats.md names. Postures to pass through are
+        passed at the moves at which this tween passes them. Two conditions are not written, so that the optimum may be
+        less: that an alternative differs from other tweens, and that a `posturewise` one keeps to whole postures.
         """
         vias = [Via(via.states, move) for via, move in zip(self.search_problem.vias, self.passed, strict=True)]
-        return cfn(replace(self.search_problem, vias=tuple(vias)), self.moves, self.joints)
+        problem = replace(self.search_problem, vias=tuple(vias))
+        return cfn(problem, self.moves, self.joints, self.ingredients())
 
 
 def report_of(tween: Tween, motion_sha256: str | None = None) -> TweenReport:

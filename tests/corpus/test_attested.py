@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ingredients import assert_reported
 from saved_corpora import entries, put_entries
 from walks import dance
 
@@ -112,6 +113,11 @@ def test_a_tween_tells_corpus_clip_and_posture_and_what_is_mirrored_and_reversed
     assert {corpus for corpus, _, _ in kinds} == {"mine", "other"}
     assert any(is_mirrored for _, is_mirrored, _ in kinds)
     assert any(is_reversed for _, _, is_reversed in kinds)
+
+
+def test_the_written_problem_of_mixed_corpora_is_made_of_what_is_reported(everything: Engine) -> None:
+    for tween in tweens(everything):
+        assert_reported(tween)
 
 
 def test_what_a_corpus_was_made_of_is_said(everything: Engine) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -15,7 +14,7 @@ import pytest
 from command_line import Run
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from toys import solution
+from toys import evaluate, solution
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.bundled import bundled
@@ -24,7 +23,7 @@ from motionmind.formats import read_posture
 from motionmind.grammar.coordination import PSEUDO_COUNT, Coordination
 from motionmind.grammar.progression import fit_progression
 from motionmind.search.bounding import PROVEN
-from motionmind.search.cfn import cfn
+from motionmind.search.cfn import Ingredients, cfn
 from motionmind.search.problem import Model, Problem, Rules, Via, costs_to_go, places, with_waits
 from motionmind.search.sample import gibbs_sample, sample_path
 from motionmind.search.solve import solve
@@ -278,29 +277,14 @@ def test_whatever_is_asked_the_cost_is_that_of_brute_force(seed: int, share: flo
 
     chains = [f"chain{chain}" for chain in range(len(toy.sizes))]
     through = [Via(via.states, t) for via, t in zip(vias, found.passed, strict=True)]
-    text = json.loads(cfn(replace(problem, vias=through), len(path) - 1, chains))
-    assert written_cost(text, model, found.path, found.passed, chains) == pytest.approx(found.cost, abs=1e-4)
+    text = written(replace(problem, vias=through), len(path) - 1, chains, net, factor)
+    assert evaluate(text, path, chains) == pytest.approx(found.cost, abs=1e-4)
 
 
-def written_cost(text: dict[str, Any], model: Model, path: Int32s, passed: tuple[int, ...], chains: list[str]) -> float:
-    """What a path of moves costs in the problem as it is written."""
-    at = places(model, path)
-    value = {
-        f"{chain}_{t}": word(int(path[t, j]), int(at[t, j])) for j, chain in enumerate(chains) for t in range(len(path))
-    }
-    value |= {f"{chain}_{t}_on": word(int(at[t, j]), int(at[t, j])) for j, chain in enumerate(chains) for t in passed}
-    index = {name: text["variables"][name].index(value[name]) for name in text["variables"]}
-    total = 0.0
-    for function in text["functions"].values():
-        scope, costs = function["scope"], function["costs"]
-        if not scope:
-            total += costs[0]
-        elif len(scope) == 1:
-            total += costs[index[scope[0]]]
-        else:
-            listed = {tuple(costs[k : k + 2]): costs[k + 2] for k in range(0, len(costs), 3)}
-            total += listed.get(tuple(index[name] for name in scope), function["defaultcost"])
-    return total
+def written(problem: Problem, moves: int, chains: list[str], net: Coordination, factor: float) -> str:
+    """The problem as it is written, all edges of one kind."""
+    one = np.zeros(len(problem.model.costs), np.int64)
+    return cfn(problem, moves, chains, Ingredients(("edge",), one, factor * net.child_costs, factor * net.parent_costs))
 
 
 def test_a_guide_over_moves_is_paid_on_the_way_and_the_optimum_is_that_of_toulbar2(tmp_path: Path) -> None:
@@ -308,7 +292,7 @@ def test_a_guide_over_moves_is_paid_on_the_way_and_the_optimum_is_that_of_toulba
     checked = 0
     for seed in range(60):
         toy, (start, goal) = body(seed), ends_of(seed)
-        model, _ = toy.of_moves(goal, 0.7, 1.0)
+        model, net = toy.of_moves(goal, 0.7, 1.0)
         rng = np.random.default_rng(seed)
         guides = [rng.uniform(-2.0, 3.0, (max(moves - 1, 0), model.starts[-1])) for moves in range(MOVES + 1)]
         vias = [Via(rng.integers(toy.sizes))] * (seed % 2)
@@ -318,20 +302,16 @@ def test_a_guide_over_moves_is_paid_on_the_way_and_the_optimum_is_that_of_toulba
             continue
         moves, chains = len(found.path) - 1, [f"chain{chain}" for chain in range(len(toy.sizes))]
         problem = replace(problem, vias=[Via(via.states, t) for via, t in zip(vias, found.passed, strict=True)])
-        plain = json.loads(cfn(replace(problem, guide=None), moves, chains))
+        plain = written(replace(problem, guide=None), moves, chains, net, 1.0)
         paid = sum(guides[moves][t, model.starts[:-1] + states].sum() for t, states in enumerate(found.path[1:-1]))
-        cost = written_cost(plain, model, found.path, found.passed, chains) + paid
+        cost = evaluate(plain, places(model, found.path), chains) + paid
         assert cost == pytest.approx(found.cost, abs=1e-4), seed
-        (tmp_path / "problem.cfn").write_text(cfn(problem, moves, chains))
+        (tmp_path / "problem.cfn").write_text(written(problem, moves, chains, net, 1.0))
         network = pytoulbar2.CFN(verbose=-1)
         network.Read(str(tmp_path / "problem.cfn"))
         assert network.Solve()[1] == pytest.approx(found.cost, abs=1e-4), seed
         checked += moves > 1
     assert checked > 10
-
-
-def word(state: int, place: int) -> str:
-    return f"s{state}" if state == place else f"m{state}_s{place}"
 
 
 def test_paths_are_drawn_as_often_as_they_are_likely() -> None:

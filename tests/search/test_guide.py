@@ -25,7 +25,7 @@ from motionmind.search.sample import sample_path
 from motionmind.search.solve import Certificate, Progress, feasible, solve
 from motionmind.search.trellis import segment_trellises
 from motionmind.tween.engine import Engine
-from motionmind.tween.problem import build_model
+from motionmind.tween.problem import build_model, ingredients_of
 
 MOVES = 5
 SAME = 2 * PROVEN
@@ -240,10 +240,10 @@ def test_the_guide_is_checked() -> None:
 # --- the problem written out ------------------------------------------------------------------------------------------
 
 
-def written(problem: Problem, found: Certificate, chains: list[str]) -> str:
+def written(toy: Toy, problem: Problem, found: Certificate, chains: list[str]) -> str:
     """The problem in the number of moves that was found, its vias where they were passed."""
     vias = [Via(via.states, move) for via, move in zip(problem.vias, found.passed, strict=True)]
-    return cfn(replace(problem, vias=vias), len(found.path) - 1, chains)
+    return cfn(replace(problem, vias=vias), len(found.path) - 1, chains, toy.ingredients(problem))
 
 
 def test_a_path_costs_in_the_written_problem_what_its_certificate_states() -> None:
@@ -253,7 +253,7 @@ def test_a_path_costs_in_the_written_problem_what_its_certificate_states() -> No
         found = solution(problem)
         if found is not None:
             chains = [f"chain{chain}" for chain in range(len(toy.sizes))]
-            text = written(problem, found, chains)
+            text = written(toy, problem, found, chains)
             assert evaluate(text, found.path, chains) == pytest.approx(found.cost, abs=1e-4), seed
             moves = [0, *found.passed, len(found.path) - 1]
             cost = sum(
@@ -290,7 +290,7 @@ def test_the_guided_optima_of_toys_are_those_of_toulbar2(tmp_path: Path) -> None
         problem = toy.problem(toy.rules(2, MOVES), random_vias(toy, seed, seed % 3, at=0.3), random_guide(toy, seed))
         found = solution(problem)
         if found is not None:
-            text = written(problem, found, [f"chain{chain}" for chain in range(len(toy.sizes))])
+            text = written(toy, problem, found, [f"chain{chain}" for chain in range(len(toy.sizes))])
             assert toulbar2(text, tmp_path) == pytest.approx(found.cost, abs=1e-4), seed
             checked += 1
     assert checked > 10
@@ -303,7 +303,7 @@ def test_costs_of_a_millionth_of_a_nat_are_written_as_toulbar2_reads_them(tmp_pa
     problem = toy.problem(toy.rules(MOVES, MOVES), guide=lambda _: small)
     found = solution(problem)
     assert found is not None
-    text = written(problem, found, [f"chain{chain}" for chain in range(len(toy.sizes))])
+    text = written(toy, problem, found, [f"chain{chain}" for chain in range(len(toy.sizes))])
     assert not re.search(r"\de-", text)
     assert toulbar2(text, tmp_path) == pytest.approx(found.cost, abs=1e-4)
 
@@ -332,5 +332,6 @@ def test_optima_on_bundled_ballet_are_those_of_toulbar2(guided: bool, tmp_path: 
         problem = Problem(model, start, goal, Rules(1.0, 1.0, 1, 30, 200_000), guide=guide if guided else None)
         found = solve(problem)
         assert found.status == "optimal"
-        text = cfn(problem, len(found.path) - 1, engine.grammar.chains)
+        ingredients = ingredients_of(problem, engine.grammar, "conditional", engine.grammar.coordination, 1.0, 1.0)
+        text = cfn(problem, len(found.path) - 1, engine.grammar.chains, ingredients)
         assert toulbar2(text, tmp_path) == pytest.approx(found.cost, abs=1e-3)

@@ -629,13 +629,15 @@ def test_a_path_costs_in_the_written_problem_what_its_certificate_states() -> No
         if found is None:
             continue
         moves, chains = len(found.path) - 1, [f"chain{chain}" for chain in range(len(toy.sizes))]
-        text = cfn(toy.problem(toy.rules(1, MOVES)), moves, chains)
+        problem = toy.problem(toy.rules(1, MOVES))
+        text = cfn(problem, moves, chains, toy.ingredients(problem))
         assert evaluate(text, found.path, chains) == pytest.approx(found.cost, abs=1e-4), seed
 
 
 def test_the_written_problem_forbids_what_the_model_forbids() -> None:
     toy = a_body(edges=(np.array([[1.0, 1.0], [np.inf, np.inf]]), np.ones((2, 2))))
-    text = cfn(toy.problem(toy.rules(3, 3)), 3, ["a", "b"])
+    problem = toy.problem(toy.rules(3, 3))
+    text = cfn(problem, 3, ["a", "b"], toy.ingredients(problem))
     top = float(json.loads(text)["problem"]["mustbe"].removeprefix("<"))
     legal, illegal = [[0, 0], [0, 0], [0, 0], [1, 1]], [[0, 0], [1, 0], [0, 0], [1, 1]]
     assert evaluate(text, np.array(legal), ["a", "b"]) < top

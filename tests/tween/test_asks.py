@@ -228,7 +228,7 @@ def test_what_was_asked_is_in_the_written_problem(tmp_path: Path) -> None:
             continue
         at = [Via(via.states, move) for via, move in zip(vias, found.passed, strict=True)]
         chains = [f"chain{chain}" for chain in range(len(toy.sizes))]
-        text = cfn(replace(problem, vias=at), len(found.path) - 1, chains)
+        text = cfn(replace(problem, vias=at), len(found.path) - 1, chains, toy.ingredients(problem))
         (tmp_path / "problem.cfn").write_text(text)
         network = pytoulbar2.CFN(verbose=-1)
         network.Read(str(tmp_path / "problem.cfn"))

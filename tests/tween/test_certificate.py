@@ -18,7 +18,7 @@ from motionmind.search.cfn import cfn
 from motionmind.search.problem import Problem, Rules, with_waits
 from motionmind.search.solve import solve
 from motionmind.tween.engine import Engine
-from motionmind.tween.problem import build_model
+from motionmind.tween.problem import build_model, ingredients_of
 from motionmind.tween.progression import lift_to_moves
 
 pytestmark = pytest.mark.long
@@ -120,7 +120,8 @@ def test_optima_on_recorded_dance_are_those_of_toulbar2(cmu05: Engine, tmp_path:
         problem = Problem(model, start, goal, rules)
         ours = solve(problem)
         moves = len(ours.path) - 1
-        (tmp_path / "problem.cfn").write_text(cfn(problem, moves, cmu05.grammar.chains))
+        ingredients = ingredients_of(problem, cmu05.grammar, "conditional", cmu05.grammar.coordination, 1.0, 1.0)
+        (tmp_path / "problem.cfn").write_text(cfn(problem, moves, cmu05.grammar.chains, ingredients))
         assert toulbar2(tmp_path / "problem.cfn") == pytest.approx(ours.cost, abs=SAME), pair
         assert ours.lower_bound <= ours.cost
         optimal += ours.status == "optimal"
@@ -142,7 +143,8 @@ def test_optima_of_coordinated_moves_are_those_of_toulbar2(cmu05: Engine, tmp_pa
         problem = Problem(of_these, start, goal, rules)
         ours = solve(problem)
         assert ours.status == "optimal"
-        text = cfn(problem, len(ours.path) - 1, cmu05.grammar.chains)
+        ingredients = ingredients_of(problem, cmu05.grammar, "conditional", net, 1.0, 1.0)
+        text = cfn(problem, len(ours.path) - 1, cmu05.grammar.chains, ingredients)
         (tmp_path / "problem.cfn").write_text(text)
         assert toulbar2(tmp_path / "problem.cfn") == pytest.approx(ours.cost, abs=SAME), pair
 
@@ -158,6 +160,6 @@ def test_optima_of_toy_bodies_at_each_number_of_moves_are_those_of_toulbar2(tmp_
             problem = toy.problem(toy.rules(moves, moves))
             ours = solution(problem)
             if ours is not None:
-                text = cfn(problem, moves, chains)
+                text = cfn(problem, moves, chains, toy.ingredients(problem))
                 (tmp_path / "problem.cfn").write_text(text)
                 assert toulbar2(tmp_path / "problem.cfn") == pytest.approx(ours.cost, abs=SAME), (seed, moves)
