@@ -23,6 +23,7 @@ import numpy as np
 import pytest
 from bundled_clips import ballet_clip
 from command_line import Run
+from ingredients import altered
 from PIL import Image, ImageChops
 
 from motionmind import __version__, write_motion
@@ -30,10 +31,12 @@ from motionmind.cli import app
 
 ROOT = Path(__file__).parents[2]
 README, GALLERY, REFERENCES = ROOT / "README.md", ROOT / "docs" / "gallery.md", ROOT / "docs" / "references.md"
+PROOF = ROOT / "docs" / "proof.md"
 GUIDES = [
     README,
     ROOT / "docs" / "tutorial.md",
     *sorted((ROOT / "docs" / "how-to").glob("*.md")),
+    PROOF,
     ROOT / "docs" / "api.md",
 ]
 EXPERIMENTS = sorted((ROOT / "experiments").rglob("README.md"))
@@ -269,6 +272,29 @@ def test_the_commands_and_the_python_of_a_guide_run(
         if written and document != README:
             path = here / written[1]
             assert path.exists() or path.with_stem(f"{path.stem}-1").exists(), line
+
+
+def test_the_proof_adds_up_and_would_not_if_an_ingredient_were_another(
+    here: Path, run: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document = [*blocks(PROOF.read_text("utf-8"))]
+    (script,) = (block.text for block in document if block.language == "python")
+    for block in document:
+        for line in commands_of(block):
+            call(run, line)
+    problem = Path("problem.cfn").read_text("utf-8")
+
+    def differences() -> list[bool]:
+        """Whether moves, coordination, guide and the whole differ between the two lines that the script prints."""
+        capsys.readouterr()
+        exec(compile(script, name_of(PROOF), "exec"), {})
+        file, report = (np.array(line.split(), dtype=np.float64) for line in capsys.readouterr().out.splitlines())
+        return list(np.abs(file - report) > 1e-3)
+
+    assert differences() == [False] * 4
+    for part, changed in (("transition", 0), ("network", 1), ("guide", 2), ("allowed", 3), ("moves", 3)):
+        Path("problem.cfn").write_text(altered(problem, part), "utf-8")
+        assert differences() == [number in (changed, 3) for number in range(4)], part
 
 
 @pytest.mark.parametrize("document", [path for path in DOCUMENTS if path not in GUIDES], ids=name_of)
