@@ -111,7 +111,12 @@ def _grow(founders: Ints, seen: Floats) -> _Tree:
     """Return the tree of founders [K], postures by number, of all of which [N, d] is seen."""
     bounds, points = node_bounds(len(founders)), seen[founders]
     order, boxes = np.arange(len(founders)), np.empty((len(bounds), 2, points.shape[1]))
-    _halve(points, bounds, order, boxes)
+    for node, (start, stop) in enumerate(bounds):
+        own = points[order[start:stop]]
+        boxes[node] = own.min(axis=0, initial=np.inf), own.max(axis=0, initial=-np.inf)
+        if 2 * node + 2 < len(bounds):  # its children halve it where it is widest
+            widest = np.argmax(boxes[node, 1] - boxes[node, 0])
+            order[start:stop] = order[start:stop][np.argsort(own[:, widest], kind="stable")]
     return _Tree(founders, order, points[order], bounds, boxes)
 
 
@@ -164,26 +169,6 @@ def _look_along(orientations: Floats, middle: Floats, directions: Floats, out: F
                 off = row[k] / root - middle[9 * joint + k]
                 for d in range(DIRECTIONS):
                     out[n, d] += off * directions[9 * joint + k, d]
-
-
-@jit
-def _halve(points: Floats, bounds: Int32s, order: Ints, boxes: Floats) -> None:
-    """Order points [K, d] so that a node's children halve it where it is widest; write the nodes' boxes [D, 2, d]."""
-    for node in range(len(bounds)):
-        start, stop = bounds[node]
-        widest, width = 0, -1.0
-        for d in range(points.shape[1]):
-            low, high = np.inf, -np.inf
-            for k in range(start, stop):
-                low, high = min(low, points[order[k], d]), max(high, points[order[k], d])
-            boxes[node, 0, d], boxes[node, 1, d] = low, high
-            if high - low > width:
-                widest, width = d, high - low
-        if 2 * node + 2 < len(bounds):
-            keys = np.empty(stop - start)
-            for k in range(start, stop):
-                keys[k - start] = points[order[k], widest]
-            order[start:stop] = order[start:stop][np.argsort(keys)]
 
 
 @jit

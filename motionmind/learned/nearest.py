@@ -34,8 +34,12 @@ def find_near(
         count: how many moments for each posture.
         leaves: how many to search.
     """
-    tree = _tree_of(trees, number)
-    return _find(read_only(orientations), tree, np.ascontiguousarray(postures[:, tree.part]), count, leaves)
+    tree, shown = _tree_of(trees, number), read_only(orientations)
+    leaf = (len(tree.bounds) + 1) // 2
+    least = np.diff(tree.bounds[-leaf:]).min()  # so that each posture has as many
+    count = min(count, leaves * least if leaves < leaf else len(tree.order))
+    sought = np.ascontiguousarray(postures[:, tree.part])
+    return np.stack([_nearest(*_leaves(shown, tree, posture, leaves), count) for posture in sought])
 
 
 def postures_near(
@@ -52,7 +56,8 @@ def postures_near(
         leaves: how many to search.
     """
     tree = _tree_of(trees, 0)
-    return _find_below(read_only(orientations), tree, np.ascontiguousarray(posture[tree.part]), count, below, leaves)
+    moments, off = _leaves(read_only(orientations), tree, np.ascontiguousarray(posture[tree.part]), leaves)
+    return _nearest(moments[moments < below], off[moments < below], count)
 
 
 class _Tree(NamedTuple):
@@ -83,33 +88,9 @@ def _tree_of(trees: Neighbours, number: int) -> _Tree:
     )
 
 
-@jit
-def _find(orientations: Floats, tree: _Tree, postures: Floats, count: int, leaves: int) -> Ints:
-    """Return moments near each posture of a part [K, m, 4]: [K, n]."""
-    leaf = (len(tree.bounds) + 1) // 2
-    least = (tree.bounds[-leaf:, 1] - tree.bounds[-leaf:, 0]).min()  # so that each posture has as many
-    count = min(count, leaves * least if leaves < leaf else len(tree.order))
-    found = np.empty((len(postures), count), np.int64)
-    for k in range(len(postures)):
-        found[k] = _nearest(*_leaves(orientations, tree, postures[k], leaves), count)
-    return found
-
-
-@jit
-def _find_below(orientations: Floats, tree: _Tree, posture: Floats, count: int, below: int, leaves: int) -> Ints:
-    """Return moments near a posture of a part [m, 4] whose numbers are below one, so many or all that are found [n]."""
-    moments, off = _leaves(orientations, tree, posture, leaves)
-    some = np.flatnonzero(moments < below)
-    return _nearest(moments[some], off[some], min(count, len(some)))
-
-
-@jit
 def _nearest(moments: Int32s, off: Singles, count: int) -> Ints:
-    """Return so many of some moments, those that are least off, the nearest first [n]."""
-    if count == 0:
-        return np.empty(0, np.int64)
-    within = np.flatnonzero(off <= np.partition(off, count - 1)[count - 1])  # few of many are sorted
-    return moments[within[np.argsort(off[within], kind="mergesort")[:count]]].astype(np.int64)
+    """Return so many of some moments, or all, those that are least off, the nearest first [n]."""
+    return moments[np.argsort(off, kind="stable")[:count]].astype(np.int64)
 
 
 @jit
@@ -119,7 +100,11 @@ def _search(posture: Floats, bounds: Int32s, centres: Singles, radii: Floats, le
     Nodes wait in a heap, those that promise more first; of equals, the first. With `heapq` it takes a quarter longer.
     """
     found, many = np.empty(leaves, np.int64), 0
-    promises, nodes, waiting = np.empty((len(bounds) + 1) // 2), np.empty((len(bounds) + 1) // 2, np.int64), 1
+    promises, nodes, waiting = (
+        np.empty((len(bounds) + 1) // 2),
+        np.empty((len(bounds) + 1) // 2, np.int64),
+        min(leaves, 1),
+    )
     promises[0], nodes[0] = 0.0, 0
     while waiting and many < leaves:
         node = nodes[0]

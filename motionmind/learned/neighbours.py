@@ -147,32 +147,36 @@ def node_bounds(count: int) -> Int32s:
     return np.concatenate(levels).astype(np.int32)
 
 
-@jit
 def _grow(shown: Singles, bounds: Int32s, order: Int32s, centres: Singles, radii: Floats) -> None:
     """Grow the tree of a part that moments show [N, m, 4]: write its order [N], and its nodes' centres and radii.
 
     What they show is put in that order, too: so memory is read as it lies.
     """
     order[:] = np.arange(len(order))
-    keys, joints = np.empty(len(order)), shown.shape[1]
-    for node in range(len(bounds)):
-        start, stop = bounds[node]
+    keys = np.empty(len(order))
+    for node, (start, stop) in enumerate(bounds):
         own = shown[start:stop]
-        sample = own[:: max(1, (stop - start) // SAMPLE)]
-        _centre(sample, centres[node])
-        radius = 0.0
-        for k in range(len(own)):
-            radius = max(radius, squared_distance(own[k], centres[node]))
-        radii[node] = np.sqrt(radius / joints) + _SLACK
+        radii[node] = _measure(own, centres[node], keys)
         if 2 * node + 2 < len(bounds):
-            one = sample[_farthest(sample, centres[node])]
-            other = sample[_farthest(sample, one)]
-            for k in range(len(own)):
-                keys[k] = squared_distance(own[k], one) - squared_distance(own[k], other)
-            sorted_by_key = np.argsort(keys[: len(own)], kind="mergesort")
+            sorted_by_key = np.argsort(keys[: len(own)], kind="stable")
             order[start:stop] = order[start:stop][sorted_by_key]
-            for j in range(joints):  # one by one: a copy of all may not fit into memory
+            for j in range(own.shape[1]):  # one by one: a copy of all may not fit into memory
                 own[:, j] = own[sorted_by_key, j]
+
+
+@jit
+def _measure(own: Singles, centre: Singles, keys: Floats) -> float:
+    """Write a node's centre [m, 4], and by how much each of its moments [n, m, 4] is nearer to one that is far from the
+    centre, or if more than 0 to one that is far from that [n]; return its radius."""
+    sample = own[:: max(1, len(own) // SAMPLE)]
+    _centre(sample, centre)
+    one = sample[_farthest(sample, centre)]
+    other = sample[_farthest(sample, one)]
+    radius = 0.0
+    for k in range(len(own)):
+        radius = max(radius, squared_distance(own[k], centre))
+        keys[k] = squared_distance(own[k], one) - squared_distance(own[k], other)
+    return float(np.sqrt(radius / own.shape[1]) + _SLACK)
 
 
 @jit
@@ -202,13 +206,9 @@ def _farthest(shown: Singles, posture: Singles) -> int:
     return farthest
 
 
-@jit
 def _encode(shown: Singles, bounds: Int32s, codes: Int8s) -> None:
     """Write the codes [N * m * 4] of what moments show of a part, in its tree's order [N, m, 4]."""
     width = 4 * shown.shape[1]
-    for node in range(len(bounds) // 2, len(bounds)):
-        start, stop = bounds[node]
-        own = codes[width * start : width * stop].reshape(width, stop - start)
-        for k in range(stop - start):
-            for c in range(width):
-                own[c, k] = np.round(WHOLE * shown[start + k, c // 4, c % 4])
+    for start, stop in bounds[len(bounds) // 2 :]:
+        own = shown[start:stop].reshape(-1, width).astype(np.float64)
+        codes[width * start : width * stop] = np.round(WHOLE * own.T).ravel()

@@ -142,7 +142,7 @@ def test_postures_near_one_are_no_middles_of_moves(engine: Engine, trees: Neighb
 def test_what_was_learned_just_now_is_searched_by_the_loop_for_what_was_loaded(
     engine: Engine, trees: Neighbours
 ) -> None:
-    shown, loop = engine.carriage.orientations.copy(), cast(Any, nearest._find)
+    shown, loop = engine.carriage.orientations.copy(), cast(Any, nearest._leaves)
     loaded = shown.view()
     loaded.setflags(write=False)
     find_near(trees, 0, loaded, shown[:1], 5)
