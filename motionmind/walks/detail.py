@@ -31,7 +31,6 @@ LIVELIER = 4.0
 # How much more detail all joints but the legs' get, where a movement stands still beside what it copies; chosen on
 # `cmu-05`.
 MISSES = 0.6
-_SIDE = 8  # poses that are measured at once, of which the last may be none
 
 
 def likest_moves(moves: Moves, orientations: Floats, poses: Floats, among: Ints | None = None) -> Ints:
@@ -47,7 +46,6 @@ def likest_moves(moves: Moves, orientations: Floats, poses: Floats, among: Ints 
         poses: orientations of the movement's postures [T + 1, J, 4].
         among: numbers of the moves to choose from, rising [m] (`moves_near`); None for all.
     """
-    poses = read_only(np.ascontiguousarray(poses))
     some = moves if among is None else moves.take(among)
     if among is None:
         among, begins, ends = np.arange(len(moves)), moves.begins, moves.ends
@@ -55,7 +53,8 @@ def likest_moves(moves: Moves, orientations: Floats, poses: Floats, among: Ints 
     else:
         postures, which = np.unique([some.begins, some.ends], return_inverse=True)
         begins, ends = which.reshape(2, -1)
-    distances = _squared_distances(read_only(orientations), postures, poses) / poses.shape[1]
+    shown = np.ascontiguousarray(poses.transpose(1, 2, 0))
+    distances = _squared_distances(read_only(orientations), postures, shown).T / len(shown)
     cost = distances[:-1, begins] + distances[1:, ends]
     before = _predecessors(some, among)
     total, came_from = cost[0], []
@@ -154,17 +153,13 @@ def _predecessors(some: Moves, among: Ints) -> Ints:
 
 @jit
 def _squared_distances(orientations: Floats, some: Ints, poses: Floats) -> Floats:
-    """Return the squared distance of each of `poses` [T, J, 4] from some of all `orientations` [N, L, 4]: [T, n]."""
-    count = len(poses)
-    out, off = np.empty((count, len(some))), np.empty(count + -count % _SIDE)
-    shown = np.zeros((poses.shape[1], 4, len(off)))
-    shown[:, :, :count] = poses.transpose(1, 2, 0)
+    """Return the squared distance of some of all `orientations` [N, L, 4] from each of poses [J, 4, T]: [n, T]."""
+    out = np.zeros((len(some), poses.shape[2]))
     for i in range(len(some)):
-        off[:] = 0.0
-        for j in range(len(shown)):
+        off = out[i]
+        for j in range(len(poses)):
             x, y, z, w = orientations[some[i], j]
             for t in range(len(off)):  # side by side, so that several are measured at once; as `squared_turn`
-                cosine = x * shown[j, 0, t] + y * shown[j, 1, t] + z * shown[j, 2, t] + w * shown[j, 3, t]
+                cosine = x * poses[j, 0, t] + y * poses[j, 1, t] + z * poses[j, 2, t] + w * poses[j, 3, t]
                 off[t] += 4.0 * max(1.0 - cosine * cosine, 0.0)
-        out[:, i] = off[:count]
     return out

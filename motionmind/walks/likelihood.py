@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Ints
-from motionmind.jit import jit
+from motionmind.jit import jit, read_only
 
 # How near a walk's ends are to the given postures, radians a joint, standard deviation: the least and the greatest, and
 # between them a share of the distance of the corpus's nearest posture. Where movement recurs the nearest know best.
@@ -36,7 +36,6 @@ _BLOCK = 256  # moments whose distances are measured at a time: their sums are i
 ANYWHERE = 0.006  # share of steps after which it goes on from any posture: some walk joins any two
 
 
-@jit
 def squared_distances(orientations: Floats, members: Ints, parts: int, postures: Floats) -> Floats:
     """Return the squared distances of parts of the body from postures, means over their joints [P, K, N], radians^2.
 
@@ -46,7 +45,15 @@ def squared_distances(orientations: Floats, members: Ints, parts: int, postures:
         parts: how many parts there are.
         postures: orientations of the joints that distances are measured from [K, J, 4].
     """
-    out, sizes = np.zeros((parts, len(postures), len(orientations))), np.bincount(members.ravel(), minlength=parts)
+    out = np.zeros((parts, len(postures), len(orientations)))
+    _add_squares(read_only(orientations), members, postures, out)
+    out /= np.bincount(members.ravel(), minlength=parts)[:, None, None]
+    return out
+
+
+@jit
+def _add_squares(orientations: Floats, members: Ints, postures: Floats, out: Floats) -> None:
+    """Add the squared distances of `squared_distances`, sums over the parts' joints [P, K, N]."""
     shown, own = np.empty((4, _BLOCK)), np.empty(_BLOCK)
     for first in range(0, len(orientations), _BLOCK):
         count = min(_BLOCK, len(orientations) - first)
@@ -63,9 +70,6 @@ def squared_distances(orientations: Floats, members: Ints, parts: int, postures:
                     sums = out[part, k, first : first + count]
                     for i in range(count):
                         sums[i] += own[i]
-    for part in range(parts):
-        out[part] /= sizes[part]
-    return out
 
 
 @jit
@@ -117,16 +121,11 @@ def distances_of(shown: Floats, postures: Floats) -> Floats:
     return np.asarray(out / joints)
 
 
-@jit
 def squared_differences(rates: Floats, rate: Floats) -> Floats:
     """Return the squared difference of each of a part's angular velocities [N, m, 3] from one of them [m, 3], mean over
     joints [N]."""
-    out = np.zeros(len(rates))
-    for i in range(len(rates)):
-        for j in range(len(rate)):
-            for k in range(3):
-                out[i] += (rates[i, j, k] - rate[j, k]) ** 2
-    return out / len(rate)
+    columns = ((rates - rate) ** 2).reshape(len(rates), -1).T
+    return np.asarray(sum(columns, np.zeros(len(rates))) / len(rate))  # one after another
 
 
 def variance_at_ends(nearest: float) -> float:
@@ -139,17 +138,15 @@ def variance_at_ends(nearest: float) -> float:
     return min(max(OF_NEAREST * nearest, least), most) ** 2
 
 
-@jit
 def nearest_to_ends(off: Floats) -> tuple[float, float]:
     """Return the distances of the nearest moments from both ends, radians a joint.
 
     Args:
         off: squared distances of moments from the first posture, and from the last, and others [K, n], radians^2.
     """
-    return np.sqrt(off[0].min()), np.sqrt(off[1].min())
+    return float(np.sqrt(off[0].min())), float(np.sqrt(off[1].min()))
 
 
-@jit
 def in_variances(off: Floats, of_first: float, of_last: float) -> Floats:
     """Return squared distances of moments in units of their variances [K, n].
 
@@ -168,20 +165,11 @@ def likelihoods(squares: Floats) -> Floats:
     Args:
         squares: squared distances in units of a variance [K, n].
     """
-    exponents = _exponents(squares)
+    exponents = 0.5 * squares
+    np.subtract(exponents.min(axis=1, keepdims=True), exponents, out=exponents)
     return np.exp(exponents, out=exponents)
 
 
-@jit
-def _exponents(squares: Floats) -> Floats:
-    """Return the exponents of `likelihoods` [K, n]."""
-    out = 0.5 * squares
-    for k in range(len(out)):
-        out[k] = out[k].min() - out[k]
-    return out
-
-
-@jit
 def share_of_others(likely: Floats, near: tuple[Bools, Bools], weights: Floats) -> float:
     """Return the share of walks that begin or end in moments that are not near, at the end where it is greater.
 
@@ -192,11 +180,8 @@ def share_of_others(likely: Floats, near: tuple[Bools, Bools], weights: Floats) 
     """
     share = 0.0
     for k in range(2):
-        every, others = 0.0, 0.0
-        for i in range(len(weights)):
-            every += weights[i] * likely[k, i]
-            if not near[k][i]:
-                others += weights[i] * likely[k, i]
+        likely_at = weights * likely[k]
+        every, others = (float(of.cumsum()[-1]) for of in (likely_at, np.where(near[k], 0.0, likely_at)))
         share = max(share, others / every)
     return share
 

@@ -24,19 +24,17 @@ from weakref import WeakKeyDictionary, ref
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
-from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import find_near
 from motionmind.learned.neighbours import Neighbours
 from motionmind.walks.likelihood import distances_of, show
-from motionmind.walks.steps import follow, place_of, steps_at
+from motionmind.walks.steps import follow, steps_at
 
 SPLITS = 384  # balls that are cut in two
 ENDS = 64  # moments near each end, with those that follow on them or lead to them
 NEAREST = 8  # of these, that are the nearest; the others are spread evenly, from near to far,
 AMONG = 1024  # over so many: of a large corpus hundreds are as near as the nearest, and what they do next differs
 ALONG = 12  # steps for which these are followed, at most: 1.2 s of a corpus of five postures a second
-COARSE = 32  # places in a tree's order for which one ball is kept
 KEPT = 32  # look-ups of parts that are kept: of a body of 16 parts those from stop to stop, twice
 HARDLY = 1e-200  # of the likeliest moment: sums of such chances might be 0
 
@@ -85,40 +83,28 @@ class Found(NamedTuple):
     off: Floats
 
 
-@jit
-def _chosen(
-    near: Ints,
-    nearest: Ints,
-    balls: _Balls,
-    steps: int,
-    begins: Ints,
-    ends: Ints,
-    postures: int,
-    shares: Floats,
-    weights: Floats,
-    clusters: Int32s,
-    number: int,
-) -> tuple[Ints, Floats, Ints, Ints, Floats, Int32s, tuple[Bools, Bools]]:
-    """Return the attributes of `Chosen`: in one call, so that threads seldom wait for Python, which runs in one of them
-    at a time.
+def _chosen(carriage: Carriage, number: int, near: Ints, nearest: Ints, balls: _Balls, steps: int) -> Chosen:
+    """Return the moments chosen for the walks of a part.
 
     Args:
+        carriage: all moments.
+        number: of the part.
         near: moments near both ends, which are followed [2, n].
         nearest: those of them that stand for themselves [2, m].
         balls: of the part's tree.
         steps: for which the moments are followed.
-        begins, ends, shares, weights, clusters: of the carriage.
-        postures: how many moments are postures.
-        number: of the part.
     """
-    on = follow(near[0], True, steps, begins, ends, postures)
-    back = follow(near[1], False, steps, begins, ends, postures)
-    moments = _rising(np.concatenate((near.ravel(), balls.middles, on, back)))
-    own, stands = _shares(moments, nearest.ravel(), balls, weights)
-    leaves, leads, which = steps_at(moments, True, begins, ends, postures)
-    goals, here = _goals(moments, leads, stands, balls), _numbered(clusters, moments, number)
+    chain = carriage.begins, carriage.ends, len(carriage.weights) - len(carriage.turn)
+    ways = [follow(near[k], k == 0, steps, *chain) for k in range(2)]
+    moments = np.unique(np.concatenate([near.ravel(), balls.middles, *ways]))
+    weights, stands = _shares(moments, nearest.ravel(), balls, carriage.weights)
+    begins, leads, which = steps_at(moments, True, *chain)
+    goals = np.minimum(np.searchsorted(moments, leads), len(moments) - 1)
+    others = np.flatnonzero(moments[goals] != leads)  # steps to what is not chosen lead to what stands for its ball
+    goals[others] = stands[_balls_of(leads[others], balls)]
+    clusters = np.unique(carriage.clusters[moments, number], return_inverse=True)[1].astype(np.int32)
     both = _among(moments, nearest[0]), _among(moments, nearest[1])
-    return moments, own, leaves, goals, shares[which], here, both
+    return Chosen(moments, weights, begins, goals, carriage.shares[which], clusters, both)
 
 
 def steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
@@ -140,20 +126,9 @@ def steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
     return begins, goals, np.concatenate([chosen.shares, np.ones(len(ends))])
 
 
-@jit
 def merged(some: Ints, others: Ints) -> Ints:
     """Return numbers that are among either of two, each of them rising."""
-    out, count, k = np.empty(len(some) + len(others), np.int64), 0, 0
-    for number in some:
-        while k < len(others) and others[k] <= number:
-            if others[k] < number:
-                out[count] = others[k]
-                count += 1
-            k += 1
-        out[count] = number
-        count += 1
-    out[count : count + len(others) - k] = others[k:]
-    return out[: count + len(others) - k]
+    return np.union1d(some, others)
 
 
 _Owner = TypeVar("_Owner")
@@ -210,11 +185,10 @@ def _found(carriage: Carriage, number: int, ends: bytes, steps: int) -> Found:
     apart = np.linspace(NEAREST, ranked.shape[1] - 1, max(ENDS - NEAREST, 0))
     ranks = np.unique(np.concatenate([np.arange(NEAREST), apart]).astype(int).clip(max=ranked.shape[1] - 1))
     near, nearest, balls = ranked[:, ranks], np.ascontiguousarray(ranked[:, :NEAREST]), _balls(trees, number)
-    begins, ends_of, count = carriage.begins, carriage.ends, len(carriage.weights) - len(carriage.turn)
-    of_all = carriage.shares, carriage.weights, carriage.clusters
-    found = _chosen(near, nearest, balls, steps, begins, ends_of, count, *of_all, number)
-    shown = show(carriage.orientations, found[0], part)
-    return Found(Chosen(*found), shown, distances_of(shown, np.ascontiguousarray(postures[:, part])))
+    chosen = _chosen(carriage, number, near, nearest, balls, steps)
+    assert isinstance(chosen.moments, np.ndarray)
+    shown = show(carriage.orientations, chosen.moments, part)
+    return Found(chosen, shown, distances_of(shown, np.ascontiguousarray(postures[:, part])))
 
 
 class _Balls(NamedTuple):
@@ -224,14 +198,12 @@ class _Balls(NamedTuple):
         starts: where they begin in that order [B].
         weights: sums of their moments' weights [B].
         middles: a moment of each [B].
-        first: the ball that each COARSE-th moment of that order is in: the ball of any is that or soon after.
         ranks: where each of the corpus's moments is in that order [N].
     """
 
     starts: Int32s
     weights: Floats
     middles: Ints
-    first: Int32s
     ranks: Int32s
 
 
@@ -240,40 +212,10 @@ def _balls(trees: Neighbours, number: int) -> _Balls:
     """Return the balls that a part's tree is cut into."""
     nodes = _cut(trees.bounds, trees.radii[number], trees.weights[number])
     starts, order = np.ascontiguousarray(trees.bounds[nodes, 0]), trees.order[number]
-    first = np.searchsorted(starts, np.arange(0, len(order), COARSE), side="right") - 1
     middles = order[trees.bounds[nodes].sum(axis=1) // 2].astype(np.int64)
-    return _Balls(starts, trees.weights[number][nodes], middles, first.astype(np.int32), trees.ranks[number])
+    return _Balls(starts, trees.weights[number][nodes], middles, trees.ranks[number])
 
 
-@jit
-def _rising(numbers: Ints) -> Ints:
-    """Return numbers without repetition, rising."""
-    numbers, count = np.sort(numbers), 0
-    for number in numbers:
-        if count == 0 or number != numbers[count - 1]:
-            numbers[count] = number
-            count += 1
-    return numbers[:count]
-
-
-@jit
-def _numbered(clusters: Int32s, moments: Ints, number: int) -> Int32s:
-    """Return the clusters of moments in one part, of those of all [N, P], by numbers that rise as theirs do, from 0 and
-    without gaps [n]."""
-    own, most = np.empty(len(moments), np.int32), 0
-    for k in range(len(moments)):
-        own[k] = clusters[moments[k], number]
-        most = max(most, own[k])
-    new = np.zeros(most + 1, np.int32)
-    new[own] = 1
-    count = 0
-    for cluster in range(most + 1):
-        count += new[cluster]
-        new[cluster] = count - 1
-    return new[own]
-
-
-@jit
 def _among(moments: Ints, some: Ints) -> Bools:
     """Return which of moments, that rise, are among some of them [n]."""
     out = np.zeros(len(moments), np.bool_)
@@ -281,7 +223,6 @@ def _among(moments: Ints, some: Ints) -> Bools:
     return out
 
 
-@jit
 def _shares(moments: Ints, singles: Ints, balls: _Balls, counts: Floats) -> tuple[Floats, Ints]:
     """Return the weights of chosen moments [n], and the first of them that stands for each ball [B].
 
@@ -291,71 +232,39 @@ def _shares(moments: Ints, singles: Ints, balls: _Balls, counts: Floats) -> tupl
         balls: of the part's tree.
         counts: weights of all moments [N].
     """
-    ball, alone = _balls_of(moments, balls), _among(moments, singles)
-    shared, rest = np.zeros(len(balls.weights)), balls.weights.copy()
-    for k in range(len(moments)):
-        if not alone[k]:
-            shared[ball[k]] += counts[moments[k]]
+    ball, own, alone = _balls_of(moments, balls), counts[moments], _among(moments, singles)
+    shared = np.bincount(ball[~alone], own[~alone], len(balls.weights))
     # Where none but what is near was chosen of a ball, that stands for what is left of it.
-    crowded = shared > 0.0
-    for k in range(len(moments)):
-        if not crowded[ball[k]]:
-            alone[k] = False
-            shared[ball[k]] += counts[moments[k]]
-        elif alone[k]:
-            rest[ball[k]] -= counts[moments[k]]
-    weights, stands = np.empty(len(moments)), np.empty(len(balls.weights), np.int64)
-    for k in range(len(moments) - 1, -1, -1):
-        weights[k] = counts[moments[k]]
-        if not alone[k]:
-            weights[k] *= rest[ball[k]] / shared[ball[k]]
-            stands[ball[k]] = k
-    return weights, stands
+    alone &= shared[ball] > 0.0
+    shared, rest = np.bincount(ball[~alone], own[~alone], len(balls.weights)), balls.weights.copy()
+    np.subtract.at(rest, ball[alone], own[alone])
+    stand, here = np.flatnonzero(~alone), ball[~alone]
+    own[stand] *= rest[here] / shared[here]
+    stands = np.empty(len(balls.weights), np.int64)
+    stands[here[::-1]] = stand[::-1]
+    return own, stands
 
 
-@jit
-def _goals(moments: Ints, leads: Ints, stands: Ints, balls: _Balls) -> Ints:
-    """Return which of the chosen moments [n] each step leads to [m]: its own, or what stands for the ball of that."""
-    out, at = np.empty(len(leads), np.int64), 0
-    for k in range(len(leads)):
-        at = place_of(moments, 0, len(moments), leads[k], at)
-        out[k] = at if at < len(moments) and moments[at] == leads[k] else -1
-    others = np.flatnonzero(out < 0)
-    out[others] = stands[_balls_of(leads[others], balls)]
-    return out
-
-
-@jit
 def _balls_of(moments: Ints, balls: _Balls) -> Ints:
     """Return the ball that each moment is in [n]."""
-    places = balls.ranks[moments]  # all at once: in the loop, each look-up would wait for the one before
-    out = np.empty(len(moments), np.int64)
-    for k in range(len(moments)):
-        ball = balls.first[places[k] // COARSE]
-        while ball + 1 < len(balls.starts) and balls.starts[ball + 1] <= places[k]:
-            ball += 1
-        out[k] = ball
-    return out
+    return np.searchsorted(balls.starts, balls.ranks[moments], side="right") - 1
 
 
-@jit
 def _cut(bounds: Int32s, radii: Floats, weights: Floats) -> Ints:
     """Cut a tree into balls, of which none is much wider or heavier: return their nodes in its order [n].
 
     Args:
         bounds, radii, weights: of the nodes.
     """
-    heap, leaves = [(-1.0, 0)], [0][:0]
+    heap, nodes, keys = [(-1.0, 0)], [], (-weights * radii**2).tolist()
     for _ in range(SPLITS):
         if not heap:
             break
         _, node = heapq.heappop(heap)
         if 2 * node + 2 >= len(bounds):
-            leaves.append(node)
+            nodes.append(node)
             continue
         for child in (2 * node + 1, 2 * node + 2):
-            heapq.heappush(heap, (-weights[child] * radii[child] ** 2, child))
-    for _, node in heap:
-        leaves.append(node)
-    nodes = np.array(leaves, np.int64)
-    return nodes[np.argsort(bounds[nodes, 0])]
+            heapq.heappush(heap, (keys[child], child))
+    nodes += [node for _, node in heap]
+    return np.array(sorted(nodes, key=bounds[:, 0].__getitem__), np.int64)
