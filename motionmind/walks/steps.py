@@ -8,6 +8,7 @@ then those that lead back; in either the postures that they leave, and those tha
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,9 +18,11 @@ from motionmind._typing import Ints
 def follow(moments: Ints, ahead: bool, steps: int, begins: Ints, ends: Ints, postures: int) -> Ints:
     """Return moments to which so many steps, or fewer, lead from others, or from which they lead there if not `ahead`;
     some of them repeatedly [n]."""
-    out = [moments[:0]]
+    out, ways = [moments[:0]], _ways(ahead, begins, ends)
     for _ in range(steps):
-        moments = np.unique(steps_at(moments, ahead, begins, ends, postures)[1])
+        numbers = _steps(moments, ahead, begins, ends, postures, ways)
+        reached = (ends if ahead else begins)[numbers[numbers >= 0]]
+        moments = np.unique(reached) if len(reached) > len(moments) else reached  # they could double with each move
         out.append(moments)
     return np.concatenate(out)
 
@@ -27,15 +30,30 @@ def follow(moments: Ints, ahead: bool, steps: int, begins: Ints, ends: Ints, pos
 def steps_at(moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int) -> tuple[Ints, Ints, Ints]:
     """Return the steps that leave moments, or that lead to them if not `ahead`: at which of the moments [m], the moment
     at each one's other end [m], and its number [m]."""
-    moves = len(begins) // 2
-    turns = bisect_left(range(moves), True, key=lambda move: ends[moves + move] <= begins[move])
-    leaves, first = (begins, 0) if ahead else (ends, moves)  # steps from postures, or to them
-    steps = np.full((len(moments), 2), -1)
-    steps[:, 0] = np.where(moments >= postures, moments - postures + moves - first, -1)
-    for way, (start, stop) in enumerate(((first, first + turns), (first + turns, first + moves))):
-        places = start + np.searchsorted(leaves[start:stop], moments)
-        found = np.flatnonzero(places < stop)
-        found = found[leaves[places[found]] == moments[found]]
-        steps[found, way] = places[found]
+    steps = _steps(moments, ahead, begins, ends, postures, _ways(ahead, begins, ends))
     at, numbers = np.nonzero(steps >= 0)[0], steps[steps >= 0]
     return at, (ends if ahead else begins)[numbers], numbers
+
+
+def _steps(
+    moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int, ways: Sequence[tuple[int, int]]
+) -> Ints:
+    """Return the steps at each moment [n, 2], at most one forward in its clip and one backward; -1 for none."""
+    leaves, moves = begins if ahead else ends, len(begins) // 2
+    out = np.full((len(moments), 2), -1)
+    out[:, 0] = np.where(moments >= postures, moments - postures + ahead * moves, -1)
+    for column, (start, stop) in enumerate(ways):
+        places = start + leaves[start:stop].searchsorted(moments)
+        found = np.flatnonzero(places < stop)
+        found = found[leaves[places[found]] == moments[found]]
+        out[found, column] = places[found]
+    return out
+
+
+def _ways(ahead: bool, begins: Ints, ends: Ints) -> list[tuple[int, int]]:
+    """Return where the steps from postures, or to them if not `ahead`, that are forward in their clips begin and end,
+    and those that are backward, if there are any."""
+    moves = len(begins) // 2
+    first = 0 if ahead else moves
+    turns = bisect_left(range(moves), True, key=lambda move: ends[moves + move] <= begins[move])
+    return [way for way in ((first, first + turns), (first + turns, first + moves)) if way[0] < way[1]]
