@@ -99,7 +99,7 @@ def search(
     nodes = _root(trellis, from_start(heuristic), budget)
     known = lower = cost
     while nodes.tally[_HEAPED] > 0:
-        node = nodes.heap[0]
+        node = int(nodes.heap[0])
         if nodes.key[node] >= cost - (slack if cost < known else SAME):
             lower = nodes.key[node]
             break
@@ -148,7 +148,7 @@ def _expand(
             if nodes.f[twin] <= f + SAME:
                 continue
             if nodes.slot[twin] >= 0 and nodes.children[twin] == 0:
-                parent = nodes.parent[twin]
+                parent = int(nodes.parent[twin])
                 _discard(nodes, twin)
                 if parent != node:
                     _release(nodes, parent)
@@ -200,7 +200,8 @@ def nodes_in(memory: int, chains: int) -> int:
 @jit
 def _trace(trellis: Trellis, nodes: _Nodes, node: int, path: Ints) -> None:
     """Write to `path` the positions that a node and its ancestors chose, and the start."""
-    path[: trellis.chains] = trellis.dom_ptr[: trellis.chains]
+    for chain in range(trellis.chains):
+        path[chain] = trellis.dom_ptr[chain]
     while node > 0:
         i = nodes.var[node]
         path[i] = trellis.dom_ptr[i] + nodes.frontier[node, i % trellis.chains]
@@ -217,7 +218,7 @@ def _forget(nodes: _Nodes, current: int) -> bool:
     kept = np.zeros(len(nodes.var), np.bool_)
     size, marked = nodes.tally[_HEAPED], _mark(nodes, kept, current)
     while nodes.tally[_HEAPED] > 0:
-        node = nodes.heap[0]
+        node = int(nodes.heap[0])
         if marked + _unmarked(nodes, kept, node) > KEPT * len(kept):
             break
         _close(nodes, node)
@@ -227,12 +228,12 @@ def _forget(nodes: _Nodes, current: int) -> bool:
     others = bool(nodes.tally[_NODES] > marked)
     nodes.tally[_HEAPED] = 0
     for k in range(size):
-        node = nodes.heap[k]
+        node = int(nodes.heap[k])
         if nodes.slot[node] < 0:
             continue  # forgotten after its last child
         listed = kept[node]
         while not kept[node] and nodes.children[node] == 0:
-            parent = nodes.parent[node]
+            parent = int(nodes.parent[node])
             listed = nodes.slot[parent] < 0
             nodes.key[parent] = nodes.key[node] if listed else min(nodes.key[parent], nodes.key[node])
             nodes.slot[parent] = max(nodes.slot[parent], 0)
@@ -273,7 +274,7 @@ def _mark(nodes: _Nodes, kept: Bools, node: int) -> int:
 def _release(nodes: _Nodes, node: int) -> None:
     """Free a closed node without children, since nothing below the known cost lies behind it; then its ancestors."""
     while node > 0 and nodes.slot[node] < 0 and nodes.children[node] == 0:
-        parent = nodes.parent[node]
+        parent = int(nodes.parent[node])
         _drop(nodes, node)
         node = parent
 
@@ -296,6 +297,14 @@ def _hash(nodes: _Nodes, node: int, var: int, choice: int, chain: int) -> int:
         h = (h ^ np.uint64(choice if k == chain else nodes.frontier[node, k])) * np.uint64(1099511628211)
     h ^= h >> np.uint64(32)
     return int(h & np.uint64(nodes.tally[_BUCKETS] - 1))
+
+
+@jit
+def _home(nodes: _Nodes, node: int) -> int:
+    """Return the bucket of a node."""
+    var = int(nodes.var[node])
+    chain = var % nodes.frontier.shape[1]
+    return _hash(nodes, node, var, int(nodes.frontier[node, chain]), chain)
 
 
 @jit
@@ -323,8 +332,7 @@ def _widen(nodes: _Nodes) -> None:
         node = nodes.bucket[home]
         nodes.bucket[home] = nodes.bucket[count + home] = -1
         while node >= 0:
-            after, chain = nodes.following[node], nodes.var[node] % nodes.frontier.shape[1]
-            now = _hash(nodes, node, nodes.var[node], nodes.frontier[node, chain], chain)
+            after, now = nodes.following[node], _home(nodes, int(node))
             nodes.following[node] = nodes.bucket[now]
             nodes.bucket[now] = node
             node = after
@@ -341,14 +349,14 @@ def _add(nodes: _Nodes, node: int, var: int, choice: int, chain: int, f: float, 
         child = nodes.free[nodes.tally[_FREE]]
     nodes.tally[_NODES] += 1
     nodes.tally[_PEAK] = max(nodes.tally[_PEAK], nodes.tally[_NODES])
-    nodes.frontier[child] = nodes.frontier[node]
-    nodes.frontier[child, chain] = choice
+    for k in range(nodes.frontier.shape[1]):
+        nodes.frontier[child, k] = choice if k == chain else nodes.frontier[node, k]
     nodes.var[child], nodes.f[child], nodes.key[child] = var, f, key
     nodes.parent[child], nodes.children[child] = node, 0
     nodes.children[node] += 1
     if nodes.tally[_NODES] > nodes.tally[_BUCKETS]:
         _widen(nodes)
-    home = _hash(nodes, child, var, choice, chain)
+    home = _home(nodes, child)
     nodes.following[child] = nodes.bucket[home]
     nodes.bucket[home] = child
     _open(nodes, child)
@@ -357,8 +365,7 @@ def _add(nodes: _Nodes, node: int, var: int, choice: int, chain: int, f: float, 
 @jit
 def _drop(nodes: _Nodes, node: int) -> None:
     """Remove a closed node without children from memory."""
-    chain = nodes.var[node] % nodes.frontier.shape[1]
-    home = _hash(nodes, node, nodes.var[node], nodes.frontier[node, chain], chain)
+    home = _home(nodes, node)
     if nodes.bucket[home] == node:
         nodes.bucket[home] = nodes.following[node]
     else:
@@ -400,12 +407,12 @@ def _open(nodes: _Nodes, node: int) -> None:
 def _close(nodes: _Nodes, node: int) -> None:
     """Take a node off the open list."""
     nodes.tally[_HEAPED] -= 1
-    k, last = nodes.slot[node], nodes.heap[nodes.tally[_HEAPED]]
+    k, last = int(nodes.slot[node]), nodes.heap[nodes.tally[_HEAPED]]
     nodes.slot[node] = -1
     if last != node:
         nodes.heap[k], nodes.slot[last] = last, k
         _rise(nodes, k)
-        _sink(nodes, nodes.slot[last])
+        _sink(nodes, int(nodes.slot[last]))
 
 
 @jit

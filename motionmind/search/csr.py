@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
-from motionmind.jit import jit
+from motionmind.jit import jit, read_only
 
 
 def insertion_point(ptr: Ints, columns: Int32s, row: int, column: int) -> int:
@@ -14,7 +14,6 @@ def insertion_point(ptr: Ints, columns: Int32s, row: int, column: int) -> int:
     return int(first + np.searchsorted(columns[first:last], column))
 
 
-@jit
 def select_entries(
     ptr: Ints, columns: Int32s, costs: Floats, rows: Ints, numbers: Int32s, shifts: Ints
 ) -> tuple[Ints, Int32s, Floats]:
@@ -31,21 +30,20 @@ def select_entries(
     Returns:
         Row pointers [N + 1], columns [M] and entries [M] of the new matrix.
     """
-    most = 0
-    for row in rows:
-        most += ptr[row + 1] - ptr[row]
+    most = int((ptr[rows + 1] - ptr[rows]).sum())
     out_columns, out_costs = np.empty(most + 1, np.int32), np.empty(most + 1)
-    out_ptr = _write_entries(ptr, columns, costs, rows, numbers, shifts, out_columns, out_costs)
+    old = read_only(ptr), read_only(columns), read_only(costs)
+    out_ptr = _write_entries(*old, rows, numbers, shifts, out_columns, out_costs)
     return out_ptr, out_columns[: out_ptr[-1]], out_costs[: out_ptr[-1]]
 
 
-@jit
 def keep_entries(ptr: Ints, columns: Int32s, costs: Floats, rows: Ints, numbers: Int32s) -> tuple[Ints, Int32s, Floats]:
     """Do as `select_entries` with rising rows, in the memory of the other matrix, which is lost.
 
     To come by as much memory again takes longer than to write to it.
     """
-    out_ptr = _write_entries(ptr, columns, costs, rows, numbers, np.zeros(len(rows), np.int64), columns, costs)
+    old, shifts = (read_only(ptr), read_only(columns), read_only(costs)), np.zeros(len(rows), np.int64)
+    out_ptr = _write_entries(*old, rows, numbers, shifts, columns, costs)
     return out_ptr, columns[: out_ptr[-1]], costs[: out_ptr[-1]]
 
 
@@ -72,7 +70,6 @@ def _write_entries(
     return out_ptr
 
 
-@jit
 def insert_entries(
     ptr: Ints, columns: Int32s, costs: Floats, rows: Ints, at: Ints, new: Int32s, cost: float
 ) -> tuple[Ints, Int32s, Floats]:
@@ -87,14 +84,5 @@ def insert_entries(
         new: their columns [N].
         cost: the cost of each.
     """
-    out_ptr, count = ptr.copy(), len(columns) + len(new)
-    out_columns, out_costs = np.empty(count, np.int32), np.empty(count)
-    first = 0
-    for k in range(len(new) + 1):
-        last = at[k] if k < len(new) else len(columns)
-        out_columns[first + k : last + k], out_costs[first + k : last + k] = columns[first:last], costs[first:last]
-        first = last
-        if k < len(new):
-            out_columns[last + k], out_costs[last + k] = new[k], cost
-            out_ptr[rows[k] + 1 :] += 1
-    return out_ptr, out_columns, out_costs
+    rises = np.cumsum(np.bincount(rows, minlength=len(ptr) - 1))
+    return ptr + np.concatenate([[0], rises]), np.insert(columns, at, new), np.insert(costs, at, cost)

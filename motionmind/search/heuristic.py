@@ -80,7 +80,8 @@ def descend(trellis: Trellis, heuristic: Heuristic, path: Ints) -> None:
     """Write to `path` [n] the path of positions that takes the least growth of f at each variable."""
     chains = trellis.chains
     frontier = np.zeros(chains, np.uint16)
-    path[:chains] = trellis.dom_ptr[:chains]
+    for chain in range(chains):
+        path[chain] = trellis.dom_ptr[chain]
     for i in range(chains, len(path)):
         before, least = path[i - chains], np.inf
         for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):

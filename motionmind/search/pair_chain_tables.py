@@ -48,23 +48,16 @@ class PairChains(NamedTuple):
     partner_share: Floats
 
 
-@jit
 def empty(trellis: Trellis) -> PairChains:
     """Return pair chains of a trellis, all their costs and tables 0."""
-    chains, variables = trellis.chains, len(trellis.dom_ptr) - 1
-    partner = np.maximum(trellis.parents, 0)
-    child_ptr = np.zeros(chains + 1, np.int64)
-    for chain in range(1, chains):
-        child_ptr[partner[chain] + 1 :] += 1
-    children = 1 + np.argsort(partner[1:], kind="mergesort")
-    pair_ptr, half_ptr, partner_ptr = np.zeros((3, variables + 1), np.int64)
-    for i in range(variables):
-        pair_ptr[i + 1], half_ptr[i + 1], partner_ptr[i + 1] = pair_ptr[i], half_ptr[i], partner_ptr[i]
-        if i % chains > 0:
-            a = partner_of(trellis, i)
-            pair_ptr[i + 1] += size_of(trellis, a) * size_of(trellis, i)
-            half_ptr[i + 1] += size_of(trellis, a) * size_of(trellis, i - chains) if i >= chains else 0
-            partner_ptr[i + 1] += trellis.row_ptr[trellis.dom_ptr[a + 1]] - trellis.row_ptr[trellis.dom_ptr[a]]
+    chains, partner = trellis.chains, np.maximum(trellis.parents, 0)
+    child_ptr = np.concatenate([[0], np.cumsum(np.bincount(partner[1:], minlength=chains))])
+    children = 1 + np.argsort(partner[1:], kind="stable")
+    i, a = partners(trellis)
+    sizes, edges = np.diff(trellis.dom_ptr), np.diff(trellis.row_ptr[trellis.dom_ptr])
+    lengths = np.zeros((3, len(sizes)), np.int64)
+    lengths[:, i] = sizes[a] * sizes[i], np.where(i >= chains, sizes[a] * sizes[i - chains], 0), edges[a]
+    pair_ptr, half_ptr, partner_ptr = (np.concatenate([[0], np.cumsum(of)]) for of in lengths)
     count = pair_ptr[-1]
     return PairChains(
         partner, child_ptr, children, pair_ptr, np.zeros(count), np.zeros(count), np.zeros(count),
@@ -72,14 +65,19 @@ def empty(trellis: Trellis) -> PairChains:
     )  # fmt: skip
 
 
-@jit
 def count_pairs(trellis: Trellis) -> int:
     """Count the pairs that the pair chains of a trellis list; memory and the time of a sweep grow with them."""
-    count = 0
-    for i in range(len(trellis.dom_ptr) - 1):
-        if i % trellis.chains > 0:
-            count += size_of(trellis, i) * size_of(trellis, partner_of(trellis, i))
-    return count
+    sizes = np.diff(trellis.dom_ptr)
+    i, a = partners(trellis)
+    return int(sizes[i] @ sizes[a])
+
+
+def partners(trellis: Trellis) -> tuple[Ints, Ints]:
+    """Return the variables that have a pair chain, and the partner of each."""
+    i = np.arange(len(trellis.dom_ptr) - 1)
+    i = i[i % trellis.chains > 0]
+    chain = i % trellis.chains
+    return i, i - chain + np.maximum(trellis.parents, 0)[chain]
 
 
 @jit
@@ -87,7 +85,8 @@ def push_so_far(trellis: Trellis, tables: PairChains, i: int) -> None:
     """Compute `so_far` of variable i from one move before: first its chain moves, then the partner."""
     chains = trellis.chains
     first, last, size = tables.pair_ptr[i], tables.pair_ptr[i + 1], size_of(trellis, i)
-    tables.so_far[first:last] = tables.pair_cost[first:last]
+    for k in range(first, last):
+        tables.so_far[k] = tables.pair_cost[k]
     if i < chains:
         return
     a, least = partner_of(trellis, i - chains), np.full(last - first, np.inf)
@@ -100,7 +99,8 @@ def push_so_far(trellis: Trellis, tables: PairChains, i: int) -> None:
             )
             for x in range(size):
                 least[base + x] = min(least[base + x], moved[x] + cost)
-    tables.so_far[first:last] += least
+    for k in range(first, last):
+        tables.so_far[k] += least[k - first]
 
 
 @jit
@@ -110,7 +110,9 @@ def pull_to_go(trellis: Trellis, tables: PairChains, i: int) -> None:
     a, was, size = partner_of(trellis, b), size_of(trellis, b), size_of(trellis, i)
     for p in range(size_of(trellis, a + trellis.chains)):
         base = tables.pair_ptr[i] + p * size
-        rest = tables.pair_cost[base : base + size] + tables.to_go[base : base + size]
+        rest = np.empty(size)
+        for x in range(size):
+            rest[x] = tables.pair_cost[base + x] + tables.to_go[base + x]
         for x in range(was):
             least = np.inf
             for e in range(trellis.row_ptr[trellis.dom_ptr[b] + x], trellis.row_ptr[trellis.dom_ptr[b] + x + 1]):

@@ -24,10 +24,12 @@ Sources: Komodakis, Paragios and Tziritas, "MRF energy minimization and beyond v
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind._typing import Floats
+from motionmind._typing import Floats, Ints
 from motionmind.jit import jit
 from motionmind.search.pair_chain_tables import (
     PairChains,
@@ -37,46 +39,39 @@ from motionmind.search.pair_chain_tables import (
     pair_chains_of,
     partner_edge_share,
     partner_of,
+    partners,
     pull_to_go,
     push_so_far,
     size_of,
 )
-from motionmind.search.trellis import Trellis, reachable, subset
+from motionmind.search.trellis import Trellis, positions_above, reachable, subset
 from motionmind.search.trws import Messages
 
 
-@jit
 def build(trellis: Trellis, messages: Messages) -> PairChains:
     """Build the pair chains of a trellis, the costs as messages have reparametrised them shared out evenly."""
-    chains = trellis.chains
-    tables = empty(trellis)
+    chains, tables = trellis.chains, empty(trellis)
     theta, edge = _reparametrise(trellis, messages)
-    for i in range(len(trellis.dom_ptr) - 1):
-        chain = i % chains
-        if chain == 0:
-            continue
-        a = partner_of(trellis, i)
-        mine, theirs = (
-            1.0 / len(pair_chains_of(tables, chain)),
-            1.0 / len(pair_chains_of(tables, tables.partner[chain])),
-        )
-        for e in range(trellis.row_ptr[trellis.dom_ptr[i]], trellis.row_ptr[trellis.dom_ptr[i + 1]]):
-            tables.edge_share[e] = mine * edge[e]
-        first = trellis.row_ptr[trellis.dom_ptr[a]]
-        for k in range(tables.partner_ptr[i + 1] - tables.partner_ptr[i]):
-            tables.partner_share[tables.partner_ptr[i] + k] = theirs * edge[first + k]
-        coupled = trellis.up_ptr[i + 1] > trellis.up_ptr[i]
-        for p in range(size_of(trellis, a)):
-            base = tables.pair_ptr[i] + p * size_of(trellis, i) - trellis.dom_ptr[i]
-            for x in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
-                tables.pair_cost[base + x] = theirs * theta[trellis.dom_ptr[a] + p] + mine * theta[x]
-                if coupled:
-                    tables.pair_cost[base + x] -= messages.up_col[trellis.up_ptr[i] + p] + messages.down_col[x]
-            if coupled:
-                for q in range(trellis.col_ptr[trellis.up_ptr[i] + p], trellis.col_ptr[trellis.up_ptr[i] + p + 1]):
-                    tables.pair_cost[base + trellis.col_to[q]] += trellis.col_cost[q]
+    shares = 1.0 / (np.diff(tables.child_ptr) + (np.arange(chains) > 0))  # of each chain in the pair chains it is in
+    first = np.empty(trellis.up_ptr[-1], np.int64)  # pair of each coupling row, less the variable's first position
+    own, out, rows = _slices(trellis.dom_ptr), _slices(trellis.row_ptr[trellis.dom_ptr]), _slices(trellis.up_ptr)
+    pairs, borne = _slices(tables.pair_ptr), _slices(tables.partner_ptr)
+    for i, a in zip(*map(np.ndarray.tolist, partners(trellis)), strict=True):
+        mine, theirs = shares[i % chains], shares[a % chains]
+        tables.edge_share[out[i]], tables.partner_share[borne[i]] = mine * edge[out[i]], theirs * edge[out[a]]
+        cost = theirs * theta[own[a], None] + mine * theta[own[i]]
+        if rows[i].stop > rows[i].start:
+            cost -= messages.up_col[rows[i], None] + messages.down_col[own[i]]
+            first[rows[i]] = pairs[i].start - own[i].start + cost.shape[1] * np.arange(len(cost))
+        tables.pair_cost[pairs[i]] = cost.ravel()
+    tables.pair_cost[np.repeat(first, np.diff(trellis.col_ptr)) + trellis.col_to] += trellis.col_cost
     fill_to_go(trellis, tables)
     return tables
+
+
+def _slices(ptr: Ints) -> list[slice]:
+    """Return the slices that row pointers mean."""
+    return [slice(first, end) for first, end in pairwise(ptr.tolist())]
 
 
 @jit
@@ -107,16 +102,18 @@ def sweep(trellis: Trellis, tables: PairChains, through: Floats) -> float:
         for i in range((t + 1) * chains - 1, t * chains - 1, -1):
             _average_positions(trellis, tables, i)
         begin, end = trellis.dom_ptr[t * chains], trellis.dom_ptr[(t + 1) * chains]
-        through[begin:end] = 0.0
+        for p in range(begin, end):
+            through[p] = 0.0
         for i in range(t * chains + 1, (t + 1) * chains):
-            a = partner_of(trellis, i)
-            minima = _position_minima(trellis, tables, i, i)
-            least[i % chains] = np.min(minima)
-            through[trellis.dom_ptr[i] : trellis.dom_ptr[i + 1]] += minima - least[i % chains]
-            through[trellis.dom_ptr[a] : trellis.dom_ptr[a + 1]] += (
-                _position_minima(trellis, tables, i, a) - least[i % chains]
-            )
-        through[begin:end] += np.sum(least)
+            for j in (i, partner_of(trellis, i)):
+                minima = _position_minima(trellis, tables, i, j)
+                if j == i:
+                    least[i % chains] = np.min(minima)
+                for p in range(len(minima)):
+                    through[trellis.dom_ptr[j] + p] += minima[p] - least[i % chains]
+        whole = np.sum(least)
+        for p in range(begin, end):
+            through[p] += whole
     return float(np.sum(least))
 
 
@@ -129,7 +126,6 @@ def lower_bound(tables: PairChains) -> float:
     return bound
 
 
-@jit
 def prune(trellis: Trellis, tables: PairChains, through: Floats, below: float) -> tuple[Trellis, PairChains]:
     """Remove the positions that no path cheaper than `below` goes through; return the rest with its pair chains.
 
@@ -146,25 +142,14 @@ def prune(trellis: Trellis, tables: PairChains, through: Floats, below: float) -
     fewer = empty(smaller)
     if np.any(np.diff(smaller.dom_ptr) == 0):
         return smaller, fewer
-    edges = np.zeros(len(trellis.row_to), np.bool_)
-    for p in range(len(kept)):
-        for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1]):
-            edges[e] = kept[p] and kept[trellis.row_to[e]]
-    pairs, partner_edges = np.zeros(len(tables.pair_cost), np.bool_), np.zeros(len(tables.partner_share), np.bool_)
-    for i in range(len(trellis.dom_ptr) - 1):
-        if i % trellis.chains > 0:
-            a, size = partner_of(trellis, i), size_of(trellis, i)
-            for p in range(size_of(trellis, a)):
-                if kept[trellis.dom_ptr[a] + p]:
-                    base = tables.pair_ptr[i] + p * size
-                    pairs[base : base + size] = kept[trellis.dom_ptr[i] : trellis.dom_ptr[i + 1]]
-            first, last = trellis.row_ptr[trellis.dom_ptr[a]], trellis.row_ptr[trellis.dom_ptr[a + 1]]
-            partner_edges[tables.partner_ptr[i] : tables.partner_ptr[i + 1]] = edges[first:last]
-    fewer.pair_cost[:], fewer.edge_share[:], fewer.partner_share[:] = (
-        tables.pair_cost[pairs],
-        tables.edge_share[edges],
-        tables.partner_share[partner_edges],
-    )
+    edges = np.repeat(kept, np.diff(trellis.row_ptr)) & kept[trellis.row_to]
+    own, out = _slices(trellis.dom_ptr), _slices(trellis.row_ptr[trellis.dom_ptr])
+    both = list(zip(*map(np.ndarray.tolist, partners(trellis)), strict=True))
+    fewer.pair_cost[:] = tables.pair_cost[
+        np.concatenate([np.outer(kept[own[a]], kept[own[i]]).ravel() for i, a in both])
+    ]
+    fewer.edge_share[:] = tables.edge_share[edges]
+    fewer.partner_share[:] = tables.partner_share[np.concatenate([edges[out[a]] for _, a in both])]
     fill_to_go(smaller, fewer)
     return smaller, fewer
 
@@ -210,19 +195,12 @@ def step(trellis: Trellis, tables: PairChains, i: int, frontier: NDArray[np.uint
 # --- shares ----------------------------------------------------------------------------------------------------------
 
 
-@jit
 def _reparametrise(trellis: Trellis, messages: Messages) -> tuple[Floats, Floats]:
     """Return the costs of positions plus all messages to them [P], and of edges along chains less those [R]."""
     theta, edge = trellis.unary + messages.down_row + messages.up_row + messages.down_col, trellis.row_cost.copy()
-    for i in range(len(trellis.dom_ptr) - 1):
-        if trellis.up_ptr[i + 1] > trellis.up_ptr[i]:
-            a = partner_of(trellis, i)
-            theta[trellis.dom_ptr[a] : trellis.dom_ptr[a + 1]] += messages.up_col[
-                trellis.up_ptr[i] : trellis.up_ptr[i + 1]
-            ]
-    for p in range(len(theta)):
-        for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1]):
-            edge[e] -= messages.up_row[p] + messages.down_row[trellis.row_to[e]]
+    above, _ = positions_above(trellis.chains, trellis.parents, trellis.dom_ptr, trellis.up_ptr)
+    np.add.at(theta, above, messages.up_col)
+    edge -= np.repeat(messages.up_row, np.diff(trellis.row_ptr)) + messages.down_row[trellis.row_to]
     return theta, edge
 
 
@@ -234,9 +212,13 @@ def _average_positions(trellis: Trellis, tables: PairChains, i: int) -> None:
         return
     first = i - i % trellis.chains
     minima = np.empty((len(members), size_of(trellis, i)))
+    mean = np.zeros(minima.shape[1])
     for k in range(len(members)):
-        minima[k] = _position_minima(trellis, tables, first + members[k], i)
-    mean = np.sum(minima, axis=0) / len(members)
+        of_one = _position_minima(trellis, tables, first + members[k], i)
+        for x in range(len(mean)):
+            minima[k, x] = of_one[x]
+            mean[x] += of_one[x]
+    mean /= len(members)
     for k in range(len(members)):
         j, more = first + members[k], mean - minima[k]
         size = size_of(trellis, j)
@@ -256,16 +238,19 @@ def _average_edges(trellis: Trellis, tables: PairChains, i: int) -> None:
     first = i - i % trellis.chains
     begin, end = trellis.row_ptr[trellis.dom_ptr[i]], trellis.row_ptr[trellis.dom_ptr[i + 1]]
     minima = np.empty((len(members), end - begin))
+    mean = np.zeros(end - begin)
     for k in range(len(members)):
         j = first + members[k]
-        minima[k] = _edge_minima(trellis, tables, j) if j == i else _partner_edge_minima(trellis, tables, j)
-    mean = np.sum(minima, axis=0) / len(members)
+        of_one = _edge_minima(trellis, tables, j) if j == i else _partner_edge_minima(trellis, tables, j)
+        for e in range(len(mean)):
+            minima[k, e] = of_one[e]
+            mean[e] += of_one[e]
+    mean /= len(members)
     for k in range(len(members)):
         j, more = first + members[k], mean - minima[k]
-        if j == i:
-            tables.edge_share[begin:end] += more
-        else:
-            tables.partner_share[tables.partner_ptr[j] : tables.partner_ptr[j + 1]] += more
+        shares, base = (tables.edge_share, begin) if j == i else (tables.partner_share, tables.partner_ptr[j])
+        for e in range(len(more)):
+            shares[base + e] += more[e]
 
 
 @jit

@@ -33,23 +33,24 @@ def polish(trellis: Trellis, path: Ints, through: Floats) -> float:
     while True:
         for chain in range(chains):
             if chain_waits[chain]:
-                before = path[chain::chains].copy()
+                before, moved = path.copy(), False
                 minimise_chain(trellis, path, chain, kept)
                 chain_waits[chain] = False
-                moved = np.flatnonzero(path[chain::chains] != before)
-                for changed in moved:
-                    moment_waits[changed - 1 : changed + 2] = True
+                for t in range(1, trellis.moves + 1):
+                    if path[t * chains + chain] != before[t * chains + chain]:
+                        moved = moment_waits[t - 1] = moment_waits[t] = moment_waits[t + 1] = True
+                if moved:
                     _wake_neighbours(trellis, chain, chain_waits)
-                if len(moved) > 0:
                     kept = _of_use(path, through, path_cost(trellis, path))
         for t in range(1, trellis.moves + 1):
             if moment_waits[t]:
-                before = path[t * chains : (t + 1) * chains].copy()
+                before = path.copy()
                 minimise_moment(trellis, path, t, kept)
                 moment_waits[t] = False
-                for changed in np.flatnonzero(path[t * chains : (t + 1) * chains] != before):
-                    moment_waits[t - 1] = moment_waits[t + 1] = chain_waits[changed] = True
-                    _wake_neighbours(trellis, int(changed), chain_waits)
+                for chain in range(chains):
+                    if path[t * chains + chain] != before[t * chains + chain]:
+                        moment_waits[t - 1] = moment_waits[t + 1] = chain_waits[chain] = True
+                        _wake_neighbours(trellis, chain, chain_waits)
         better = path_cost(trellis, path)
         if not better < cost - 1e-9:
             return min(better, cost)
@@ -60,7 +61,8 @@ def polish(trellis: Trellis, path: Ints, through: Floats) -> float:
 def _of_use(path: Ints, through: Floats, cost: float) -> Bools:
     """Return which positions [P] a path as cheap as this one, which costs so much, may go through; its own are."""
     kept = through <= cost + _ROUNDING
-    kept[path] = True
+    for p in path:
+        kept[p] = True
     return kept
 
 

@@ -203,26 +203,28 @@ def costs_to_go(
     Returns:
         V, nats [T + 1, G]; infinite where no walk of exactly k moves exists.
     """
-    none = np.zeros((0, model.starts[-1]))
-    return _costs_to_go(model, goal, moves, none if timed is None else timed, none if known is None else known)
+    value, fewer = np.full((moves + 1, model.starts[-1]), np.inf), 0 if known is None else len(known)
+    if known is not None:
+        value[:fewer] = known
+    _fill_costs_to_go(model, goal, value[:0] if timed is None else timed, fewer, value)
+    return value
 
 
 @jit
-def _costs_to_go(model: Model, goal: Ints, moves: int, timed: Floats, known: Floats) -> Floats:
-    """Compute as `costs_to_go` does; `timed` has no rows where it holds no costs, and `known` where nothing is."""
-    value = np.full((moves + 1, model.starts[-1]), np.inf)
-    value[: len(known)] = known
+def _fill_costs_to_go(model: Model, goal: Ints, timed: Floats, known: int, value: Floats) -> None:
+    """Write the rows of V from `known` on; `timed` has no rows where it holds no costs."""
+    moves, arrived = len(value) - 1, np.empty(len(model.alone))
     for chain in range(len(model.parents)):
         first, last = model.starts[chain], model.starts[chain + 1]
         for row in range(first, last):
             if model.place[row] == goal[chain]:
                 value[0, row] = 0.0
-        for k in range(max(1, len(known)), moves + 1):
-            arrived = value[k - 1, first:last] + model.alone[first:last]
-            if len(timed) > 0:
-                arrived += timed[moves - k + 1, first:last]
-            if k > 1:
-                arrived[~model.allowed[first:last]] = np.inf
+        for k in range(max(1, known), moves + 1):
+            for row in range(first, last):
+                cost = value[k - 1, row] + model.alone[row]
+                if len(timed) > 0:
+                    cost += timed[moves - k + 1, row]
+                arrived[row - first] = cost if k == 1 or model.allowed[row] else np.inf
             for row in range(first, last):
                 least, other = np.inf, np.inf  # of every other edge, for the next need not wait for the one before
                 first_edge, end = np.uint64(model.indptr[row]), np.uint64(model.indptr[row + 1])
@@ -234,4 +236,3 @@ def _costs_to_go(model: Model, goal: Ints, moves: int, timed: Floats, known: Flo
                     beside = e + np.uint64(1)
                     other = min(other, model.costs[beside] + arrived[np.uint64(model.targets[beside])])
                 value[k, row] = min(least, other)
-    return value

@@ -87,7 +87,34 @@ def build_trellis(
         timed: further costs of being in each state after each move, nats [T + 1, G]; None for none. At the start
             nothing is paid.
     """
-    return _build(model, start, moves, to_go, below, np.zeros((0, 0)) if timed is None else timed)
+    timed = np.zeros((0, 0)) if timed is None else timed
+    dom_ptr, place = _domains(model, start, moves, to_go, below, timed)
+    chains, states, lengths = len(model.parents), model.starts[-1], np.diff(dom_ptr)
+    variable = np.repeat(np.arange(len(lengths)), lengths)
+    move, first, rows = variable // chains, model.starts[variable % chains], np.nonzero(place >= 0)[1]
+    dom, last = (rows - first).astype(np.int32), dom_ptr[moves * chains]  # from the last move no edges lead
+    edges = model.indptr, model.targets, model.costs
+    shifts = (move[:last] + 1) * states + first[:last]
+    row_ptr, row_to, row_cost = select_entries(*edges, rows[:last], place.ravel(), shifts)
+    row_ptr = np.append(row_ptr, np.full(len(dom) - last, len(row_to)))
+    unary, on = np.zeros(len(dom)), dom_ptr[chains]
+    unary[on:] = model.unary[rows[on:]] + (timed[move[on:], rows[on:]] if len(timed) else 0.0)
+
+    above = np.arange(len(lengths)).reshape(-1, chains) + model.parents - np.arange(chains)
+    coupled = (model.parents >= 0) & (np.arange(moves + 1) > 0)[:, None]
+    up_ptr = np.concatenate([[0], np.cumsum(np.where(coupled, lengths[above], 0))])
+    up, child = positions_above(chains, model.parents, dom_ptr, up_ptr)
+    pairs = model.pair_ptr, model.pair_states, model.pair_costs
+    shifts = child // chains * states + model.starts[child % chains]
+    couplings = select_entries(*pairs, model.pair_starts[child % chains] + dom[up], place.ravel(), shifts)
+    return Trellis(chains, moves, model.parents, dom_ptr, dom, unary, row_ptr, row_to, row_cost, up_ptr, *couplings)
+
+
+def positions_above(chains: int, parents: Ints, dom_ptr: Ints, up_ptr: Ints) -> tuple[Ints, Ints]:
+    """Return the position of the parent variable that each coupling row is for, and the variable [U] each."""
+    child = np.repeat(np.arange(len(up_ptr) - 1), np.diff(up_ptr))
+    above = child + (parents - np.arange(chains))[child % chains]
+    return dom_ptr[above] + np.arange(len(child)) - up_ptr[child], child
 
 
 @jit
@@ -108,15 +135,11 @@ def states_of(trellis: Trellis, chosen: Ints) -> Int32s:
     return trellis.dom[chosen].reshape(trellis.moves + 1, trellis.chains)
 
 
-@jit
 def locate(trellis: Trellis, states: Int32s) -> Ints:
     """Return the positions [n] of a path of states [T + 1, L]; -1 for a state that is not in its domain."""
-    out = np.full(len(trellis.dom_ptr) - 1, -1, np.int64)
-    for i in range(len(out)):
-        state = states[i // trellis.chains, i % trellis.chains]
-        for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
-            if trellis.dom[p] == state:
-                out[i] = p
+    out, lengths = np.full(len(trellis.dom_ptr) - 1, -1), np.diff(trellis.dom_ptr)
+    found = np.flatnonzero(trellis.dom == np.repeat(states.ravel(), lengths))
+    out[np.repeat(np.arange(len(out)), lengths)[found]] = found
     return out
 
 
@@ -147,7 +170,6 @@ def reachable(trellis: Trellis, through: Floats, below: float) -> Bools:
     return kept
 
 
-@jit
 def subset(trellis: Trellis, kept: Bools, in_place: bool) -> Trellis:
     """Build the trellis of the positions that are kept [P].
 
@@ -156,18 +178,10 @@ def subset(trellis: Trellis, kept: Bools, in_place: bool) -> Trellis:
         kept: which positions to keep.
         in_place: whether in the memory of the whole, which is lost.
     """
-    chains, variables = trellis.chains, len(trellis.dom_ptr) - 1
     held, rows = np.flatnonzero(kept), coupling_rows(trellis, kept)
-    numbers = np.full(len(kept), -1, np.int32)  # of each kept position among them
-    numbers[held] = np.arange(len(held)).astype(np.int32)
-    dom_ptr = np.zeros(variables + 1, np.int64)
-    up_ptr = np.zeros(variables + 1, np.int64)
-    for i in range(variables):
-        dom_ptr[i + 1] = dom_ptr[i] + np.sum(kept[trellis.dom_ptr[i] : trellis.dom_ptr[i + 1]])
-        up_ptr[i + 1] = up_ptr[i]
-        if trellis.up_ptr[i + 1] > trellis.up_ptr[i]:
-            above = i - i % chains + trellis.parents[i % chains]
-            up_ptr[i + 1] += dom_ptr[above + 1] - dom_ptr[above]
+    before = np.concatenate([[0], np.cumsum(kept)])  # how many are kept before each position
+    numbers = np.where(kept, before[:-1], -1).astype(np.int32)
+    dom_ptr, up_ptr = before[trellis.dom_ptr], np.searchsorted(rows, trellis.up_ptr)
     row, col = (trellis.row_ptr, trellis.row_to, trellis.row_cost), (trellis.col_ptr, trellis.col_to, trellis.col_cost)
     if in_place:
         row_ptr, row_to, row_cost = keep_entries(*row, held, numbers)
@@ -176,42 +190,18 @@ def subset(trellis: Trellis, kept: Bools, in_place: bool) -> Trellis:
         row_ptr, row_to, row_cost = select_entries(*row, held, numbers, np.zeros(len(held), np.int64))
         col_ptr, col_to, col_cost = select_entries(*col, rows, numbers, np.zeros(len(rows), np.int64))
     return Trellis(
-        chains, trellis.moves, trellis.parents, dom_ptr, trellis.dom[held], trellis.unary[held],
+        trellis.chains, trellis.moves, trellis.parents, dom_ptr, trellis.dom[held], trellis.unary[held],
         row_ptr, row_to, row_cost, up_ptr, col_ptr, col_to, col_cost,
     )  # fmt: skip
 
 
-@jit
 def coupling_rows(trellis: Trellis, kept: Bools) -> Ints:
     """Return the coupling rows [U'] of the positions that are kept [P]."""
-    coupled = np.zeros(trellis.up_ptr[-1], np.bool_)
-    for i in range(len(trellis.dom_ptr) - 1):
-        if trellis.up_ptr[i + 1] > trellis.up_ptr[i]:
-            above = i - i % trellis.chains + trellis.parents[i % trellis.chains]
-            coupled[trellis.up_ptr[i] : trellis.up_ptr[i + 1]] = kept[
-                trellis.dom_ptr[above] : trellis.dom_ptr[above + 1]
-            ]
-    return np.flatnonzero(coupled)
+    above, _ = positions_above(trellis.chains, trellis.parents, trellis.dom_ptr, trellis.up_ptr)
+    return np.flatnonzero(kept[above])
 
 
 # --- building --------------------------------------------------------------------------------------------------------
-
-
-@jit
-def _build(model: Model, start: Ints, moves: int, to_go: Floats, below: float, timed: Floats) -> Trellis:
-    """Build as `build_trellis` does; `timed` has no rows where it holds no costs."""
-    chains = len(model.parents)
-    dom_ptr, dom, place = _domains(model, start, moves, to_go, below, timed)
-    row_ptr, row_to, row_cost = _edges(model, dom_ptr, dom, place)
-    up_ptr, col_ptr, col_to, col_cost = _couplings(model, dom_ptr, dom, place)
-    unary = np.zeros(len(dom))
-    for i in range(chains, (moves + 1) * chains):
-        for p in range(dom_ptr[i], dom_ptr[i + 1]):
-            row = model.starts[i % chains] + dom[p]
-            unary[p] = model.unary[row] + (timed[i // chains, row] if len(timed) > 0 else 0.0)
-    return Trellis(
-        chains, moves, model.parents, dom_ptr, dom, unary, row_ptr, row_to, row_cost, up_ptr, col_ptr, col_to, col_cost
-    )
 
 
 @jit
@@ -229,15 +219,14 @@ def _costs_so_far(model: Model, start: Ints, moves: int, timed: Floats) -> Float
                         cost = value[t, row] + model.costs[e] + model.alone[target]
                         value[t + 1, target] = min(value[t + 1, target], cost)
             if len(timed) > 0:
-                value[t + 1, first:last] += timed[t + 1, first:last]
+                for row in range(first, last):
+                    value[t + 1, row] += timed[t + 1, row]
     return value
 
 
 @jit
-def _domains(
-    model: Model, start: Ints, moves: int, to_go: Floats, below: float, timed: Floats
-) -> tuple[Ints, Int32s, Int32s]:
-    """Return `dom_ptr`, `dom`, and the position of each state at each move [T + 1, G], -1 where it has none."""
+def _domains(model: Model, start: Ints, moves: int, to_go: Floats, below: float, timed: Floats) -> tuple[Ints, Int32s]:
+    """Return `dom_ptr`, and the position of each state at each move [T + 1, G], -1 where it has none."""
     chains, rows = len(model.parents), model.starts[-1]
     so_far = _costs_so_far(model, start, moves, timed)
     spare = below
@@ -266,44 +255,4 @@ def _domains(
                     place[t, first + state] = count
                     count += 1
         dom_ptr[i + 1] = count
-    dom = np.empty(count, np.int32)
-    for t in range(moves + 1):
-        for chain in range(chains):
-            for row in range(model.starts[chain], model.starts[chain + 1]):
-                if place[t, row] >= 0:
-                    dom[place[t, row]] = row - model.starts[chain]
-    return dom_ptr, dom, place
-
-
-@jit
-def _edges(model: Model, dom_ptr: Ints, dom: Int32s, place: Int32s) -> tuple[Ints, Int32s, Floats]:
-    """Return the edges from each position to those of the same chain at the next move, as compressed rows."""
-    chains, variables, states = len(model.parents), len(dom_ptr) - 1, model.starts[-1]
-    rows, shifts = np.zeros(len(dom), np.int64), np.zeros(len(dom), np.int64)
-    for i in range(variables - chains):
-        first = model.starts[i % chains]
-        for p in range(dom_ptr[i], dom_ptr[i + 1]):
-            rows[p], shifts[p] = first + dom[p], (i // chains + 1) * states + first
-    last = dom_ptr[variables - chains]  # from here on no edges lead
-    ptr, to, cost = select_entries(model.indptr, model.targets, model.costs, rows[:last], place.ravel(), shifts[:last])
-    return np.append(ptr, np.full(len(dom) - last, len(to))), to, cost
-
-
-@jit
-def _couplings(model: Model, dom_ptr: Ints, dom: Int32s, place: Int32s) -> tuple[Ints, Ints, Int32s, Floats]:
-    """Return the first coupling row of each variable, and the listed pairs as compressed rows."""
-    chains, variables, states = len(model.parents), len(dom_ptr) - 1, model.starts[-1]
-    up_ptr = np.zeros(variables + 1, np.int64)
-    for i in range(variables):
-        above = i - i % chains + model.parents[i % chains]
-        coupled = i >= chains and model.parents[i % chains] >= 0
-        up_ptr[i + 1] = up_ptr[i] + (dom_ptr[above + 1] - dom_ptr[above] if coupled else 0)
-    rows, shifts = np.empty(up_ptr[-1], np.int64), np.empty(up_ptr[-1], np.int64)
-    for i in range(chains, variables):
-        chain, t = i % chains, i // chains
-        first = dom_ptr[i - chain + model.parents[chain]]
-        for u in range(up_ptr[i], up_ptr[i + 1]):
-            rows[u] = model.pair_starts[chain] + dom[first + u - up_ptr[i]]
-            shifts[u] = t * states + model.starts[chain]
-    ptr, to, cost = select_entries(model.pair_ptr, model.pair_states, model.pair_costs, rows, place.ravel(), shifts)
-    return up_ptr, ptr, to, cost
+    return dom_ptr, place

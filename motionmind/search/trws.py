@@ -351,13 +351,13 @@ def tighten(trellis: Trellis, messages: Messages, path: Ints, sweeps: int, enoug
         found = bound + descend(trellis, messages, trial, chains)
         if found < cost:
             cost = found
-            path[:] = trial
+            for i in range(len(path)):
+                path[i] = trial[i]
         if bound >= min(cost, enough) - 1e-9:
             break
     return bound, cost
 
 
-@jit
 def prune(trellis: Trellis, messages: Messages, below: float, in_place: bool) -> tuple[Trellis, Messages]:
     """Remove the positions that no path cheaper than `below` nats goes through; return the rest with its messages.
 
@@ -372,9 +372,8 @@ def prune(trellis: Trellis, messages: Messages, below: float, in_place: bool) ->
     kept = reachable(trellis, messages.through, below)
     held = np.flatnonzero(kept)
     rows = coupling_rows(trellis, kept)
-    for i in range(len(trellis.dom_ptr) - 1):
-        in_place = in_place and bool(np.any(kept[trellis.dom_ptr[i] : trellis.dom_ptr[i + 1]]))
-    return subset(trellis, kept, in_place), Messages(
+    fewest = np.diff(np.searchsorted(held, trellis.dom_ptr)).min()  # that are kept of a domain
+    return subset(trellis, kept, in_place and bool(fewest > 0)), Messages(
         messages.down_row[held], messages.up_row[held], messages.down_col[held], messages.up_col[rows],
         messages.constants.copy(), messages.before.copy(), messages.ahead[held], messages.through[held],
     )  # fmt: skip
