@@ -42,14 +42,6 @@ def swings_and_twists(turned: Floats, long: Ints, outer: Bools, rest: Floats, mi
     return out
 
 
-@jit
 def find_beyond(angles: Floats, least: Floats, most: Floats) -> Bools:
     """Return which joints have an angle beyond its limits [N, J], of angles [N, J, 3] and their limits [J, 3]."""
-    out = np.zeros(angles.shape[:2], np.bool_)
-    for n in range(len(angles)):
-        for joint in range(angles.shape[1]):
-            for k in range(3):
-                angle = angles[n, joint, k]
-                if angle < least[joint, k] or angle > most[joint, k]:
-                    out[n, joint] = True
-    return out
+    return np.asarray(((angles < least) | (angles > most)).any(axis=-1))

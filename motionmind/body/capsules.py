@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from functools import lru_cache
-from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -77,10 +76,8 @@ class Capsules(NamedTuple):
 
     def place(self, positions: Floats) -> Floats:
         """Return the ends [..., C, 2, 3], metres, from the `positions_and_tips` [..., 2 J, 3] of the skeleton."""
-        *shape, count, _ = positions.shape
-        out = np.empty((prod(shape), len(self.names), 2, 3))
-        _place(positions.reshape(len(out), count, 3), self.points, self.shares, out)
-        return out.reshape(*shape, *out.shape[1:])
+        first, second = positions[..., self.points[:, :1], :], positions[..., self.points[:, 1:], :]
+        return np.asarray(first + self.shares[..., None] * (second - first))
 
     def pairs(self) -> Ints:
         """Return the pairs of capsules that could pass through each other [P, 2].
@@ -170,17 +167,6 @@ def _depths(skeleton: Skeleton, rotations: Floats, capsules: Capsules, pairs: In
 
 def _sided(side: str, parts: Collection[str]) -> set[str]:
     return {f"{side}_{part}" for part in parts}
-
-
-@jit
-def _place(positions: Floats, points: Ints, shares: Floats, out: Floats) -> None:
-    """Write the ends [T, C, 2, 3] of axes between points [C, 2] at positions [T, P, 3], by their shares [C, 2]."""
-    for t in range(len(positions)):
-        for c in range(len(points)):
-            first, second = positions[t, points[c, 0]], positions[t, points[c, 1]]
-            for end in range(2):
-                for k in range(3):
-                    out[t, c, end, k] = first[k] + shares[c, end] * (second[k] - first[k])
 
 
 @jit

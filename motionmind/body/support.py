@@ -23,6 +23,7 @@ from motionmind.body.contact import Posed, contact_points, limb_heights, pose
 from motionmind.body.human import human23
 from motionmind.body.limbs import limb_of_points
 from motionmind.body.skeleton import Skeleton, joints_of, place, remembered
+from motionmind.geometry.rotations import norm
 from motionmind.jit import jit
 
 NEAR = 0.05  # metres above the body's lowest point within which a limb can bear
@@ -201,7 +202,6 @@ def _extent(skeleton: Skeleton) -> float:
     return float(np.ptp(skeleton.rest, axis=0).max())
 
 
-@jit
 def _find_bearers(
     places: Floats, limb: Ints, near: Floats, airborne: Bools, still: float, fps: float
 ) -> tuple[Bools, Bools]:
@@ -215,20 +215,13 @@ def _find_bearers(
         still: speed up to which a point bears, metres a second: over two frames, at the ends over one.
         fps: frames a second.
     """
-    last = len(places) - 1
-    bears, touches = np.zeros((len(places), limb.max() + 1), np.bool_), np.zeros(places.shape[:2], np.bool_)
-    for t in range(len(places)):
-        if airborne[t]:
-            continue
-        before, after = max(t - 1, 0), min(t + 1, last)
-        for p in range(len(limb)):
-            if places[t, p, 1] <= near[t]:
-                x, y, z = places[after, p] - places[before, p]
-                if np.sqrt(x * x + y * y + z * z) * fps / max(after - before, 1) < still:
-                    bears[t, limb[p]] = True
-        for p in range(len(limb)):
-            touches[t, p] = bears[t, limb[p]] and places[t, p, 1] <= near[t]
-    return bears, touches
+    frames = np.arange(len(places))
+    before, after = np.maximum(frames - 1, 0), np.minimum(frames + 1, len(places) - 1)
+    frames_between = np.maximum(after - before, 1)[:, None]
+    low = (places[..., 1] <= near[:, None]) & ~airborne[:, None]
+    rests = low & (norm(places[after] - places[before]) * fps / frames_between < still)
+    bears = np.stack([rests[:, limb == one].any(axis=1) for one in range(limb.max() + 1)], axis=1)
+    return bears, bears[:, limb] & low
 
 
 @jit
@@ -244,18 +237,23 @@ def _overhang(points: Floats, supports: Bools, mass: Floats) -> Floats:
         chosen = np.flatnonzero(supports[t])
         if len(chosen) == 0:
             continue
-        off = points[t][chosen] - mass[t]
-        angles = np.sort(np.arctan2(off[:, 1], off[:, 0]))
+        xs, ys, angles = np.empty(len(chosen)), np.empty(len(chosen)), np.empty(len(chosen))
+        least = np.inf
+        for i in range(len(chosen)):
+            x, y = points[t, chosen[i], 0] - mass[t, 0], points[t, chosen[i], 1] - mass[t, 1]
+            xs[i], ys[i], at = x, y, i
+            angle = np.arctan2(y, x)
+            while at > 0 and angles[at - 1] > angle:  # in order
+                angles[at] = angles[at - 1]
+                at -= 1
+            angles[at] = angle
+            for j in range(i + 1):
+                side_x, side_y = xs[j] - x, ys[j] - y
+                length = side_x**2 + side_y**2
+                share = 0.0 if length == 0.0 else min(max(-(x * side_x + y * side_y) / length, 0.0), 1.0)
+                least = min(least, (x + share * side_x) ** 2 + (y + share * side_y) ** 2)
         gap = angles[0] + 2.0 * np.pi - angles[-1]
         for i in range(1, len(angles)):
             gap = max(gap, angles[i] - angles[i - 1])
-        least = np.inf
-        for i in range(len(off)):
-            for j in range(i + 1):
-                side = off[j] - off[i]
-                length = side[0] ** 2 + side[1] ** 2  # not @, which imports SciPy's linear algebra
-                along = off[i, 0] * side[0] + off[i, 1] * side[1]
-                share = 0.0 if length == 0.0 else min(max(-along / length, 0.0), 1.0)
-                least = min(least, (off[i, 0] + share * side[0]) ** 2 + (off[i, 1] + share * side[1]) ** 2)
         out[t] = 0.0 if gap < np.pi else np.sqrt(least)
     return out

@@ -33,7 +33,7 @@ NOTICE = "compiling inner loops, once, which takes a minute or more (`motionmind
 _LAST = "search/astar.search"  # calls most of what is compiled for a search, and is there only once all of that is
 _SEARCHES = ("body/", "footing/", "geometry/", "realise/", "search/", "walks/")  # what a search needs, by folder
 _LATER = (  # of which it needs little, or nothing
-    *("body/support._overhang", "geometry/many.matrices", "geometry/many.turns"),
+    "body/support._overhang",
     *("walks/sparse", "walks/steps", "search/pair_chain", "search/sample"),
 )
 _LOOK = 0.2  # seconds between two looks at what is compiled

@@ -7,15 +7,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from motionmind._typing import Floats
-from motionmind.geometry.curves import bends_of, piece_of
+from motionmind._typing import Floats, Ints
+from motionmind.geometry.curves import bends_of
 from motionmind.jit import jit
 
 _MARGIN = 18  # keys on either side that a chart knows: a key's influence falls to about a quarter with each further one
 _NEAR = 3.1  # radians: less than half a turn
 
 
-@jit
 def curve_of_rotations(times: Floats, keys: Floats, at: Floats) -> Floats:
     """Return the curve through keys [K, m, 4], two or more, at some times [N]: [N, m, 4] (`splines.rotation_spline`).
 
@@ -24,32 +23,34 @@ def curve_of_rotations(times: Floats, keys: Floats, at: Floats) -> Floats:
         keys: unit quaternions.
         at: times to evaluate at.
     """
-    count, joints = keys.shape[:2]
-    rows = keys.transpose(0, 2, 1).copy()
-    out, pieces, wanted = np.empty((len(at), joints, 4)), np.empty(len(at), np.int64), np.zeros(count, np.bool_)
-    for t in range(len(at)):
-        pieces[t] = piece_of(times, at[t])
-        if at[t] != times[pieces[t]]:
-            wanted[pieces[t]] = wanted[pieces[t] + 1] = True
+    pieces = np.searchsorted(times, at, side="right").clip(1, len(times) - 1) - 1  # by the key that each begins with
+    rows, out = np.ascontiguousarray(keys.transpose(0, 2, 1)), np.take(keys, pieces, axis=0)
+    between = np.flatnonzero(at != times[pieces])
     # In each chart only the centre and its neighbours count: values, and second derivatives.
-    values, bends = np.zeros((count, 3, 3, joints)), np.zeros((count, 3, 3, joints))
-    for centre in range(count):
-        if wanted[centre]:
-            _write_chart(times, rows, centre, values[centre], bends[centre])
+    charts = np.zeros((2, len(keys), 3, 3, keys.shape[1]))
+    _write_charts(times, rows, np.union1d(pieces[between], pieces[between] + 1), charts)
+    _write_curve(times, rows, charts, at, pieces, between, out)
+    return out
+
+
+@jit
+def _write_curve(
+    times: Floats, rows: Floats, charts: Floats, at: Floats, pieces: Ints, between: Ints, out: Floats
+) -> None:
+    """Write the curve at those times that are between keys; arguments are variables of `curve_of_rotations`."""
+    joints = rows.shape[2]
     one, other, turned = np.empty((4, joints)), np.empty((4, joints)), np.empty((4, joints))
     vectors, room = np.empty((3, joints)), np.empty((2, joints))
-    for t in range(len(at)):
+    for t in between:
         key = pieces[t]
         after, before = times[key + 1] - at[t], at[t] - times[key]
-        if before == 0.0:
-            out[t] = keys[key]
-            continue
+        step = after + before
         step = after + before
         a, b, s = after**3 / step - step * after, before**3 / step - step * before, before / step
         share = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
         for end, rotations in ((0, one), (1, other)):
             # The chart of the piece's first key has that in the middle, and that of its last one the last.
-            v, m, first = values[key + end], bends[key + end], 1 - end
+            v, m, first = charts[0, key + end], charts[1, key + end], 1 - end
             for k in range(3):
                 for joint in range(joints):
                     line = (v[first, k, joint] * after + v[first + 1, k, joint] * before) / step
@@ -63,61 +64,63 @@ def curve_of_rotations(times: Floats, keys: Floats, at: Floats) -> Floats:
         for joint in range(joints):
             for k in range(4):
                 out[t, joint, k] = turned[k, joint]
-    return out
 
 
 @jit
-def _write_chart(times: Floats, keys: Floats, centre: int, values: Floats, bends: Floats) -> None:
-    """Write the natural spline of rotation vectors around a key: values and second derivatives [3, 3, m] there and at
-    its neighbours, where there are some."""
-    first, last = max(centre - _MARGIN, 0), min(centre + _MARGIN, len(keys) - 1)
-    vectors = _vectors_around(keys, centre, first, last)
-    bent = bends_of(times[first : last + 1], vectors.reshape(len(vectors), -1)).reshape(vectors.shape)
-    for row in range(3):
-        key = centre + row - 1
-        if 0 <= key < len(keys):
-            values[row], bends[row] = vectors[key - first], bent[key - first]
+def _write_charts(times: Floats, keys: Floats, centres: Ints, out: Floats) -> None:
+    """Write the natural splines of rotation vectors around some keys: values and second derivatives [2, K, 3, 3, m]
+    there and at their neighbours, where there are some."""
+    for centre in centres:
+        first, last = max(centre - _MARGIN, 0), min(centre + _MARGIN, len(keys) - 1)
+        vectors = _vectors_around(keys, centre, first, last)
+        bends = bends_of(times[first : last + 1], vectors)
+        for key in range(max(centre - 1, 0), min(centre + 2, len(keys))):
+            for k in range(3):
+                for joint in range(keys.shape[2]):
+                    out[0, centre, key - centre + 1, k, joint] = vectors[key - first, k * keys.shape[2] + joint]
+                    out[1, centre, key - centre + 1, k, joint] = bends[key - first, k * keys.shape[2] + joint]
 
 
 @jit
 def _vectors_around(keys: Floats, centre: int, first: int, last: int) -> Floats:
-    """Return rotation vectors [n, 3, m], radians, from the key that is the centre to the keys from first to last.
+    """Return rotation vectors [n, 3 m], radians, from the key that is the centre to the keys from first to last.
 
     They are unrolled: each has whole turns added so that it is nearest to that of the neighbouring key towards the
     centre.
     """
     joints = keys.shape[2]
-    out = np.empty((last - first + 1, 3, joints))
-    turned, room = np.empty(joints), np.empty((2, joints))
-    out[centre - first] = 0.0
+    out = np.zeros((last - first + 1, 3 * joints))
+    own, room = np.empty((3, joints)), np.empty((2, joints))
     for side in (1, -1):
-        turned[:] = 0.0
+        turned = np.zeros(joints)
         key = centre + side
         while first <= key <= last:
-            own = out[key - first]
             _write_logs(keys[centre], keys[key], own, room)
             for joint in range(joints):
                 # No turn could bring it nearer: neither is half a turn away. Of zeros the sign would be lost.
                 angle, is_flat = room[0, joint], own[0, joint] * own[1, joint] * own[2, joint] == 0.0
                 if angle + turned[joint] > _NEAR or angle < 1e-8 or is_flat:
-                    _unroll(own[:, joint], out[key - side - first, :, joint])
+                    _unroll(own, joint, out[key - side - first])
                     angle = np.sqrt(own[0, joint] ** 2 + own[1, joint] ** 2 + own[2, joint] ** 2)
                 turned[joint] = angle
+                for k in range(3):
+                    out[key - first, k * joints + joint] = own[k, joint]
             key += side
     return out
 
 
 @jit
-def _unroll(own: Floats, toward: Floats) -> None:
-    """Add whole turns to a rotation vector [3], in place, so that it is nearest to another."""
-    x, y, z = own[0], own[1], own[2]
+def _unroll(own: Floats, joint: int, toward: Floats) -> None:
+    """Add whole turns to a joint's rotation vector [3, m], in place, so that it is nearest to another [3 m]."""
+    x, y, z, joints = own[0, joint], own[1, joint], own[2, joint], own.shape[1]
+    to_x, to_y, to_z = toward[joint], toward[joints + joint], toward[2 * joints + joint]
     angle = np.sqrt(x**2 + y**2 + z**2)
     # A zero vector may be a whole turn about any axis: take its neighbour's, if that is not zero too.
-    ax, ay, az = (x, y, z) if angle > 1e-9 else (toward[0], toward[1], toward[2])
+    ax, ay, az = (x, y, z) if angle > 1e-9 else (to_x, to_y, to_z)
     length = max(np.sqrt(ax**2 + ay**2 + az**2), 1e-9)
-    across = (ax * toward[0] + ay * toward[1] + az * toward[2]) / length
+    across = (ax * to_x + ay * to_y + az * to_z) / length
     turns = 2.0 * np.pi * np.round((across - angle) / (2.0 * np.pi)) / length
-    own[0], own[1], own[2] = x + turns * ax, y + turns * ay, z + turns * az
+    own[0, joint], own[1, joint], own[2, joint] = x + turns * ax, y + turns * ay, z + turns * az
 
 
 @jit

@@ -105,10 +105,6 @@ def mul_vec(q: Floats, v: Floats) -> Floats:
 
 def norm(v: Floats) -> Floats:
     """Return the lengths [...] of vectors [..., n]; np.linalg.norm takes several times as long on short vectors."""
-    if v.size >= v.shape[-1] * _MANY:
-        lengths = np.empty(v.shape[:-1])
-        _many().measure(_rows(v), lengths.reshape(-1))
-        return lengths
     squares = v[..., 0] ** 2
     for i in range(1, v.shape[-1]):
         squares = squares + v[..., i] ** 2
@@ -135,15 +131,9 @@ def normalise(q: ArrayLike) -> Floats:
     """
     q = np.asarray(q, dtype=np.float64)
     length = norm(q)
-    if q.size >= 4 * _MANY:
-        out = q.copy()
-        is_rotation = _many().divide(out.reshape(-1, 4), length.reshape(-1), _LEAST)
-    else:
-        is_rotation = bool(np.all(length > _LEAST))
-        out = np.asarray(q / length[..., None] if is_rotation else q, dtype=np.float64)
-    if not is_rotation:
+    if not np.all(length > _LEAST):
         raise ValueError("a quaternion of length zero is no rotation")
-    return out
+    return np.asarray(q / length[..., None])
 
 
 def canonical(q: Floats) -> Floats:
@@ -161,16 +151,8 @@ def angle(a: Floats, b: Floats) -> Floats:
     0.3
     """
     # atan2 of the relative rotation's vector and scalar parts; acos of the dot product would lose half the digits.
-    return np.asarray(2.0 * np.arctan2(*_sides(inv_mul(a, b))))
-
-
-def _sides(q: Floats) -> tuple[Floats, Floats]:
-    """Return the sine and the cosine [...] of half the angle of `q` [..., 4], both at least 0."""
-    if q.size < 4 * _MANY:
-        return norm(q[..., :3]), np.abs(q[..., 3])
-    sines, cosines = np.empty((2, *q.shape[:-1]))
-    _many().sides(_rows(q), sines.reshape(-1), cosines.reshape(-1))
-    return sines, cosines
+    q = inv_mul(a, b)
+    return np.asarray(2.0 * np.arctan2(norm(q[..., :3]), np.abs(q[..., 3])))
 
 
 def exp(v: Floats) -> Floats:
@@ -178,21 +160,13 @@ def exp(v: Floats) -> Floats:
     theta = norm(v)
     # sin(theta/2)/theta, by numpy's sin(pi x)/(pi x) with x = theta / 2 pi: exact at 0.
     share, cosine = np.sinc(theta / (2.0 * np.pi)), np.cos(0.5 * theta)
-    if theta.size < _MANY:
-        return np.concatenate([v * 0.5 * share[..., None], cosine[..., None]], axis=-1)
-    out = np.empty((*theta.shape, 4))
-    _many().quaternions(_rows(v), share.reshape(-1), cosine.reshape(-1), out.reshape(-1, 4))
-    return out
+    return np.concatenate([v * 0.5 * share[..., None], cosine[..., None]], axis=-1)
 
 
 def log(q: Floats) -> Floats:
     """Return the rotation vector [..., 3] of `q` [..., 4], radians, of length at most pi: the inverse of `exp`."""
-    s, cosine = _sides(q)
-    theta = np.asarray(2.0 * np.arctan2(s, cosine))
-    if theta.size >= _MANY:
-        out = np.empty((*theta.shape, 3))
-        _many().vectors(_rows(q), s.reshape(-1), theta.reshape(-1), out.reshape(-1, 3))
-        return out
+    s = norm(q[..., :3])
+    theta = 2.0 * np.arctan2(s, np.abs(q[..., 3]))
     # theta / s tends to 2 as s does to 0: theta = 2 asin(s) = 2 s + s^3/3 + ...
     scale = np.where(s > 1e-8, theta / np.where(s > 1e-8, s, 1.0), 2.0)
     return np.asarray(q[..., :3] * np.where(q[..., 3] < 0.0, -scale, scale)[..., None])
@@ -221,10 +195,6 @@ def from_euler(order: str, angles: Floats) -> Floats:
     [0.0, 1.0, 0.0, 0.0]
     """
     axes = np.array([np.eye(3)["xyz".index(letter)] for letter in order.lower()])
-    if len(axes) and angles.size >= len(axes) * _MANY:
-        half, out = 0.5 * angles, np.empty((*angles.shape[:-1], 4))
-        _many().turns(_rows(np.sin(half)), _rows(np.cos(half)), axes, out.reshape(-1, 4))
-        return out
     turns = [from_axis_angle(axis, angles[..., i]) for i, axis in enumerate(axes)]
     return reduce(mul, turns) if turns else np.tile(IDENTITY, (*angles.shape[:-1], 1))
 
@@ -260,11 +230,7 @@ def to_euler(order: str, q: Floats) -> Floats:
 
 def to_matrix(q: Floats) -> Floats:
     """Return rotation matrices [..., 3, 3] of `q` [..., 4]; their columns are the images of x, y and z."""
-    if q.size < 4 * _MANY:
-        return np.stack([mul_vec(q, np.broadcast_to(e, (*q.shape[:-1], 3))) for e in np.eye(3)], axis=-1)
-    out = np.empty((*q.shape[:-1], 3, 3))
-    _many().matrices(_rows(q), out.reshape(-1, 3, 3))
-    return out
+    return np.stack([mul_vec(q, e) for e in np.eye(3)], axis=-1)
 
 
 def from_matrix(m: Floats) -> Floats:
