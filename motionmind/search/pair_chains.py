@@ -29,7 +29,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind._typing import Floats, Ints
+from motionmind._typing import Bools, Floats, Ints
 from motionmind.jit import jit
 from motionmind.search.pair_chain_tables import (
     PairChains,
@@ -59,11 +59,11 @@ def build(trellis: Trellis, messages: Messages) -> PairChains:
     for i, a in zip(*map(np.ndarray.tolist, partners(trellis)), strict=True):
         mine, theirs = shares[i % chains], shares[a % chains]
         tables.edge_share[out[i]], tables.partner_share[borne[i]] = mine * edge[out[i]], theirs * edge[out[a]]
-        cost = theirs * theta[own[a], None] + mine * theta[own[i]]
+        cost = tables.pair_cost[pairs[i]].reshape(own[a].stop - own[a].start, -1)  # written to in place
+        np.add(theirs * theta[own[a], None], mine * theta[own[i]], out=cost)
         if rows[i].stop > rows[i].start:
             cost -= messages.up_col[rows[i], None] + messages.down_col[own[i]]
             first[rows[i]] = pairs[i].start - own[i].start + cost.shape[1] * np.arange(len(cost))
-        tables.pair_cost[pairs[i]] = cost.ravel()
     tables.pair_cost[np.repeat(first, np.diff(trellis.col_ptr)) + trellis.col_to] += trellis.col_cost
     fill_to_go(trellis, tables)
     return tables
@@ -143,15 +143,32 @@ def prune(trellis: Trellis, tables: PairChains, through: Floats, below: float) -
     if np.any(np.diff(smaller.dom_ptr) == 0):
         return smaller, fewer
     edges = np.repeat(kept, np.diff(trellis.row_ptr)) & kept[trellis.row_to]
-    own, out = _slices(trellis.dom_ptr), _slices(trellis.row_ptr[trellis.dom_ptr])
-    both = list(zip(*map(np.ndarray.tolist, partners(trellis)), strict=True))
-    fewer.pair_cost[:] = tables.pair_cost[
-        np.concatenate([np.outer(kept[own[a]], kept[own[i]]).ravel() for i, a in both])
-    ]
+    _keep_shares(trellis, tables, kept, fewer)
     fewer.edge_share[:] = tables.edge_share[edges]
-    fewer.partner_share[:] = tables.partner_share[np.concatenate([edges[out[a]] for _, a in both])]
     fill_to_go(smaller, fewer)
     return smaller, fewer
+
+
+@jit
+def _keep_shares(trellis: Trellis, tables: PairChains, kept: Bools, fewer: PairChains) -> None:
+    """Write what pairs of kept positions cost [P], and the shares of partners' edges between such."""
+    pair = entry = 0
+    for i in range(len(trellis.dom_ptr) - 1):
+        if i % trellis.chains == 0:
+            continue
+        a, first, last = partner_of(trellis, i), trellis.dom_ptr[i], trellis.dom_ptr[i + 1]
+        borne = tables.partner_ptr[i] - trellis.row_ptr[trellis.dom_ptr[a]]
+        for p in range(trellis.dom_ptr[a], trellis.dom_ptr[a + 1]):
+            if kept[p]:
+                base = tables.pair_ptr[i] + (p - trellis.dom_ptr[a]) * (last - first) - first
+                for x in range(first, last):
+                    if kept[x]:
+                        fewer.pair_cost[pair] = tables.pair_cost[base + x]
+                        pair += 1
+                for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1]):
+                    if kept[trellis.row_to[e]]:
+                        fewer.partner_share[entry] = tables.partner_share[borne + e]
+                        entry += 1
 
 
 @jit
