@@ -38,6 +38,7 @@ class _Nodes(NamedTuple):
     """Up to N nodes, the open list and the hash table that finds nodes. `tally` holds the counters above.
 
     Memory is written to only as it is needed: most searches need little of it.
+    Numbers of 32 bits are widened where functions take them: else these would be compiled for both widths.
     """
 
     var: Int32s  # the last variable that is fixed [N]
@@ -99,7 +100,7 @@ def search(
     nodes = _root(trellis, from_start(heuristic), budget)
     known = lower = cost
     while nodes.tally[_HEAPED] > 0:
-        node = int(nodes.heap[0])
+        node = int(np.int64(nodes.heap[0]))
         if nodes.key[node] >= cost - (slack if cost < known else SAME):
             lower = nodes.key[node]
             break
@@ -148,7 +149,7 @@ def _expand(
             if nodes.f[twin] <= f + SAME:
                 continue
             if nodes.slot[twin] >= 0 and nodes.children[twin] == 0:
-                parent = int(nodes.parent[twin])
+                parent = int(np.int64(nodes.parent[twin]))
                 _discard(nodes, twin)
                 if parent != node:
                     _release(nodes, parent)
@@ -184,7 +185,7 @@ def _root(trellis: Trellis, bound: float, budget: int) -> _Nodes:
     nodes.tally[_NODES] = nodes.tally[_PEAK] = 1
     nodes.var[0], nodes.f[0], nodes.key[0] = trellis.chains - 1, bound, bound
     nodes.frontier[0], nodes.parent[0], nodes.children[0] = 0, -1, 0
-    _open(nodes, 0)
+    nodes.heap[0], nodes.slot[0], nodes.tally[_HEAPED] = 0, 0, 1
     return nodes
 
 
@@ -218,7 +219,7 @@ def _forget(nodes: _Nodes, current: int) -> bool:
     kept = np.zeros(len(nodes.var), np.bool_)
     size, marked = nodes.tally[_HEAPED], _mark(nodes, kept, current)
     while nodes.tally[_HEAPED] > 0:
-        node = int(nodes.heap[0])
+        node = int(np.int64(nodes.heap[0]))
         if marked + _unmarked(nodes, kept, node) > KEPT * len(kept):
             break
         _close(nodes, node)
@@ -228,12 +229,12 @@ def _forget(nodes: _Nodes, current: int) -> bool:
     others = bool(nodes.tally[_NODES] > marked)
     nodes.tally[_HEAPED] = 0
     for k in range(size):
-        node = int(nodes.heap[k])
+        node = int(np.int64(nodes.heap[k]))
         if nodes.slot[node] < 0:
             continue  # forgotten after its last child
         listed = kept[node]
         while not kept[node] and nodes.children[node] == 0:
-            parent = int(nodes.parent[node])
+            parent = int(np.int64(nodes.parent[node]))
             listed = nodes.slot[parent] < 0
             nodes.key[parent] = nodes.key[node] if listed else min(nodes.key[parent], nodes.key[node])
             nodes.slot[parent] = max(nodes.slot[parent], 0)
@@ -274,7 +275,7 @@ def _mark(nodes: _Nodes, kept: Bools, node: int) -> int:
 def _release(nodes: _Nodes, node: int) -> None:
     """Free a closed node without children, since nothing below the known cost lies behind it; then its ancestors."""
     while node > 0 and nodes.slot[node] < 0 and nodes.children[node] == 0:
-        parent = int(nodes.parent[node])
+        parent = int(np.int64(nodes.parent[node]))
         _drop(nodes, node)
         node = parent
 
@@ -302,9 +303,9 @@ def _hash(nodes: _Nodes, node: int, var: int, choice: int, chain: int) -> int:
 @jit
 def _home(nodes: _Nodes, node: int) -> int:
     """Return the bucket of a node."""
-    var = int(nodes.var[node])
+    var = int(np.int64(nodes.var[node]))
     chain = var % nodes.frontier.shape[1]
-    return _hash(nodes, node, var, int(nodes.frontier[node, chain]), chain)
+    return _hash(nodes, node, var, int(np.int64(nodes.frontier[node, chain])), chain)
 
 
 @jit
@@ -332,7 +333,7 @@ def _widen(nodes: _Nodes) -> None:
         node = nodes.bucket[home]
         nodes.bucket[home] = nodes.bucket[count + home] = -1
         while node >= 0:
-            after, now = nodes.following[node], _home(nodes, int(node))
+            after, now = nodes.following[node], _home(nodes, int(np.int64(node)))
             nodes.following[node] = nodes.bucket[now]
             nodes.bucket[now] = node
             node = after
@@ -407,12 +408,12 @@ def _open(nodes: _Nodes, node: int) -> None:
 def _close(nodes: _Nodes, node: int) -> None:
     """Take a node off the open list."""
     nodes.tally[_HEAPED] -= 1
-    k, last = int(nodes.slot[node]), nodes.heap[nodes.tally[_HEAPED]]
+    k, last = int(np.int64(nodes.slot[node])), nodes.heap[nodes.tally[_HEAPED]]
     nodes.slot[node] = -1
     if last != node:
         nodes.heap[k], nodes.slot[last] = last, k
         _rise(nodes, k)
-        _sink(nodes, int(nodes.slot[last]))
+        _sink(nodes, int(np.int64(nodes.slot[last])))
 
 
 @jit

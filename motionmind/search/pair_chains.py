@@ -44,7 +44,7 @@ from motionmind.search.pair_chain_tables import (
     push_so_far,
     size_of,
 )
-from motionmind.search.trellis import Trellis, positions_above, reachable, subset
+from motionmind.search.trellis import Trellis, coupling_rows, positions_above, reachable, subset
 from motionmind.search.trws import Messages
 
 
@@ -138,7 +138,7 @@ def prune(trellis: Trellis, tables: PairChains, through: Floats, below: float) -
         below: nats.
     """
     kept = reachable(trellis, through, below)
-    smaller = subset(trellis, kept, False)
+    smaller = subset(trellis, kept, coupling_rows(trellis, kept), False)
     fewer = empty(smaller)
     if np.any(np.diff(smaller.dom_ptr) == 0):
         return smaller, fewer

@@ -91,7 +91,7 @@ def build_trellis(
     dom_ptr, place = _domains(model, start, moves, to_go, below, timed)
     chains, states, lengths = len(model.parents), model.starts[-1], np.diff(dom_ptr)
     variable = np.repeat(np.arange(len(lengths)), lengths)
-    move, first, rows = variable // chains, model.starts[variable % chains], np.nonzero(place >= 0)[1]
+    move, first, rows = variable // chains, model.starts[variable % chains], np.flatnonzero(place >= 0) % states
     dom, last = (rows - first).astype(np.int32), dom_ptr[moves * chains]  # from the last move no edges lead
     edges = model.indptr, model.targets, model.costs
     shifts = (move[:last] + 1) * states + first[:last]
@@ -170,15 +170,16 @@ def reachable(trellis: Trellis, through: Floats, below: float) -> Bools:
     return kept
 
 
-def subset(trellis: Trellis, kept: Bools, in_place: bool) -> Trellis:
+def subset(trellis: Trellis, kept: Bools, rows: Ints, in_place: bool) -> Trellis:
     """Build the trellis of the positions that are kept [P].
 
     Args:
         trellis: the whole.
         kept: which positions to keep.
+        rows: their `coupling_rows`.
         in_place: whether in the memory of the whole, which is lost.
     """
-    held, rows = np.flatnonzero(kept), coupling_rows(trellis, kept)
+    held = np.flatnonzero(kept)
     before = np.concatenate([[0], np.cumsum(kept)])  # how many are kept before each position
     numbers = np.where(kept, before[:-1], -1).astype(np.int32)
     dom_ptr, up_ptr = before[trellis.dom_ptr], np.searchsorted(rows, trellis.up_ptr)

@@ -373,7 +373,7 @@ def prune(trellis: Trellis, messages: Messages, below: float, in_place: bool) ->
     held = np.flatnonzero(kept)
     rows = coupling_rows(trellis, kept)
     fewest = np.diff(np.searchsorted(held, trellis.dom_ptr)).min()  # that are kept of a domain
-    return subset(trellis, kept, in_place and bool(fewest > 0)), Messages(
+    return subset(trellis, kept, rows, in_place and bool(fewest > 0)), Messages(
         messages.down_row[held], messages.up_row[held], messages.down_col[held], messages.up_col[rows],
         messages.constants.copy(), messages.before.copy(), messages.ahead[held], messages.through[held],
     )  # fmt: skip
