@@ -76,7 +76,7 @@ class Capsules(NamedTuple):
 
     def place(self, positions: Floats) -> Floats:
         """Return the ends [..., C, 2, 3], metres, from the `positions_and_tips` [..., 2 J, 3] of the skeleton."""
-        first, second = positions[..., self.points[:, :1], :], positions[..., self.points[:, 1:], :]
+        first, second = (np.take(positions, self.points[:, end : end + 1], axis=-2) for end in range(2))
         return np.asarray(first + self.shares[..., None] * (second - first))
 
     def pairs(self) -> Ints:

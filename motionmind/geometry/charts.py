@@ -28,7 +28,9 @@ def curve_of_rotations(times: Floats, keys: Floats, at: Floats) -> Floats:
     between = np.flatnonzero(at != times[pieces])
     # In each chart only the centre and its neighbours count: values, and second derivatives.
     charts = np.zeros((2, len(keys), 3, 3, keys.shape[1]))
-    _write_charts(times, rows, np.union1d(pieces[between], pieces[between] + 1), charts)
+    centres = np.zeros(len(keys), dtype=np.bool_)
+    centres[pieces[between]] = centres[pieces[between] + 1] = True
+    _write_charts(times, rows, np.flatnonzero(centres), charts)
     _write_curve(times, rows, charts, at, pieces, between, out)
     return out
 

@@ -45,16 +45,15 @@ def squared_distances(orientations: Floats, members: Ints, parts: int, postures:
         parts: how many parts there are.
         postures: orientations of the joints that distances are measured from [K, J, 4].
     """
-    out = np.zeros((parts, len(postures), len(orientations)))
-    _add_squares(read_only(orientations), members, postures, out)
+    out = _sums_of_squares(read_only(orientations), members, parts, postures)
     out /= np.bincount(members.ravel(), minlength=parts)[:, None, None]
     return out
 
 
 @jit
-def _add_squares(orientations: Floats, members: Ints, postures: Floats, out: Floats) -> None:
-    """Add the squared distances of `squared_distances`, sums over the parts' joints [P, K, N]."""
-    shown, own = np.empty((4, _BLOCK)), np.empty(_BLOCK)
+def _sums_of_squares(orientations: Floats, members: Ints, parts: int, postures: Floats) -> Floats:
+    """Return the squared distances of `squared_distances`, sums over the parts' joints [P, K, N]."""
+    out, shown, own = np.zeros((parts, len(postures), len(orientations))), np.empty((4, _BLOCK)), np.empty(_BLOCK)
     for first in range(0, len(orientations), _BLOCK):
         count = min(_BLOCK, len(orientations) - first)
         for joint in range(len(members)):
@@ -70,6 +69,7 @@ def _add_squares(orientations: Floats, members: Ints, postures: Floats, out: Flo
                     sums = out[part, k, first : first + count]
                     for i in range(count):
                         sums[i] += own[i]
+    return out
 
 
 @jit
@@ -144,7 +144,8 @@ def nearest_to_ends(off: Floats) -> tuple[float, float]:
     Args:
         off: squared distances of moments from the first posture, and from the last, and others [K, n], radians^2.
     """
-    return float(np.sqrt(off[0].min())), float(np.sqrt(off[1].min()))
+    first, last = np.sqrt(off[:2].min(axis=1)).tolist()
+    return first, last
 
 
 def in_variances(off: Floats, of_first: float, of_last: float) -> Floats:
@@ -154,9 +155,9 @@ def in_variances(off: Floats, of_first: float, of_last: float) -> Floats:
         off: squared distances from the first posture, from the last, and from those of a path [K, n], radians^2.
         of_first, of_last: variances of walks' ends about the given postures, radians^2.
     """
-    out = off / FOLLOWS_WITHIN**2
-    out[0], out[1] = off[0] / of_first, off[1] / of_last
-    return out
+    variances = np.full((len(off), 1), FOLLOWS_WITHIN**2)
+    variances[:2, 0] = of_first, of_last
+    return np.asarray(off / variances)
 
 
 def likelihoods(squares: Floats) -> Floats:

@@ -31,7 +31,7 @@ def steps_at(moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int
     """Return the steps that leave moments, or that lead to them if not `ahead`: at which of the moments [m], the moment
     at each one's other end [m], and its number [m]."""
     steps = _steps(moments, ahead, begins, ends, postures, _ways(ahead, begins, ends))
-    at, numbers = np.nonzero(steps >= 0)[0], steps[steps >= 0]
+    at, numbers = np.flatnonzero(steps >= 0) // 2, steps[steps >= 0]
     return at, (ends if ahead else begins)[numbers], numbers
 
 
