@@ -158,7 +158,7 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
 
 
 # Of a Piece, for those that arrange postures themselves; they check nothing.
-INNER = {"Piece.around", "Piece.arrange", "Piece.ends"}
+INNER = {"Piece.around", "Piece.arrange", "Piece.chunks", "Piece.ends", "Piece.is_seam"}
 
 
 def public() -> dict[str, Callable[..., Any]]:

@@ -9,6 +9,7 @@ import click
 
 from motionmind.cli.printing import count, note
 from motionmind.display import displayed
+from motionmind.variation.orders import REFUSED
 
 if TYPE_CHECKING:
     from motionmind.tween.engine import Engine
@@ -27,20 +28,20 @@ def print_review(report: dict[str, Any], names: Sequence[str]) -> None:
         names: a name for each of the piece's postures [N].
     """
     course, counts = report["course"], report["counts"]
-    values = ", ".join(f"{name} {value:g}" for name, value in course["parameters"].items())
-    nudge = ", ".join(f"{x:g}" for x in course["nudge"])
     click.echo(
         f"{displayed(report['piece']['name']) or 'piece'}, {count(report['piece']['postures'], 'posture')}, "
-        f"by {course['flow']} ({values}), nudge {nudge}, skip {course['skip']}"
+        f"by {_format_making(report['control'], course)}"
     )
-    click.echo(
-        f"Lyapunov exponent {course['exponent']:.2g}: trajectories part by {course['parting']:.2g} nats a posture"
-    )
+    if course:
+        click.echo(
+            f"Lyapunov exponent {course['exponent']:.2g}: trajectories part by {course['parting']:.2g} nats a posture"
+        )
     seams = f"{count(counts['seams'], 'seam')} ({counts['departed']:.0%} of steps)"
     click.echo(
         f"{count(counts['postures'], 'posture')}, {seams}: {counts['inserted']} with an insertion, "
         f"{counts['attested']} attested, {counts['abrupt']} abrupt, {counts['unjudged']} not judged"
     )
+    click.echo(f"chunk length in postures: {counts['mean_chunk']:.3g} on average, {counts['longest_chunk']} at most")
     if counts["inserted"]:
         click.echo(f"{counts['inserted_share']:.0%} of the time is inserted")
     begins = [0, *(seam["at"] + 1 for seam in report["seams"])]
@@ -48,8 +49,7 @@ def print_review(report: dict[str, Any], names: Sequence[str]) -> None:
     if report["limits"]:
         shortest = min(end - begin + 1 for begin, end in zip(begins, ends, strict=True))
         kept = _format_limits(report["limits"], counts["inserted_share"], shortest)
-        own = f"the trajectory's own order leaves the piece in {course['departed']:.0%} of steps"
-        click.echo(f"{kept}{own}")
+        click.echo(f"{kept}without limits it leaves the piece in {course['departed']:.0%} of steps")
     if counts["stays"]:
         click.echo(_format_stillness(counts))
     spans = [(report["order"][first], report["order"][last]) for first, last in zip(begins, ends, strict=True)]
@@ -61,6 +61,18 @@ def print_review(report: dict[str, Any], names: Sequence[str]) -> None:
         row = f"{seam['number'] if seam else '':>4}  {here:9}  {there:12}   {name:{width}}"
         decision = seam["decision"] if seam and (seam["breaks"] or seam["decision"] != "open") else ""
         click.echo(f"{row}  {decision:9}  {_format_transition(seam)}" if seam else row.rstrip())
+
+
+def _format_making(control: dict[str, Any] | None, course: dict[str, Any] | None) -> str:
+    """Format how an order was made: "dabby, along rossler (a 0.2, b 0.2, c 5.7), nudge 0.01, 0, 0, skip 10"."""
+    made = []
+    if control:
+        made.append(control["by"] if control["seed"] is None else f"{control['by']}, seed {control['seed']}")
+    if course:
+        values = ", ".join(f"{name} {value:g}" for name, value in course["parameters"].items())
+        nudge = ", ".join(f"{x:g}" for x in course["nudge"])
+        made.append(f"{course['flow']} ({values}), nudge {nudge}, skip {course['skip']}")
+    return ", along ".join(made)
 
 
 def _format_limits(limits: dict[str, Any], share: float, shortest: int) -> str:
@@ -122,9 +134,16 @@ def _format_transition(seam: dict[str, Any]) -> str:
 
 
 def print_advice(variation: Variation, engine: Engine | None, depart: float | None) -> None:
-    """Note what to change if a variation is not what was asked for, or not what one would want."""
+    """Note what to change if a variation is not what was asked for, or not what one would want.
+
+    Args:
+        variation: the variation.
+        engine: what judged it; None for nothing.
+        depart: the share of steps for which a nudge was sought, if one was.
+    """
     from motionmind.variation.departure import WITHIN, departure
 
+    refused = REFUSED[variation.by]
     reached = departure(variation.first_order)
     if depart is not None and abs(reached - depart) > WITHIN:
         note(f"no nudge was found by which {depart:.0%} of steps leave the piece's order; the nearest is {reached:.0%}")
@@ -133,11 +152,13 @@ def print_advice(variation: Variation, engine: Engine | None, depart: float | No
     if not variation.seams and limits:
         note("within its limits the variation does not leave the piece's order: allow more by --inserted or --stretch")
     elif not variation.seams:
-        note("the variation does not leave the piece's order: try --depart 0.25, or a larger --length")
+        hints = {"depart": "--depart 0.25", "length": "a larger --length"}
+        tries = ", or ".join(hint for name, hint in hints.items() if name not in refused)
+        note("the variation does not leave the piece's order" + f": try {tries}" * bool(tries))
     elif engine is None:
         note("no corpus says which transitions are abrupt, so none is smoothed: name one by --corpus")
     share = counts["inserted_share"]
-    if limits is None and share > _MUCH:
+    if limits is None and share > _MUCH and "inserted" not in refused:
         note(f"insertions take {share:.0%} of the time: --inserted {_MUCH:g} keeps more of the piece")
     if limits and limits.inserted is not None and share > limits.inserted:
         note(f"no order was found with {limits.inserted:.0%} of the time inserted at most; this one has {share:.0%}")

@@ -132,7 +132,7 @@ SEARCH_OPTIONS = (
         bool,
     ),
     SearchOption("sample", "--sample", _SEARCH, "Sample a path, with probability proportional to exp(-cost).", bool),
-    SearchOption("seed", "--seed", _SEARCH, "Seed the random numbers of --sample.", NATURAL, "N"),
+    SearchOption("seed", "--seed", _SEARCH, "Seed all that is random, such as --sample.", NATURAL, "N"),
     SearchOption(
         "max_moves", "--max-moves", _SEARCH, "Try at most N moves, unless --moves is given.", COUNT, "N", advanced=True
     ),

@@ -128,6 +128,10 @@ def _project(file: Path | None, corpus: str, home: Path | None) -> Project:
         from motionmind.variation.variation_json import read_variation
 
         variation = read_variation(file)
+        if variation.piece.composed:
+            raise MotionMindError(
+                f"{displayed_path(file)}: the studio arranges stretches of a piece, and quadrants leave none of it"
+            )
         judge = corpus_of(variation)
         project = Project.create(place, judge if judge and _is_here(judge, home) else corpus, home)
         take_in(project, variation, _TERMINAL)

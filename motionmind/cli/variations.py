@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +25,7 @@ from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError, enumerated
 from motionmind.files import all_or_none, sha256_of
 from motionmind.render import PICTURES
+from motionmind.variation.orders import ORDERS, RANDOM, REFUSED, By
 
 if TYPE_CHECKING:
     from motionmind.corpus.corpus import Facing
@@ -78,6 +79,15 @@ if TYPE_CHECKING:
     section=Section.PART,
     type=RATE,
     help="Take N postures per second of a recording  [default: the corpus's rate, else every frame]",
+)
+@option(
+    "--by",
+    section=Section.TRAJECTORY,
+    type=click.Choice(ORDERS),
+    default="attractor",
+    help="Order the postures by the attractor or, to compare, by a control: in random order (shuffle), in random order "
+    "of the attractor's chunks (chunks), each body part in its own random order (quadrants), or along the trajectory "
+    "by Dabby's mapping (dabby). Random orders have a --seed.",
 )
 @option(
     "--attractor",
@@ -180,6 +190,7 @@ def vary(
     outputs: tuple[Path, ...],
     report: Path | None,
     as_json: bool,
+    by: By,
     attractor: str,
     parameter: tuple[str, ...],
     corpus: str | None,
@@ -191,6 +202,7 @@ def vary(
     PIECE is a file of movement, a score, a corpus of one clip, or CORPUS/CLIP. Its postures are laid out along a
     trajectory; a second trajectory, begun nearby, gives their new order: at each point, the posture that is nearest.
     Where the new order makes a transition that the corpus does not know, movement is inserted, as tween would find it.
+    With --by a control gives the order.
 
     Ctrl-C ends the smoothing: what has been found by then is written, and the exit code is 130.
     """
@@ -205,31 +217,35 @@ def vary(
     named = parse_movement(source, home)
     sources = (named.source, *via_sources(options, home))
     check_outputs(files, [path for source in sources for path in source.paths])
-    flow = flow_of(attractor, **parse_parameters(parameter))
+    refused = REFUSED[by]
+    _check_taken(context, by, refused)
     request = request_options({row.field: options.pop(row.field) for row in SEARCH_OPTIONS}, home)
-    names = ("depart", "start", "skip", "step", "transient", "length", "inserted", "stretch", "alternatives")
-    trajectory = {name: options.pop(name) for name in names}
+    names = ("depart", "start", "skip", "step", "transient", "length", "inserted", "stretch")
+    asked = {name: options.pop(name) for name in names}
     nudge = options.pop("nudge")
-    if trajectory["depart"] is not None and nudge is not None:
+    if asked["depart"] is not None and nudge is not None:
         raise click.UsageError("--depart seeks a nudge, and --nudge gives one; leave out one of them", context)
-    piece, engine = _read_piece(context, named, corpus, home, **options)
+    asked["nudge"] = nudge[0] if nudge is not None and len(nudge) == 1 else nudge
+    asked["flow"] = flow_of(attractor, **parse_parameters(parameter))
+    alternatives = options.pop("alternatives")
+    piece, engine = _read_piece(context, named, corpus, home, by, **options)
     with Interruption() as interruption:
         variation = make_variation(
             piece,
             engine,
-            flow=flow,
-            nudge=nudge[0] if nudge is not None and len(nudge) == 1 else nudge,
+            by=by,
+            alternatives=alternatives,
             on_progress=interruption.on_progress,
             watch=interruption.watch,
-            **trajectory,
+            **{name: value for name, value in asked.items() if name not in refused},
             **request,
         )
     print_variation(variation, as_json, _write(outputs, report, variation, request["fps"]), home)
     if engine and not as_json:
         print_seams_beyond(variation, engine)
-    depart = trajectory["depart"]
-    if not variation.kept:  # whose limits come first
-        depart = share_sought(nudge, depart, trajectory["start"])
+    depart = asked["depart"] if by == "attractor" else None  # a control does not depart as its trajectory does
+    if by == "attractor" and not variation.kept:  # whose limits come first
+        depart = share_sought(nudge, depart, asked["start"])
     print_advice(variation, engine, depart)
     if not as_json:
         print_written([path for path, _ in files])
@@ -255,7 +271,8 @@ def attractor(variation: Path, output: Path) -> None:
     check_outputs([(output, ATTRACTORS)], [variation])
     found = read_variation(variation)
     write_attractor(output, found)
-    click.echo(f"{displayed_path(output)}: {found.course.flow}, {len(found.piece)} sites, {len(found.order)} points")
+    flow = found.course.flow if found.course else found.by
+    click.echo(f"{displayed_path(output)}: {flow}, {len(found.piece)} sites, {len(found.order)} points")
 
 
 def load_engine(corpus: str, home: Path | None) -> Engine:
@@ -307,11 +324,21 @@ def names_in(variation: Variation, home: Path | None) -> Sequence[str]:
     return name_postures(variation.piece)
 
 
+def _check_taken(context: click.Context, by: By, refused: Mapping[str, str]) -> None:
+    """Check that no option is given that an order does not take; `refused` are arguments of `vary` with the reasons."""
+    reasons = dict(refused)
+    if "flow" in reasons:
+        reasons |= dict.fromkeys(("attractor", "parameter"), reasons["flow"])
+    if flag := given_option(context, reasons):
+        raise click.UsageError(f"{flag} is not for --by {by}, which {reasons[flag.lstrip('-')]}", context)
+
+
 def _read_piece(
     context: click.Context,
     named: PostureName,
     corpus: str | None,
     home: Path | None,
+    by: By,
     *,
     clip: str | None,
     begin: int,
@@ -327,8 +354,9 @@ def _read_piece(
     motion = read_movement(source, clip, home, **reading_options)
     own = source.place if source.kind == "corpus" else None
     judge = corpus or own
+    useful = ("fps", "seed") if by in RANDOM else ("fps",)
     unused = given_option(
-        context, ["alternatives", "inserted", *(row.field for row in SEARCH_OPTIONS if row.field != "fps")]
+        context, ["alternatives", "inserted", *(row.field for row in SEARCH_OPTIONS if row.field not in useful)]
     )
     if unused and not judge:
         raise click.UsageError(f"{unused} is for --corpus, which is not given", context)

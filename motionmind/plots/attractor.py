@@ -85,7 +85,7 @@ def _title(portrait: Portrait) -> str:
 
 def _heading(portrait: Portrait) -> Iterator[Mark]:
     """Yield the title, a summary and the legend."""
-    course, count = portrait.variation.course, len(portrait.sites)
+    course, count = portrait.course, len(portrait.sites)
     yield Words((_MARGIN, _MARGIN), _title(portrait), _TITLE, INK)
     nudge = ", ".join(f"{value:.4g}" for value in course.nudge)
     summary = f"{_count(count, 'posture')}, a site each, {portrait.every} steps of {course.step:g} apart. "
@@ -98,8 +98,11 @@ def _heading(portrait: Portrait) -> Iterator[Mark]:
             f"{_count(portrait.parting, 'posture')} of {len(portrait.points)}, "
             f"and jumps {_count(len(portrait.jumps), 'time')}."
         )
+    cells = "the map, in all coordinates"
+    if portrait.variation.control:
+        cells = f"Dabby's mapping, in {portrait.flow.dimensions[0]} alone"
     about = (
-        "The cells are those of the map, in all coordinates, where they cut the attractor; of its sheets that lie "
+        f"The cells are those of {cells}, where they cut the attractor; of its sheets that lie "
         "behind one another the one nearest to the viewer is drawn. Coordinates have no unit."
     )
     if portrait.variation.kept:

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.chaos.reorder import reorder
 from motionmind.plots.portrait import Portrait
 from motionmind.render.page import base64_of, page_beside
 from motionmind.render.palette import PIECE, VARIATION
@@ -36,7 +35,7 @@ def attractor_page(portrait: Portrait) -> str:
         "piece": encode(portrait.piece),
         "other": encode(portrait.other),
         "sheets": encode(sheets),
-        "cells": base64_of(reorder(portrait.sites, sheets).astype("<u2").tobytes()),
+        "cells": base64_of(portrait.postures_at(sheets).astype("<u2").tobytes()),
         "colours": {"piece": PIECE, "other": VARIATION},
     }
     return page_beside(arranged.motion, "attractor", data)

@@ -1,9 +1,9 @@
 """A variation on its attractor: both trajectories, the sites of postures, and their cells.
 
-A point of the flow belongs to the site that is nearest in all coordinates. The Voronoi diagram of the sites projected
-to the page is a different partition, in which a point seen in one cell may belong to another. So cells are drawn where
-the map is used: on the attractor itself. It lies in thin sheets; as with any surface, the one nearest to the viewer is
-seen.
+A point of the flow belongs to the site that is nearest in all coordinates, or that Dabby's mapping gives. The Voronoi
+diagram of the sites projected to the page is a different partition, in which a point seen in one cell may belong to
+another. So cells are drawn where the map is used: on the attractor itself. It lies in thin sheets; as with any surface,
+the one nearest to the viewer is seen.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ import numpy as np
 
 from motionmind._typing import Floats, Int16s, Ints
 from motionmind.chaos.flows import Flow, flow_of
-from motionmind.chaos.reorder import reorder
 from motionmind.chaos.trajectories import trajectory
 from motionmind.errors import MotionMindError
 from motionmind.jit import jit
 from motionmind.render.solids import EMPTY
+from motionmind.variation.controls import map_points
+from motionmind.variation.course import Course
 from motionmind.variation.review import Cut, Seam
 from motionmind.variation.variation import Variation
 
@@ -38,6 +39,7 @@ class Portrait:
 
     Attributes:
         variation: the variation, with those edits only that come before any that moved postures.
+        course: the course of its trajectories.
         flow: the flow.
         every: integration steps from one posture to the next.
         piece: the piece's trajectory, every step [(N - 1) every + 1, d], in the flow's coordinates.
@@ -45,6 +47,7 @@ class Portrait:
     """
 
     variation: Variation
+    course: Course
     flow: Flow
     every: int
     piece: Floats
@@ -62,8 +65,12 @@ class Portrait:
 
     @property
     def order(self) -> Ints:
-        """The posture of the piece at each point [L]: the nearest, or under limits one that is near."""
+        """The posture of the piece at each point [L]: that of its cell, or under limits one that is near."""
         return self.variation.first_order
+
+    def postures_at(self, points: Floats) -> Ints:
+        """Return the posture in whose cell each point [M, d] is [M]."""
+        return map_points(self.variation.control, self.sites, points)
 
     @property
     def parting(self) -> int | None:
@@ -94,9 +101,7 @@ class Portrait:
     @cached_property
     def sheets(self) -> Floats:
         """Points all over the attractor, along one trajectory [SHEETS, d]."""
-        return trajectory(
-            self.flow, self.piece[-1], count=SHEETS, every=1, step=self.variation.course.step, transient=0
-        )
+        return trajectory(self.flow, self.piece[-1], count=SHEETS, every=1, step=self.course.step, transient=0)
 
     def cells(self, corner: Floats, scale: float, width: int, height: int) -> Int16s:
         """Find the posture whose cell each pixel is in.
@@ -126,7 +131,7 @@ class Portrait:
         at[:, across], at[:, up] = (corner + (np.stack([columns, rows], axis=1) + 0.5) / [scale, -scale]).T
         at[:, left_out] = hidden[rows, columns]
         postures = np.full((height, width), EMPTY, dtype=np.int16)
-        postures[rows, columns] = reorder(self.sites, at)
+        postures[rows, columns] = self.postures_at(at)
         return postures
 
     @property
@@ -145,10 +150,14 @@ def portrait_of(variation: Variation) -> Portrait:
         variation: the variation.
 
     Raises:
-        MotionMindError: its flow is not one of `motionmind.chaos.flows`, its course is invalid, its trajectories give
-            a different order on this machine, or it has too many postures to draw.
+        MotionMindError: it follows no trajectory, its flow is not one of `motionmind.chaos.flows`, its course is
+            invalid, its trajectories give a different order on this machine, or it has too many postures to draw.
     """
     course = variation.course
+    if course is None or (variation.control is not None and variation.control.is_random):
+        raise MotionMindError(
+            f"the order of a variation by {variation.by} is random, and follows no trajectory that could be drawn"
+        )
     most = max(len(variation.piece), len(variation.order))
     if most > MOST:
         raise MotionMindError(f"a picture of an attractor shows {MOST} postures at most, not {most}")
@@ -176,8 +185,8 @@ def portrait_of(variation: Variation) -> Portrait:
     other = trajectory(
         flow, begin, count=(len(variation.order) - 1) * every + 1, every=1, step=course.step, transient=0
     )
-    portrait = Portrait(variation, flow, every, piece, other)
-    if not np.array_equal(reorder(portrait.sites, portrait.points), variation.order):
+    portrait = Portrait(variation, course, flow, every, piece, other)
+    if not np.array_equal(portrait.postures_at(portrait.points), variation.order):
         raise MotionMindError(
             f"the trajectories of {flow.label} give another order here than this variation has: it was made by another "
             "flow of that name, or where numbers round otherwise; vary the piece anew to see it"

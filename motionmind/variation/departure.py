@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from motionmind._typing import Ints
+from motionmind._typing import Bools, Ints
 from motionmind.errors import MotionMindError
 
 WITHIN = 0.05  # of the share that is sought
@@ -16,10 +16,15 @@ DEPART = 0.25  # the share that is sought unless another is given
 _NUDGES = np.geomspace(1e-12, 10.0, 131)
 
 
+def departs(order: Ints) -> Bools:
+    """Return which steps [L - 1] of an order of postures [L] neither go on in the piece nor stay."""
+    steps = np.diff(order)
+    return np.asarray((steps != 1) & (steps != 0))
+
+
 def departure(order: Ints) -> float:
     """Return the share of the steps of an order of postures [L] that neither go on in the piece nor stay."""
-    steps = np.diff(order)
-    return float(np.mean((steps != 1) & (steps != 0))) if len(steps) else 0.0
+    return float(np.mean(departs(order))) if len(order) > 1 else 0.0
 
 
 def share_sought(nudge: object | None, depart: float | None, start: object | None, stretch: int = 1) -> float | None:

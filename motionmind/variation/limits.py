@@ -22,8 +22,7 @@ from motionmind._typing import Floats, Ints, Singles
 from motionmind.chaos.reorder import Itinerary
 from motionmind.errors import MotionMindError
 from motionmind.variation.arguments import check_number, check_whole
-from motionmind.variation.departure import WITHIN
-from motionmind.variation.review import is_seam
+from motionmind.variation.departure import WITHIN, departs
 from motionmind.variation.seams import Index, Transition
 from motionmind.variation.stretches import cheapest_order
 
@@ -146,8 +145,7 @@ class _Seeker:
 
     def _inserted(self, order: Ints) -> Floats:
         """Return the seconds inserted at each step of an order [L - 1]."""
-        steps = np.diff(order)
-        return np.where((steps != 0) & (steps != 1), self.seconds[order[:-1], order[1:]], 0.0)
+        return np.where(departs(order), self.seconds[order[:-1], order[1:]], 0.0)
 
 
 def keep_within(
@@ -172,7 +170,7 @@ def keep_within(
     smoothed: dict[tuple[int, int], Transition] = {}
     order = seeker.order()
     for number in range(_ROUNDS + 1):
-        pairs = seams_of(order)
+        pairs = _seams_of(order)
         new = [pair for pair in pairs if pair not in smoothed]
         if not new or smooth is None:
             break
@@ -188,13 +186,13 @@ def keep_within(
             seeker.seconds[rest] = _NEVER
         order = seeker.order()
     kept = Kept(tuple(order.tolist()), limits)
-    return kept, tuple(smoothed[pair] for pair in seams_of(order) if pair in smoothed)
+    return kept, tuple(smoothed[pair] for pair in _seams_of(order) if pair in smoothed)
 
 
-def seams_of(order: Ints) -> list[tuple[int, int]]:
+def _seams_of(order: Ints) -> list[tuple[int, int]]:
     """Return the seams of an order of postures [L], each once: the postures that they lead from and to."""
-    pairs = zip(order[:-1].tolist(), order[1:].tolist(), strict=True)
-    return list(dict.fromkeys((i, k) for i, k in pairs if is_seam(i, k)))
+    at = np.flatnonzero(departs(order))
+    return list(dict.fromkeys(zip(order[at].tolist(), order[at + 1].tolist(), strict=True)))
 
 
 def _learn(seeker: _Seeker, estimates: Singles, smoothed: Mapping[tuple[int, int], Transition]) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 
 from motionmind._cells import html_of
 from motionmind._typing import Floats, Ints
-from motionmind.arguments import as_integers, check_text, check_type
+from motionmind.arguments import as_integers, check_flag, check_text, check_type
 from motionmind.body.motion import Insertion, Motion, Posture
 from motionmind.body.rates import FASTEST, check_size
 from motionmind.corpus.corpus import Facing
@@ -74,6 +74,7 @@ class Piece:
         frames: the frame of each posture [N], increasing from 0.
         facing: "free" if the piece may face anywhere: a chunk then continues in the heading in which the last one
             ended. "stage" if each posture keeps its own orientation.
+        composed: whether nobody ever went from one of its postures to the next: each is a chunk by itself.
 
     >>> from motionmind import Engine, Piece
     >>> engine = Engine.load("ballet")
@@ -85,10 +86,12 @@ class Piece:
     motion: Motion
     frames: Ints
     facing: Facing = "free"
+    composed: bool = False
 
     def __post_init__(self) -> None:
         check_type("motion", self.motion, Motion)
         check_text("facing", self.facing)
+        check_flag("composed", self.composed)
         frames = as_integers("frames", self.frames)
         last = len(self.motion) - 1
         if frames.ndim != 1 or len(frames) == 0 or (frames[0], frames[-1]) != (0, last) or (np.diff(frames) <= 0).any():
@@ -143,6 +146,15 @@ class Piece:
         steps = np.diff(self.motion.times[self.frames])
         return np.append(steps, steps[-1:] if len(steps) else ALONE)
 
+    def is_seam(self, i: int, k: int) -> bool:
+        """Tell whether going from posture i to posture k is neither the piece's own step nor a stay."""
+        return k != i and (self.composed or k != i + 1)
+
+    def chunks(self, order: Ints) -> tuple[Ints, Ints]:
+        """Return where the chunks of an order of postures [L] start [C], and where they stop [C]."""
+        leaps = np.flatnonzero((np.diff(order) != 1) | self.composed) + 1
+        return np.concatenate([[0], leaps]), np.concatenate([leaps, [len(order)]])
+
     def ends(self, i: int, k: int) -> tuple[Posture, Posture]:
         """Return postures i and k for a movement from one to the other: both above the origin and, if the facing is
         free, both facing +Z."""
@@ -152,8 +164,10 @@ class Piece:
         """Return how the piece moves up to posture i and from posture k on, each placed as in `ends`.
 
         Each lasts a fifth of a second, or until the next frame if that is later; None where the piece has no frame, or
-        none within half a second.
+        none within half a second, and for composed postures.
         """
+        if self.composed:
+            return None, None
         times, begin, end = self.motion.times, int(self.frames[i]), int(self.frames[k])
         first = min(int(np.searchsorted(times, times[begin] - _LEAD - _ROUNDING)), begin - 1)
         last = max(int(np.searchsorted(times, times[end] + _LEAD + _ROUNDING)), end + 2) - 1
@@ -199,8 +213,7 @@ class Piece:
             insertions: the movement from the n-th posture of the order to the next, by n, from and to `ends`. Where the
                 order leaves the piece's and there is no insertion, the next posture follows at once.
         """
-        leaps = np.flatnonzero(np.diff(order) != 1) + 1
-        starts, stops = np.concatenate([[0], leaps]), np.concatenate([leaps, [len(order)]])
+        starts, stops = self.chunks(order)
         motion, parts = self.motion, Parts()
         place, clock = Placement(0.0, np.zeros(3)), float(motion.times[0] - motion.times[self.frames[order[0]]])
         for start, stop in zip(starts, stops, strict=True):

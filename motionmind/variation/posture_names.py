@@ -17,8 +17,8 @@ _SAME = np.radians(1.0)  # in every joint, of postures that have one name
 def name_postures(piece: Piece, collection: Collection | None = None) -> tuple[str, ...]:
     """Name a piece's postures [N]: "tendu" where the collection names such a posture, else "adagio@23".
 
-    Frames count from 0 in the whole clip, also where the piece is a part of it. Which way a body faces makes no other
-    posture of it.
+    Frames count from 0 in the whole clip, also where the piece is a part of it; composed postures are in no clip, and
+    called "composed@23". Which way a body faces makes no other posture of it.
 
     Args:
         piece: the piece.
@@ -27,7 +27,7 @@ def name_postures(piece: Piece, collection: Collection | None = None) -> tuple[s
     motion = piece.motion
     named = _postures_of(motion, collection)
     where = _upright(motion.rotations[piece.frames])
-    clip, first = motion.name or "piece", _first_frame(motion, collection)
+    clip, first = ("composed", 0) if piece.composed else (motion.name or "piece", _first_frame(motion, collection))
     found = [f"{clip}@{first + frame}" for frame in piece.frames.tolist()]
     for name, posture in reversed(named):  # the first of several names of a posture stays
         off = rot.angle(where, _upright(posture.rotations)).max(axis=-1)

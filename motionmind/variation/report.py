@@ -13,6 +13,7 @@ from motionmind.credits.credit import Credit
 from motionmind.credits.ledger import Ledger, ledger_of
 from motionmind.search.solve import Status
 from motionmind.tween.certificate import Bridge, Wait
+from motionmind.variation.controls import Control
 from motionmind.variation.course import Course
 from motionmind.variation.departure import departure
 from motionmind.variation.limits import Kept, Limits, inserted_share
@@ -31,7 +32,7 @@ class PieceReport(msgspec.Struct, frozen=True):
 
 class CourseReport(msgspec.Struct, frozen=True):
     """The trajectories (see `Course`); `parting` in nats, on average, from one posture to the next; `departed` is the
-    share of steps by which their own order leaves the piece's."""
+    share of steps by which the order without limits leaves the piece's."""
 
     flow: str
     parameters: Mapping[str, float]
@@ -58,6 +59,8 @@ class CountsReport(msgspec.Struct, frozen=True):
         stays: steps that stay in their posture.
         seconds_still: the duration of these, seconds.
         departed: share of the steps that leave the piece's order.
+        mean_chunk: postures of a chunk, on average.
+        longest_chunk: postures of the longest.
         inserted_share: share of the time that insertions take.
     """
 
@@ -70,6 +73,8 @@ class CountsReport(msgspec.Struct, frozen=True):
     stays: int
     seconds_still: float
     departed: float
+    mean_chunk: float
+    longest_chunk: int
     inserted_share: float
 
 
@@ -105,26 +110,29 @@ class SeamReport(msgspec.Struct, frozen=True):
 
 
 class VariationReport(msgspec.Struct, frozen=True):
-    """The report of a variation as it stands; `order` is the piece's postures [L], `edits` the number of edits,
-    `credits` whose movement it is made of: its own stretches are the piece's, `limits` those that its first order was
-    kept within, null for none, and `motion_sha256` the hash of the file that was written with the report, null where
-    none was."""
+    """The report of a variation as it stands; `course` is null where it follows no trajectory, `order` is the piece's
+    postures [L], `edits` the number of edits, `credits` whose movement it is made of: its own stretches are the
+    piece's, `limits` those that its first order was kept within, null for none, `control` the control that gave the
+    first order, null for the attractor's own, and `motion_sha256` the hash of the file that was written with the
+    report, null where none was."""
 
     piece: PieceReport
-    course: CourseReport
+    course: CourseReport | None
     order: list[int]
     counts: CountsReport
     seams: list[SeamReport]
     edits: int
     credits: Ledger
     limits: Limits | None = None
+    control: Control | None = None
     motion_sha256: str | None = None
 
 
 def report_of(
     piece: Piece,
-    course: Course,
-    trajectory: Ints,
+    course: Course | None,
+    control: Control | None,
+    made: Ints,
     order: Ints,
     seams: Sequence[Seam],
     edits: int,
@@ -135,8 +143,9 @@ def report_of(
 
     Args:
         piece: what it is a variation of.
-        course: the trajectories by which it was made.
-        trajectory: numbers of the piece's postures as the trajectories gave them [L].
+        course: the trajectories by which it was made, if any.
+        control: the control by which it was made, if any.
+        made: numbers of the piece's postures as these gave them [L].
         order: numbers of the piece's postures as they stand now [L].
         seams: its seams.
         edits: number of its edits.
@@ -145,17 +154,18 @@ def report_of(
     """
     return VariationReport(
         PieceReport(piece.motion.name, len(piece), piece.facing),
-        _course_report(course, trajectory),
+        _course_report(course, made) if course else None,
         order.tolist(),
         _counts_report(piece, order, seams),
         list(map(_seam_report, seams)),
         edits,
         ledger_of(shares),
         kept.limits if kept else None,
+        control,
     )
 
 
-def _course_report(course: Course, trajectory: Ints) -> CourseReport:
+def _course_report(course: Course, made: Ints) -> CourseReport:
     return CourseReport(
         course.flow,
         dict(course.parameters),
@@ -166,7 +176,7 @@ def _course_report(course: Course, trajectory: Ints) -> CourseReport:
         course.transient,
         course.exponent,
         course.parting,
-        departure(trajectory),
+        departure(made),
     )
 
 
@@ -176,6 +186,8 @@ def _counts_report(piece: Piece, order: Ints, seams: Sequence[Seam]) -> CountsRe
     for seam in seams:
         if seam.insertion:
             inserted[seam.at] = seam.insertion.motion.times[-1]
+    starts, stops = piece.chunks(order)
+    lengths = stops - starts
     return CountsReport(
         postures=len(order),
         seams=len(seams),
@@ -185,7 +197,9 @@ def _counts_report(piece: Piece, order: Ints, seams: Sequence[Seam]) -> CountsRe
         unjudged=sum(seam.transition is None for seam in seams),
         stays=len(stays),
         seconds_still=float(piece.durations[order[stays]].sum()),
-        departed=departure(order),
+        departed=len(seams) / max(len(order) - 1, 1),
+        mean_chunk=float(lengths.mean()),
+        longest_chunk=int(lengths.max()),
         inserted_share=inserted_share(inserted, piece.durations[order[:-1]]),
     )
 

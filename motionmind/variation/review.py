@@ -1,7 +1,7 @@
 """The review of a variation: edits, each of which leads from one state of the review to the next.
 
 An edit loses nothing. A variation keeps the list of its edits; its state is the result of applying them one after
-another to the order that the attractor gave. To undo the last edit is to drop it from the list.
+another to the first order. To undo the last edit is to drop it from the list.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 
 from motionmind._typing import Ints
 from motionmind.errors import MotionMindError, enumerated
+from motionmind.variation.piece import Piece
 from motionmind.variation.seams import Candidate, Transition
 
 T = TypeVar("T")  # a judged transition, or its form in a file
@@ -145,12 +146,14 @@ class ReviewState:
     """A variation as it stands.
 
     Attributes:
-        order: the postures of the piece as the attractor gave them [L].
+        piece: the piece.
+        order: its postures in their first order [L].
         sequence: the entries of `order` in their present order [L].
         transitions: judged transitions, by the postures of the piece that they lead from and to.
         verdicts: decisions, by the two entries of `order` between which the seam is or was.
     """
 
+    piece: Piece
     order: Ints
     sequence: tuple[int, ...]
     transitions: Mapping[tuple[int, int], Transition]
@@ -167,7 +170,7 @@ class ReviewState:
         seams = []
         for at, (one, other) in enumerate(pairwise(self.sequence)):
             start, end = int(self.order[one]), int(self.order[other])
-            if is_seam(start, end):
+            if self.piece.is_seam(start, end):
                 verdict = self.verdicts[one, other]
                 transition = self.transitions.get((start, end))
                 seams.append(Seam(verdict.number, at, start, end, transition, verdict.decision, verdict.chosen))
@@ -190,15 +193,16 @@ class ReviewState:
         raise MotionMindError(f"no seam {number}; there are {there or 'none'}")
 
 
-def initial_state(order: Ints, transitions: tuple[Transition, ...]) -> ReviewState:
+def initial_state(piece: Piece, order: Ints, transitions: tuple[Transition, ...]) -> ReviewState:
     """Return the state before any edit.
 
     Args:
-        order: the postures of the piece as the attractor gave them [L].
+        piece: the piece.
+        order: its postures in their first order [L].
         transitions: what a corpus judged.
     """
     known = {(transition.start, transition.end): transition for transition in transitions}
-    return _number_seams(ReviewState(order, tuple(range(len(order))), known, {}))
+    return _number_seams(ReviewState(piece, order, tuple(range(len(order))), known, {}))
 
 
 def apply_edit(state: ReviewState, edit: Edit) -> ReviewState:
@@ -279,7 +283,7 @@ def _number_seams(state: ReviewState) -> ReviewState:
     """The state with a verdict on each seam: new seams are open, and get the next numbers."""
     verdicts = dict(state.verdicts)
     for pair in pairwise(state.sequence):
-        if is_seam(*state.order[list(pair)]) and pair not in verdicts:
+        if state.piece.is_seam(*state.order[list(pair)]) and pair not in verdicts:
             verdicts[pair] = Verdict(len(verdicts) + 1)
     return replace(state, verdicts=verdicts)
 
@@ -289,8 +293,3 @@ def _number_anew(state: ReviewState) -> ReviewState:
     pairs = [(state.sequence[seam.at], state.sequence[seam.at + 1]) for seam in state.seams]
     verdicts = {pair: replace(state.verdicts[pair], number=number) for number, pair in enumerate(pairs, start=1)}
     return replace(state, verdicts={**state.verdicts, **verdicts})
-
-
-def is_seam(start: int, end: int) -> bool:
-    """Tell whether going from posture `start` to posture `end` is neither the piece's own step nor a stay."""
-    return end not in (start, start + 1)

@@ -1,4 +1,5 @@
-"""A variation of a piece: its postures in the order of a chaotic trajectory, smoothed by the engine, and reviewed."""
+"""A variation of a piece: its postures in the order of a chaotic trajectory or of a control, smoothed by the engine,
+and reviewed."""
 
 from __future__ import annotations
 
@@ -23,10 +24,12 @@ from motionmind.errors import MotionMindError
 from motionmind.search.solve import Watch
 from motionmind.tween.engine import Engine
 from motionmind.variation.arguments import check_number, check_numbers, check_whole, take_renamed
+from motionmind.variation.controls import Control, control_of
 from motionmind.variation.course import Course
 from motionmind.variation.departure import find_nudge, share_sought
 from motionmind.variation.insertion_times import estimate_insertions
-from motionmind.variation.limits import Kept, Limits, Smoothing, check_departure, check_limits, keep_within, seams_of
+from motionmind.variation.limits import Kept, Limits, Smoothing, check_departure, check_limits, keep_within
+from motionmind.variation.orders import By, check_taken
 from motionmind.variation.piece import Arrangement, Piece
 from motionmind.variation.report import report_of
 from motionmind.variation.review import (
@@ -69,11 +72,12 @@ class Variation:
 
     Attributes:
         piece: the piece that it varies.
-        course: the trajectories that it was made by.
-        order: the postures of the piece as the trajectories gave them [L].
+        course: the trajectories that it was made by; None for a control that follows none.
+        order: the postures of the piece as the trajectories, or the control, gave them [L].
         transitions: the judged transitions that it began with; none if no corpus was given.
         edits: the edits since, in order.
-        kept: the order that it began with in place of the trajectories', if limits were given; else None.
+        kept: the order that it began with in place of `order`, if limits were given; else None.
+        control: the control that gave the order; None for the attractor's own.
 
     >>> from motionmind import Engine, vary
     >>> engine = Engine.load("ballet")
@@ -84,18 +88,26 @@ class Variation:
     """
 
     piece: Piece
-    course: Course
+    course: Course | None
     order: Ints
     transitions: tuple[Transition, ...] = ()
     edits: tuple[Edit, ...] = ()
     kept: Kept | None = None
+    control: Control | None = None
 
     def __post_init__(self) -> None:
         check_type("piece", self.piece, Piece)
-        check_type("course", self.course, Course)
+        check_type("course", self.course, Course, or_none=True)
         check_items("transitions", self.transitions, "transitions", JudgedTransition)
         check_items("edits", self.edits, "edits", Approve, Discard, Replace, Cut, Smooth)
         check_type("kept", self.kept, Kept, or_none=True)
+        check_type("control", self.control, Control, or_none=True)
+        if (self.course is not None) != (self.control is None or self.control.needs_trajectory):
+            raise MotionMindError(f"a variation by {self.by} has {'no' if self.course else 'a'} course")
+        if self.control and (self.control.seed is not None) != self.control.is_random:
+            raise MotionMindError(f"a control by {self.by} has {'a' if self.control.is_random else 'no'} seed")
+        if self.piece.composed != (self.by == "quadrants"):
+            raise MotionMindError("the postures of a piece are composed for quadrants, and for nothing else")
         order = as_integers("order", self.order)
         for one in (order, np.array(self.kept.order if self.kept else order)):
             if one.ndim != 1 or one.shape != order.shape or not len(one) or min(one) < 0 or max(one) >= len(self.piece):
@@ -108,17 +120,23 @@ class Variation:
     def __repr__(self) -> str:
         piece = displayed(self.piece.motion.name or "a piece without a name")
         counts = f"postures {len(self.postures)}, seams {len(self.seams)}, edits {len(self.edits)}"
-        return f"<Variation of {piece} by {displayed(self.course.flow)}: {counts}>"
+        made = ([self.by] if self.control else []) + ([displayed(self.course.flow)] if self.course else [])
+        return f"<Variation of {piece} by {' along '.join(made)}: {counts}>"
 
     def _repr_html_(self) -> str:
         return html_of(self)
 
     @cached_property
     def _state(self) -> ReviewState:
-        state = initial_state(self.first_order, self.transitions)
+        state = initial_state(self.piece, self.first_order, self.transitions)
         for edit in self.edits:
             state = apply_edit(state, edit)
         return state
+
+    @property
+    def by(self) -> By:
+        """Name of its order: "attractor", or that of its control."""
+        return self.control.by if self.control else "attractor"
 
     @property
     def first_order(self) -> Ints:
@@ -175,6 +193,7 @@ class Variation:
             report_of(
                 self.piece,
                 self.course,
+                self.control,
                 self.order,
                 self.postures,
                 self.seams,
@@ -299,11 +318,13 @@ def vary(
     piece: Motion | Piece,
     engine: Engine | None = None,
     *,
-    flow: Flow = FLOWS["lorenz"],
+    by: By = "attractor",
+    seed: int = 0,
+    flow: Flow | None = None,
     nudge: float | Sequence[float] | None = None,
     depart: float | None = None,
     start: Sequence[float] | None = None,
-    skip: int = SKIP,
+    skip: int | None = None,
     step: float | None = None,
     transient: int | None = None,
     length: int | None = None,
@@ -323,14 +344,17 @@ def vary(
     Args:
         piece: the movement; every frame of a motion is a posture, `Piece.of` takes fewer.
         engine: the corpus that judges which transitions are abrupt, and smooths those; None leaves them as they are.
-        flow: the flow whose trajectories order the postures.
+        by: what orders the postures: the attractor, or a control (see `motionmind.variation.controls`), which does not
+            take all of the other arguments.
+        seed: the seed of all random numbers: of a control, and of samples (`sample`).
+        flow: the flow whose trajectories order the postures; None for Lorenz'.
         nudge: the offset of the variation's trajectory from the piece's at its beginning: a number for the flow's first
             coordinate, or one for each [d]. None to seek it by `depart`.
         depart: the share of steps that are to leave the piece's order, in place of a nudge: the smallest nudge of the
             first coordinate is taken that comes within 0.05 of it, or else nearest to it. None for 0.25, or half of
             what the `stretch` allows if that is less; or, with a `start`, for a nudge of 0.1.
         start: the start of the piece's trajectory, before its transient [d]; None for the flow's own.
-        skip: points of the trajectories to leave out between two postures.
+        skip: points of the trajectories to leave out between two postures; None for 10.
         step: the step of the integration, in the flow's units of time; None for the flow's own.
         transient: steps to drop from the beginning; None for the flow's own.
         length: postures of the variation; None for as many as the piece has.
@@ -342,8 +366,8 @@ def vary(
         alternatives: see `Variation.smooth`, as for `posturewise`, `on_progress`, `watch` and `options`.
 
     Raises:
-        MotionMindError: an argument is out of its range, a trajectory diverges or settles, both a nudge and a share
-            are given, insertions are limited that no corpus makes, or there are no such stretches.
+        MotionMindError: an argument is out of its range or not for this order, a trajectory diverges or settles, both a
+            nudge and a share are given, insertions are limited that no corpus makes, or there are no such stretches.
         SkeletonError: the piece is on another skeleton than the corpus.
         WrongTypeError: an argument is of another type, or there is no such argument.
 
@@ -359,13 +383,22 @@ def vary(
     check_type("engine", engine, Engine, or_none=True)
     _check_watchers(posturewise, on_progress, watch)
     check_asked(alternatives, options)
+    control = control_of(by, seed)
+    trajectory: dict[str, Any] = {"flow": flow, "nudge": nudge, "depart": depart, "start": start}
+    trajectory |= {"skip": skip, "step": step, "transient": transient}
+    check_taken(by, trajectory | {"length": length, "inserted": inserted, "stretch": stretch})
     piece = piece if isinstance(piece, Piece) else Piece.of(piece)
     length = check_whole("length", len(piece) if length is None else length, 1, LONGEST)
     limits = check_limits(inserted, stretch, len(piece), length)
     if inserted is not None and engine is None:
         raise MotionMindError("inserted limits what a corpus inserts, and none is given")
-    course, found = _order_postures(len(piece), length, flow, nudge, depart, start, skip, step, transient, limits)
-    variation = Variation(piece, course, found.indices)
+    found: Itinerary | None = None
+    if control is None or control.needs_trajectory:
+        course, found = _order_postures(len(piece), length, limits, **trajectory)
+        variation = Variation(piece, course, found.indices)
+    else:
+        piece, order = control.of_piece(piece)
+        variation = Variation(piece, None, order, control=control)
     smooth: Smoothing | None = None
     if engine is not None:
         smooth = partial(
@@ -376,32 +409,49 @@ def vary(
             posturewise=posturewise,
             on_progress=on_progress,
             watch=watch,
+            seed=seed,
             **options,
         )
-    if limits is not None:
+    if found is not None and limits is not None:
         seconds = np.zeros((len(piece), len(piece)), dtype=np.float32)
         if engine is not None and limits.inserted is not None:
             seconds = estimate_insertions(piece, TransitionTest(engine, posturewise))
-        kept, transitions = keep_within(limits, found, piece.durations, seconds, smooth)
-        return replace(variation, kept=kept, transitions=transitions)
-    return replace(variation, transitions=smooth(seams_of(found.indices))) if smooth else variation
+        kept, transitions = keep_within(limits, found, piece.durations, seconds, None if control else smooth)
+        variation = replace(variation, kept=kept, transitions=transitions)
+        if control is None:
+            return variation
+    if found is not None and control is not None:
+        variation = _in_order_of(control, variation, found)
+    pairs = list(dict.fromkeys((seam.start, seam.end) for seam in variation.seams))
+    return replace(variation, transitions=smooth(pairs)) if smooth else variation
+
+
+def _in_order_of(control: Control, variation: Variation, found: Itinerary) -> Variation:
+    """Return a variation by an attractor in the order of a control that is made of the same trajectory."""
+    kept = variation.kept
+    if kept is not None:
+        order = control.of_trajectory(found, np.array(kept.order))
+        kept = Kept(tuple(order.tolist()), kept.limits)
+    return replace(variation, order=control.of_trajectory(found, variation.order), kept=kept, control=control)
 
 
 def _order_postures(
     count: int,
     length: int,
-    flow: Flow,
+    limits: Limits | None,
+    *,
+    flow: Flow | None,
     nudge: float | Sequence[float] | None,
     depart: float | None,
     start: Sequence[float] | None,
-    skip: int,
+    skip: int | None,
     step: float | None,
     transient: int | None,
-    limits: Limits | None,
 ) -> tuple[Course, Itinerary]:
     """The course that `vary` asks for, its arguments checked, and the reordering of `count` postures that it gives."""
+    flow = FLOWS["lorenz"] if flow is None else flow
     check_type("flow", flow, Flow, wanted="a Flow, such as flow_of('lorenz') gives")
-    skip = check_whole("skip", skip, 0, LONGEST)
+    skip = check_whole("skip", SKIP if skip is None else skip, 0, LONGEST)
     step = check_number("step", flow.step if step is None else step)
     transient = check_whole("transient", flow.transient if transient is None else transient, 0, MOST_STEPS)
     if nudge is not None and depart is not None:

@@ -10,12 +10,15 @@ A file is motion JSON (`motionmind.formats.motion_json`) with one more field:
       "joins": [{"start": 2, "end": 63, "corpus": "ballet", "breaks": [{"joint": "left_hip", ...}],
                  "candidates": [{"motion": {...}, "status": "optimal", "cost": 131.2, ...}], "failure": ""}, ...],
       "edits": [{"edit": "approve", "seams": [1, 3]}, {"edit": "cut", "first": 10, "last": 14, "before": 30}, ...],
-      "kept": {"order": [0, 1, 2, 3, 64, ...], "limits": {"inserted": 0.3, "stretch": 4}}
+      "kept": {"order": [0, 1, 2, 3, 64, ...], "limits": {"inserted": 0.3, "stretch": 4}},
+      "control": {"by": "chunks", "seed": 0}
     }
 
 `piece` is the original with the frame of each of its postures, `order` the postures as the trajectory gave them,
 `joins` the judged transitions from one posture to another, and `edits` the decisions, from which all else follows.
-`kept` is there only where limits were given: the order that was taken in the trajectory's place.
+`kept` is there only where limits were given: the order that was taken in the trajectory's place. `control` is there
+only where a control gave the order; `course` is null where it follows no trajectory, and the piece of quadrants is
+composed postures, `"composed": true`.
 Numbers are written in full, and are read to the last bit as they were written.
 """
 
@@ -35,10 +38,11 @@ from motionmind.files import FilePath, read_bytes
 from motionmind.formats import _json
 from motionmind.formats._json import InsertionSchema
 from motionmind.formats.motion_json import FramesSchema, MotionSchema, motion_of, write_motion_json
+from motionmind.variation.controls import Control
 from motionmind.variation.course import Course
 from motionmind.variation.limits import Kept
 from motionmind.variation.piece import Piece
-from motionmind.variation.review import Approve, Cut, Discard, Edit, Replace, Smooth, is_seam
+from motionmind.variation.review import Approve, Cut, Discard, Edit, Replace, Smooth
 from motionmind.variation.seams import Candidate, Index, InsertionCandidate, JudgedTransition, Transition
 from motionmind.variation.variation import Variation
 
@@ -51,12 +55,13 @@ FileCandidate = InsertionCandidate[FramesSchema, list[list[Index]]]
 FileTransition = JudgedTransition[FileCandidate]
 
 
-class PieceSchema(msgspec.Struct, forbid_unknown_fields=True):
-    """The original."""
+class PieceSchema(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """The original, or postures composed of parts of it."""
 
     motion: FramesSchema
     frames: list[Index]
     facing: Facing
+    composed: bool = False
 
 
 class VariationSchema(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
@@ -64,11 +69,12 @@ class VariationSchema(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=
 
     version: int
     piece: PieceSchema
-    course: Course
+    course: Course | None
     order: list[Index]
     joins: list[FileTransition]
     edits: list[Approve | Discard | Replace | Cut | Smooth[FileTransition]]
     kept: Kept | None = None
+    control: Control | None = None
 
 
 class _Version(msgspec.Struct):
@@ -95,7 +101,7 @@ def read_variation(path: FilePath) -> Variation:
     skeleton = _json.to_skeleton(file.skeleton, path)
     try:
         motion = motion_of(schema.piece.motion, skeleton, path, mend=False)
-        piece = Piece(motion, np.array(schema.piece.frames), schema.piece.facing)
+        piece = Piece(motion, np.array(schema.piece.frames), schema.piece.facing, schema.piece.composed)
         edits: list[Edit] = [
             Smooth(_read_transitions(edit.transitions, f"edits[{number}].joins", piece, path))
             if isinstance(edit, Smooth)
@@ -103,7 +109,8 @@ def read_variation(path: FilePath) -> Variation:
             for number, edit in enumerate(schema.edits)
         ]
         transitions = _read_transitions(schema.joins, "joins", piece, path)
-        return Variation(piece, schema.course, np.array(schema.order), transitions, tuple(edits), schema.kept)
+        order = np.array(schema.order)
+        return Variation(piece, schema.course, order, transitions, tuple(edits), schema.kept, schema.control)
     except FormatError:
         raise
     except MotionMindError as error:
@@ -133,7 +140,7 @@ def write_variation(path: FilePath, variation: Variation) -> None:
     piece = variation.piece
     schema = VariationSchema(
         VERSION,
-        PieceSchema(_frames(piece.motion), piece.frames.tolist(), piece.facing),
+        PieceSchema(_frames(piece.motion), piece.frames.tolist(), piece.facing, piece.composed),
         variation.course,
         variation.order.tolist(),
         [_file_transition(transition) for transition in variation.transitions],
@@ -142,6 +149,7 @@ def write_variation(path: FilePath, variation: Variation) -> None:
             for edit in variation.edits
         ],
         variation.kept,
+        variation.control,
     )
     write_motion_json(path, variation.motion(), {"variation": msgspec.json.encode(schema)})
 
@@ -195,7 +203,7 @@ def _read_transitions(
     transitions = []
     for number, one in enumerate(file):
         here = f"{where}[{number}]"
-        if max(one.start, one.end) >= len(piece) or not is_seam(one.start, one.end):
+        if max(one.start, one.end) >= len(piece) or not piece.is_seam(one.start, one.end):
             fault = f"from posture {one.start} to {one.end} there is no seam: the piece has 0 to {len(piece) - 1}"
             raise FormatError(f"variation: {here}: {fault}", path=path)
         candidates = tuple(

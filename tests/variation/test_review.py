@@ -283,7 +283,7 @@ def test_review_on_the_command_line_is_review_from_python(run: Run, file: Path, 
     listed = run("review", file, "--list")
     assert listed.code == 0
     stays = bool(variation.report()["counts"]["stays"])
-    assert len(listed.out.splitlines()) == 5 + stays + 1 + len(variation.seams)
+    assert len(listed.out.splitlines()) == 6 + stays + 1 + len(variation.seams)
     assert file.read_bytes() == original
     for arguments in (
         ("--approve", f"{first},{second}"),

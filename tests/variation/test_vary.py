@@ -715,10 +715,12 @@ def test_vary_says_what_there_is_to_know(run: Run) -> None:
 def test_what_the_documents_show_runs(run: Run) -> None:
     text = DOCUMENT.read_text()
     commands = re.findall(r"^ +motionmind (\S.*)$", text, re.M)
-    assert len(commands) == 8
-    quick = ("--alternatives", 1, "--length", 16)  # last words count: less to search
+    assert len(commands) == 12
     for command in commands:
-        done = run(*command.split(), *(quick if command.startswith("vary") and "variation.json" not in command else ()))
+        quick: tuple[object, ...] = ()  # last words count: less to search
+        if command.startswith("vary") and "variation.json" not in command:
+            quick = ("--alternatives", 1, *(("--to", 15) if "--by" in command else ("--length", 16)))
+        done = run(*command.split(), *quick)
         assert done.code == 0, f"{command}: {done.err}"
         if command.endswith("--list"):
             listed = done.out
