@@ -74,8 +74,9 @@ class Portrait:
 
     @property
     def parting(self) -> int | None:
-        """The first point at which it jumps while the piece continues; None if it follows the piece to its end."""
-        first = min(self.jumps, default=len(self.sites))
+        """The first point at which it jumps while the piece continues, 0 if it begins elsewhere; None if it follows the
+        piece to its end."""
+        first = 0 if self.order[0] else min(self.jumps, default=len(self.sites))
         return first if first < len(self.sites) else None
 
     @cached_property

@@ -361,6 +361,8 @@ def test_random_orders_have_no_portrait(by: str, kata: Piece) -> None:
 def test_cells_of_dabbys_mapping_are_strips_up_to_the_next_site(kata: Piece) -> None:
     found = portrait_of(vary(kata, by="dabby"))
     assert np.array_equal(found.postures_at(found.points), found.order)
+    assert found.order[0] != 0
+    assert found.parting == 0
     assert np.array_equal(found.postures_at(found.sites), np.arange(COUNT))
     x = np.sort(found.sites[:, 0])
     middle = np.zeros((COUNT - 1, 3))
