@@ -8,22 +8,20 @@ from __future__ import annotations
 import argparse
 import csv
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import product
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
 from motionmind import Engine, Piece, Variation, flow_of, own_skeleton, read_motion, vary
-from motionmind.chaos.baselines import chunk_shuffled
-from motionmind.chaos.reorder import runs
 from motionmind.variation.seams import judge_transitions
 
 PIECES = (("ballet", "jump"), ("macarena", "macarena"), ("karate", "heian-shodan"), ("medley", "medley"))
 FLOWS = ("lorenz", "rossler")
 NUDGES = (0.1, 0.3, 1.0)  # a variation each
 RULES = {"posturewise": {"posturewise": True}, "strict": {"strict": True}, "bridged": {}}
-SHUFFLES, SEED = 10, 0
+SHUFFLES = 10  # of each variation, by seeds from 0 on
 RATE = 5.0  # postures a second of recordings
 LEAST = 200  # postures of a variation, or as many as the piece has if it has more
 
@@ -66,12 +64,12 @@ def shuffled(variations: list[Variation], engine: Engine) -> float | None:
 
     None if the variations do not leave the piece's order within as many postures as it has.
     """
-    rng, found = np.random.default_rng(SEED), []
-    for variation in variations:
-        lengths = runs(variation.postures[: len(variation.piece)])
-        for order in (chunk_shuffled(lengths, rng) for _ in range(SHUFFLES)):
-            pairs = [(int(i), int(k)) for i, k in pairwise(order) if k != i + 1]
-            found += [one.is_abrupt for one in judge_transitions(variation.piece, pairs, engine, posturewise=False)]
+    found = []
+    for variation, seed in product(variations, range(SHUFFLES)):
+        flow, nudge = flow_of(variation.course.flow), variation.course.nudge
+        control = vary(variation.piece, by="chunks", seed=seed, flow=flow, nudge=nudge)
+        pairs = [(seam.start, seam.end) for seam in control.seams]
+        found += [one.is_abrupt for one in judge_transitions(variation.piece, pairs, engine, posturewise=False)]
     return round(float(np.mean(found)), 3) if found else None
 
 
