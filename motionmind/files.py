@@ -8,6 +8,7 @@ import mmap
 import os
 import re
 import stat
+import sys
 import time
 import tomllib
 from collections.abc import Iterator, Sequence
@@ -21,12 +22,18 @@ from motionmind.errors import FormatError, MotionMindError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
+
 FilePath = str | os.PathLike[str]
 
 _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{20}}")
 
 TEMPORARY = re.compile(r"\.motionmind-(?:(\d+)-)?[0-9a-f]{16}\.tmp")  # with the process that writes it
+_LOCKED = 2**40  # the byte that is locked where files are locked in parts; far behind the last
 _MINUTE, _DAY = 60.0, 86400.0  # seconds
 _HELD_OPEN = (0.01, 0.03, 0.1, 0.3, 0.5)  # seconds to wait for another program that holds a file open
 
@@ -267,6 +274,19 @@ def sync_folder(folder: Path) -> None:
             raise
     finally:
         os.close(descriptor)
+
+
+def lock_alone(descriptor: int) -> bool:
+    """Lock an open file for this process alone, until it is closed; False if another holds it."""
+    try:
+        if sys.platform == "win32":
+            os.lseek(descriptor, _LOCKED, os.SEEK_SET)
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        else:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
 
 
 def _move(source: Path, target: Path) -> None:

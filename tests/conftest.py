@@ -24,10 +24,10 @@ from pages import Chromium, Tabs
 
 import motionmind
 from motionmind.cli import main
-from motionmind.cli.warming import NOTICE
+from motionmind.cli.warming import FIRST
+from motionmind.codecache import is_all_compiled
 from motionmind.discretize import Codebook
 from motionmind.formats import read_motion
-from motionmind.jit import is_all_compiled
 from motionmind.retarget.retarget import own_skeleton
 from motionmind.tween.engine import Engine
 
@@ -77,7 +77,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
         return
     compileall.compile_dir(Path(motionmind.__file__).parent, quiet=1)
     if not is_all_compiled():
-        config.pluginmanager.getplugin("terminalreporter").write_line(NOTICE)
+        config.pluginmanager.getplugin("terminalreporter").write_line("compiling, which takes a minute or two")
         collect = [sys.executable, "-m", "pytest", "--collect-only", "-qq", "-o", "addopts=", str(TESTS)]
         environment = os.environ | {"PYTHONDONTWRITEBYTECODE": ""}
         with subprocess.Popen(collect, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL):
@@ -156,7 +156,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
             main([str(argument) for argument in arguments])
         captured = capsys.readouterr()
         assert isinstance(end.value.code, int)
-        return Ran(end.value.code, captured.out, captured.err.replace(f"{NOTICE}\n", ""))
+        return Ran(end.value.code, captured.out, captured.err.replace(f"{FIRST}\n", ""))
 
     return call
 

@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 
-from motionmind import jit as door
+from motionmind import codecache as door
+from motionmind.jit import either, jit, pointer
 
 DAY = 86400.0  # seconds
 
@@ -138,14 +139,14 @@ def test_what_was_kept_is_called_from_what_is_compiled_later() -> None:
     def doubled(x: float) -> float:
         return 2.0 * x
 
-    assert door.jit(doubled)(4.0) == 8.0
-    kept: Any = door.jit(doubled)
+    assert jit(doubled)(4.0) == 8.0
+    kept: Any = jit(doubled)
     assert kept(4.0) == 8.0
     assert sum(kept.stats.cache_hits.values()) == 1
-    assert door.jit(lambda x: kept(x) + 1.0)(4.0) == 9.0
+    assert jit(lambda x: kept(x) + 1.0)(4.0) == 9.0
 
 
-@door.jit
+@jit
 def applied(function: object, times: int) -> float:
     value = 1.0
     for _ in range(times):
@@ -153,7 +154,7 @@ def applied(function: object, times: int) -> float:
     return value
 
 
-@door.either
+@either
 def halved(x: float) -> float:
     return 0.5 * x
 
@@ -167,7 +168,7 @@ def test_one_loop_serves_all_pointers_of_a_signature() -> None:
         expected = 1.0
         for _ in range(5):
             expected = function(expected)
-        assert applied(door.pointer(function, number(number), keep=False), 5) == expected
+        assert applied(pointer(function, number(number), keep=False), 5) == expected
     assert len(applied.signatures) == 1  # type: ignore[attr-defined]
 
 
@@ -176,4 +177,4 @@ def test_what_cannot_be_compiled_is_no_pointer() -> None:
     from numba.core.errors import NumbaError
 
     with pytest.raises(NumbaError):
-        door.pointer(lambda x: {"x": x}, types.float64(types.float64), keep=False)
+        pointer(lambda x: {"x": x}, types.float64(types.float64), keep=False)

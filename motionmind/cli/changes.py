@@ -14,7 +14,7 @@ from motionmind.cli.files import clip_names, read_mapping
 from motionmind.cli.options import HOME, Section, command, option, reading
 from motionmind.cli.printing import count, note, print_check, progress
 from motionmind.cli.types import FILE
-from motionmind.cli.warming import warm_once
+from motionmind.cli.warming import prepare
 from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError
 
@@ -158,7 +158,7 @@ def take_files(
         note(f"{fault}; left out")
     if faults:
         note(f"nothing is learned from {count(len(faults), 'file')} of {len(names)}")
-    warm_once()
+    prepare()
     progress("learning")
 
 

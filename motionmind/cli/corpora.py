@@ -24,7 +24,7 @@ from motionmind.cli.options import (
 from motionmind.cli.printing import count, format_repairs, note, print_check, print_origins
 from motionmind.cli.registry import INDEX, fetch, print_index, publish
 from motionmind.cli.types import COUNT, FILE, NATURAL, RATE, Number
-from motionmind.cli.warming import warm_once
+from motionmind.cli.warming import prepare
 from motionmind.cli.words import parse_mixture, parse_tolerances
 from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
@@ -175,7 +175,7 @@ def build(
     if others:  # a bundled one is learned as it is loaded
         for other in others:
             locate(other, home)
-        warm_once()
+        prepare()
     with open_team(workers, scheduler) as team, shards_of(name, home) as folder:
         engine = Engine.fit(
             take_files(clip_names(files), reading, folder, team, strict=strict_files),

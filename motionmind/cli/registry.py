@@ -14,7 +14,7 @@ from motionmind.cli import completion
 from motionmind.cli.options import HOME, Section, command, option, output
 from motionmind.cli.printing import count, progress
 from motionmind.cli.types import EXISTING_FILE, FOLDER
-from motionmind.cli.warming import warm_once
+from motionmind.cli.warming import prepare
 from motionmind.display import displayed, displayed_path, printable
 from motionmind.errors import CorpusError
 from motionmind.files import read_bytes
@@ -57,7 +57,7 @@ def fetch(name: str, new_name: str | None, index: str | None, home: Path | None)
         _print_recipe(found)
         raise CorpusError(f"{found.name} is not passed on; the steps above lead to it")
     _print_terms(found)
-    warm_once()
+    prepare()
     with click.progressbar(
         length=found.archive.size, label="fetching", file=sys.stderr, hidden=not sys.stderr.isatty()
     ) as bar:

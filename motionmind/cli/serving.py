@@ -10,7 +10,7 @@ from motionmind.cli.listening import address_of, listen
 from motionmind.cli.options import CORPUS, HOME, Section, command, option
 from motionmind.cli.printing import note
 from motionmind.cli.types import PORT
-from motionmind.cli.warming import warm_once
+from motionmind.cli.warming import prepare
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 
@@ -54,7 +54,7 @@ def serve(mmcp: bool, corpus: str, host: str, port: int, home: Path | None) -> N
     from motionmind.tween.engine import Engine
 
     engine = Engine.load(corpus, home)
-    warm_once()
+    prepare()
     with listen(host, port) as listening:
         url, is_open = address_of(listening)
         if is_open:

@@ -13,7 +13,7 @@ from motionmind.cli.listening import address_of, listen
 from motionmind.cli.options import HOME, Section, command, given_option, option
 from motionmind.cli.printing import note
 from motionmind.cli.types import FILE, PORT
-from motionmind.cli.warming import compile_in_steps, is_cold
+from motionmind.cli.warming import prepare_in_steps
 from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _LISTED = 5  # projects that are named at the start
 _TERMINAL = "terminal"  # the window of edits that the command makes
-_COLD = "the page opens in some seconds; inner loops are compiled for its first search, once, in a minute or more"
+_COLD = "first run: preparing in the background; searches are slower for a minute or two (`motionmind warm --stop`)"
 
 
 @command("motionmind studio dance.motionmind --corpus ballet")
@@ -67,6 +67,7 @@ def studio(
     import webbrowser  # here, for other commands open none
 
     try:
+        from motionmind.codecache import is_all_compiled
         from motionmind.studio.serving import Server
         from motionmind.studio.studio import Studio
         from motionmind.studio.token import Keys
@@ -89,9 +90,9 @@ def studio(
                     f"whoever has the URL below and reaches {url.removeprefix('http://')} can work on this project, "
                     "and whoever is on the way can read along: nothing is encrypted"
                 )
-            if cold := is_cold():
+            if is_cold := not is_all_compiled():
                 note(_COLD)
-            work, keys = Studio(project, home, first=compile_in_steps() if cold else None), Keys()
+            work, keys = Studio(project, home, first=prepare_in_steps() if is_cold else None), Keys()
             with suppress(MotionMindError):  # which is missing, and said to be
                 work.engine(project.state.corpus)
             entry = f"{url}/#token={keys.token}"

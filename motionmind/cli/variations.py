@@ -19,7 +19,7 @@ from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searc
 from motionmind.cli.sources import parse_movement, read_movement, select_part
 from motionmind.cli.tweens import INTERRUPTED
 from motionmind.cli.types import COUNT, FILE, FRAME, NATURAL, POSITIVE, RATE, Number, Point
-from motionmind.cli.warming import announce_first_search, help_first_search
+from motionmind.cli.warming import prepare
 from motionmind.cli.words import parse_parameters
 from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError, enumerated
@@ -276,13 +276,11 @@ def attractor(variation: Path, output: Path) -> None:
 
 
 def load_engine(corpus: str, home: Path | None) -> Engine:
-    """Load what was learned from a corpus; the first search of all waits for its compilation."""
+    """Load what was learned from a corpus, once all that a search calls is compiled or about to be."""
     from motionmind.tween.engine import Engine
 
-    announce_first_search()  # before a bundled corpus is learned
-    engine = Engine.load(corpus, home)
-    help_first_search()
-    return engine
+    prepare()  # before a bundled corpus is learned
+    return Engine.load(corpus, home)
 
 
 def print_variation(variation: Variation, as_json: bool, motion_sha256: str | None, home: Path | None) -> None:

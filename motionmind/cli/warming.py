@@ -1,18 +1,20 @@
-"""The command that compiles the inner loops ahead of time, and what a first search says and does about it.
+"""Compiling the inner loops: ahead of time by a command, or in the background of the first run.
 
-Compiling all in one process takes a minute and a half. Separate processes begin with different parts of the program, on
-real work, so that every loop is compiled for the arguments that it gets; each finds on disk what another has compiled
-by the time it comes there.
+Separate processes begin with different parts of the program, on real work, so that every loop is compiled for the
+arguments that it gets; each finds on disk what another has compiled by the time it comes there. One process at a time,
+which holds a lock, starts and ends them: the command, or a process that goes on when the first run has ended.
 """
 
 from __future__ import annotations
 
 import os
+import shutil
+import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Generator, Sequence
-from contextlib import suppress
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic, sleep
@@ -20,8 +22,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from motionmind.cli.options import command
+from motionmind.cli.options import Section, command, option
 from motionmind.errors import MotionMindError
+from motionmind.files import lock_alone
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
@@ -29,117 +32,111 @@ if TYPE_CHECKING:
     from motionmind.search.problem import Problem
     from motionmind.tween.engine import Engine
 
-NOTICE = "compiling inner loops, once, which takes a minute or more (`motionmind warm` does it)"
-_LAST = "search/astar.search"  # calls most of what is compiled for a search, and is there only once all of that is
-_SEARCHES = ("body/", "footing/", "geometry/", "realise/", "search/", "walks/")  # what a search needs, by folder
-_LATER = (  # of which it needs little, or nothing
-    "body/support._overhang",
-    *("walks/sparse", "walks/steps", "search/pair_chain", "search/sample"),
-)
+FIRST = "first run: preparing in the background, this one may take a minute (`motionmind warm --stop` ends it)"
+STILL = "still preparing in the background ({done} of {total} functions are compiled): this run is slower"
 _LOOK = 0.2  # seconds between two looks at what is compiled
+_STARTS = 5.0  # seconds that the background process may take to begin
 _AT_ONCE = 3  # processes at most that share the work
-_BACK = 10  # by which processes that stand back are nicer than others
+_NICER = 10  # by which processes in the background are nicer than others
+_ROOM = 200e6  # bytes free on the disk, below which nothing is compiled in the background; all code takes 15 MB
 
 
 @command("motionmind warm")
-def warm() -> None:
+@option(
+    "--stop",
+    "is_stopping",
+    section=Section.OUTPUT,
+    is_flag=True,
+    help="End the process that the first run has started in the background.",
+)
+def warm(is_stopping: bool) -> None:
     """Compile the inner loops, so that no search or film has to wait for it.
 
-    The first search does what it needs of this on its own. It takes one or two minutes, once for each version of
-    MotionMind and Python. What is compiled is kept in the user's cache directory, or in NUMBA_CACHE_DIR.
+    The first run starts this in the background. It takes one or two minutes, once for each version of MotionMind and
+    Python. What is compiled is kept in the user's cache directory, or in NUMBA_CACHE_DIR.
     """
-    from motionmind.jit import compiled_names, is_all_compiled, place_of_code
+    from motionmind.codecache import compiled_names, is_all_compiled, place_of_code
 
-    if place_of_code() is None:
+    if (place := place_of_code()) is None:
         raise MotionMindError("compiled code can be kept neither in the user's cache directory nor in NUMBA_CACHE_DIR")
+    if is_stopping:
+        click.echo("stopped preparing" if _stop(place) else "nothing is preparing in the background")
+        return
     if is_all_compiled():
         click.echo(f"nothing to do: all {len(compiled_names())} functions are compiled")
         return
     began = monotonic()
-    _compile()
+    _wait_or_compile(place)
     click.echo(f"compiled {len(compiled_names())} functions in {monotonic() - began:.0f} s; the next search needs none")
 
 
-def warm_once() -> None:
-    """Compile all, unless a search is compiled; say so, with a bar on a terminal, else in a line.
+def prepare() -> None:
+    """Have the inner loops compiled in the background, unless they are, and say so.
 
-    Nothing is done where compiled code cannot be kept: whatever needs it then compiles it.
+    Nothing is started where compiled code cannot be kept: each run then interprets or compiles what it calls.
     """
-    if is_cold():
-        _say()
-        _compile()
+    from motionmind.codecache import compiled_names, decorated_names, is_all_compiled, place_of_code
+
+    if is_all_compiled() or (place := place_of_code()) is None:
+        return
+    if _is_running(place):
+        click.echo(STILL.format(done=len(compiled_names()), total=len(decorated_names())), err=True)
+    elif shutil.disk_usage(place).free > _ROOM:
+        click.echo(FIRST, err=True)
+        _start(["compile_in_background()"], in_background=True)
 
 
-def is_cold() -> bool:
-    """Return whether a search is yet to be compiled, if only its rest, and compiled code can be kept."""
-    from motionmind.jit import compiled_names, place_of_code
+def prepare_in_steps() -> Generator[tuple[int, int, bool]]:
+    """Have the inner loops compiled in the background, as `prepare` does without a word, and yield how far that is.
 
-    return _LAST not in compiled_names() and place_of_code() is not None
-
-
-def compile_in_steps() -> Generator[tuple[int, int, bool]]:
-    """Compile all beside other work, what a search needs first; to close the iterator ends it.
-
-    Yields the number of functions that are compiled, that of all, and whether those of a search are among them; until
-    they are, functions that no search calls are not counted.
+    Yields the number of functions that are compiled, that of all, and that searches may begin. To close the iterator
+    ends nothing: the next run finds what has been compiled by then.
     """
-    from motionmind.jit import compiled_names, decorated_names, note_all_compiled
+    from motionmind.codecache import compiled_names, decorated_names, place_of_code
 
-    failed = 0
-    for is_ready, programs in ((False, [[search], [realise, seek]]), (True, [[draw, learn]])):
-        counted = decorated_names() if is_ready else _first_names()
-        workers = _start(programs, stands_back=True)
-        try:
-            while any(worker.poll() is None for worker in workers):
-                yield len(compiled_names() & counted), len(counted), is_ready
-        finally:
-            _end(workers)
-        failed += sum(worker.returncode != 0 for worker in workers)
-    if not failed:
-        note_all_compiled()
+    if (place := place_of_code()) is None or shutil.disk_usage(place).free < _ROOM:
+        return
+    if not _is_running(place):
+        _start(["compile_in_background()"], in_background=True)
+    began = monotonic()
+    while _is_running(place) or monotonic() < began + _STARTS:
+        yield len(compiled_names()), len(decorated_names()), True
 
 
-def _first_names() -> frozenset[str]:
-    """Return the functions that a search needs, but for a few."""
-    from motionmind.jit import decorated_names
+def compile_in_background() -> None:
+    """Compile all, unless another process does: the whole of a process that `prepare` has started."""
+    from motionmind.codecache import place_of_code
 
-    return frozenset(name for name in decorated_names() if name.startswith(_SEARCHES) and not name.startswith(_LATER))
-
-
-def announce_first_search() -> None:
-    """Say that the first search takes longer, if it is yet to come."""
-    from motionmind.jit import compiled_names
-
-    if _LAST not in compiled_names():
-        _say()
+    place = place_of_code()
+    assert place is not None
+    with suppress(OSError), _alone(place) as is_alone:
+        if is_alone:
+            signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # workers are ended on the way out
+            _compile(max(_processors() - 1, 1), hidden=True)
 
 
-def help_first_search() -> None:
-    """Compile, beside a search that is the first, what it comes to last; the corpus is learned, for all to load.
-
-    What is still running when the command ends is ended with it.
-    """
-    if is_cold() and _processors() > 1:
-        helpers = _start([[realise, seek], [draw]])
-        click.get_current_context().call_on_close(lambda: _end(helpers))
-
-
-def _say() -> None:
-    click.echo(NOTICE, err=True)
+def _wait_or_compile(place: Path) -> None:
+    """Compile all with a bar on a terminal, or wait for the process in the background that does."""
+    while True:
+        with _alone(place) as is_alone:
+            if is_alone:
+                _compile(_processors(), hidden=not sys.stderr.isatty())
+                return
+        sleep(_LOOK)
 
 
-def _compile() -> None:
-    """Compile all that the workers come by, with a bar on a terminal; side by side, where there are processors.
+def _compile(processes: int, *, hidden: bool) -> None:
+    """Compile all that the workers come by, side by side, with or without a bar.
 
     A worker that fails leaves its part to whoever needs it: its errors are not of interest here.
     """
-    from motionmind.jit import compiled_names, decorated_names, note_all_compiled
+    from motionmind.codecache import compiled_names, decorated_names, note_all_compiled
 
     total, known = len(decorated_names()), 0
-    works = [search, realise, draw, learn, seek]
-    side_by_side = min(_processors(), _AT_ONCE)
-    programs = [works[first::side_by_side] for first in range(side_by_side)]
-    with click.progressbar(length=total, label="compiling", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
+    works = [realise, draw, seek, learn, search]  # a first run beside it comes to these last, and begins with a search
+    side_by_side = min(processes, _AT_ONCE)
+    programs = ["; ".join(f"{work.__name__}()" for work in works[first::side_by_side]) for first in range(side_by_side)]
+    with click.progressbar(length=total, label="compiling", file=sys.stderr, hidden=hidden, show_pos=True) as bar:
         workers = _start(programs)
         try:
             while any(worker.poll() is None for worker in workers):
@@ -148,43 +145,77 @@ def _compile() -> None:
                 known = now
                 sleep(_LOOK)
         finally:
-            _end(workers)
-    if all(worker.returncode == 0 for worker in workers):
-        note_all_compiled()
+            for worker in workers:
+                with suppress(OSError):
+                    worker.kill()
+                worker.wait()
+    note_all_compiled()
 
 
-def _start(
-    programs: Sequence[Sequence[Callable[[], None]]], *, stands_back: bool = False
-) -> list[subprocess.Popen[bytes]]:
+def _start(programs: Sequence[str], *, in_background: bool = False) -> list[subprocess.Popen[bytes]]:
     """Start a process for each program, with this package on its path, and without the working directory.
 
     Args:
-        programs: functions of this module to call in turn, for each process.
-        stands_back: whether other processes go first where there are too few processors.
+        programs: calls of functions of this module, for each process.
+        in_background: whether they go on without this process, and let others go first.
     """
     root = str(Path(__file__).parents[2])
     # Compiling makes many objects that stay: with rarer collections it takes a tenth less time and a sixth more memory.
-    begin = f"import gc, sys; gc.set_threshold(100_000); sys.path.insert(0, {root!r})"
-    begin += "; from motionmind.cli import warming"
-    begin += f"; import os; os.nice({_BACK})" * (stands_back and hasattr(os, "nice"))
-    calls = ["; ".join(f"warming.{work.__name__}()" for work in works) for works in programs]
-    return [
+    begin = f"import gc, sys; gc.set_threshold(100_000); sys.path.insert(0, {root!r}); import os"
+    begin += f"; os.nice({_NICER})" * (in_background and hasattr(os, "nice"))
+    begin += "; from motionmind.cli.warming import *"
+    workers = [
         subprocess.Popen(
-            [sys.executable, "-P", "-c", f"{begin}; {call}"],
+            [sys.executable, "-P", "-c", f"{begin}; {program}"],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
+            start_new_session=in_background,
         )
-        for call in calls
+        for program in programs
     ]
+    if in_background:
+        _started.extend(workers)
+    return workers
 
 
-def _end(workers: Sequence[subprocess.Popen[bytes]]) -> None:
-    """End processes that still run."""
-    for worker in workers:
-        with suppress(OSError):
-            worker.kill()
-        worker.wait()
+_started = list[subprocess.Popen[bytes]]()  # processes in the background, which Python would else warn of as they go on
+
+
+@contextmanager
+def _alone(place: Path) -> Iterator[bool]:
+    """Hold the lock of the one process that compiles, and note its number; yields False where another has it."""
+    descriptor = os.open(place / "preparing", os.O_RDWR | os.O_CREAT, 0o600)
+    try:
+        if is_alone := lock_alone(descriptor):
+            os.ftruncate(descriptor, 0)
+            os.write(descriptor, str(os.getpid()).encode())
+        yield is_alone
+    finally:
+        os.close(descriptor)
+
+
+def _is_running(place: Path) -> bool:
+    """Return whether a process compiles."""
+    try:
+        descriptor = os.open(place / "preparing", os.O_RDWR)
+    except OSError:
+        return False
+    try:
+        return not lock_alone(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _stop(place: Path) -> bool:
+    """End the process that compiles, if one does, and its workers with it; return whether one did."""
+    if not _is_running(place):
+        return False
+    try:
+        os.kill(int((place / "preparing").read_bytes()), signal.SIGTERM)
+    except (OSError, ValueError):  # it has just ended
+        return False
+    return True
 
 
 def _processors() -> int:

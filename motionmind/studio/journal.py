@@ -13,7 +13,6 @@ process at a time holds a project, by a lock that ends with it.
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -22,16 +21,10 @@ from typing import Any, NamedTuple, Self
 import msgspec
 
 from motionmind.errors import FormatError, MotionMindError
-from motionmind.files import read_bytes, replace_file, sync_folder
-
-if sys.platform == "win32":
-    import msvcrt
-else:
-    import fcntl
+from motionmind.files import lock_alone, read_bytes, replace_file, sync_folder
 
 FORMAT, VERSION = "motionmind studio", 1
 SUFFIX = ".motionmind"
-_LOCKED = 2**40  # the byte that is locked where files are locked in parts; far behind the last
 
 
 class Line(NamedTuple):
@@ -98,7 +91,7 @@ class Journal:
         except OSError as error:
             raise MotionMindError(f"{path}: cannot be opened: {error.strerror or error}") from error
         try:
-            if not _lock(descriptor):
+            if not lock_alone(descriptor):
                 raise MotionMindError(f"{path}: is open{_elsewhere(path)}; end that studio, or work there")
             data = read_bytes(path)
             end, dropped = _whole(data), False
@@ -198,19 +191,6 @@ def _check_head(path: Path) -> None:
         raise FormatError(f"is no project of the studio: its first line does not say {FORMAT!r}", path=path)
     if head.get("version") != VERSION:
         raise FormatError(f"is version {head.get('version')!r} of a project; version {VERSION} can be read", path=path)
-
-
-def _lock(descriptor: int) -> bool:
-    """Lock a file for this process alone; False if another holds it."""
-    try:
-        if sys.platform == "win32":
-            os.lseek(descriptor, _LOCKED, os.SEEK_SET)
-            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
-        else:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
 
 
 def _note(path: Path) -> Path:

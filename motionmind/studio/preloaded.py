@@ -7,8 +7,8 @@ cancelled one would spend again.
 from contextlib import suppress
 from importlib import import_module
 
+from motionmind.codecache import is_all_compiled
 from motionmind.errors import MotionMindError
-from motionmind.jit import is_all_compiled
 from motionmind.tween.engine import Engine
 
 for name in ("alternatives", "seams", "varied", "worker_loop"):  # where jobs are

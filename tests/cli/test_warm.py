@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from time import sleep
 from types import FunctionType, ModuleType
 from typing import Any
 
@@ -15,7 +16,7 @@ from bundled_clips import ballet_clip
 from command_line import Run
 from numba.core.registry import CPUDispatcher
 
-from motionmind import jit
+from motionmind import codecache
 from motionmind.cli import changes, corpora, warming
 from motionmind.errors import MotionMindError
 from motionmind.formats import write_motion
@@ -56,16 +57,10 @@ def names_called(function: FunctionType) -> set[str]:
 
 def reach_everything() -> None:
     """Check that what is compiled ahead is all that there is to compile, in a process that has compiled nothing."""
-
-    def reached(*works: Callable[[], None]) -> set[str]:
-        for work in works:
-            work()
-        return {name for one in dispatchers().values() if one.overloads for name in names_called(one.py_func)}
-
-    # What is counted until searches may begin is what they need, give or take a few.
-    first = warming._first_names()
-    assert len(first - reached(warming.search, warming.realise, warming.seek)) <= len(first) // 20
-    assert jit.decorated_names() - reached(warming.draw, warming.learn) == set()
+    for work in (warming.search, warming.realise, warming.seek, warming.draw, warming.learn):
+        work()
+    reached = {name for one in dispatchers().values() if one.overloads for name in names_called(one.py_func)}
+    assert codecache.decorated_names() - reached == set()
 
 
 def test_the_workers_reach_every_function_that_is_to_be_compiled() -> None:
@@ -74,94 +69,112 @@ def test_the_workers_reach_every_function_that_is_to_be_compiled() -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_compiling_beside_other_work_tells_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Process:
-        returncode = 0
-
-        def __init__(self, looks: int) -> None:
-            self.looks = looks
-
-        def poll(self) -> int | None:
-            self.looks -= 1
-            return None if self.looks >= 0 else 0
-
-        def kill(self) -> None:
-            pass
-
-        def wait(self) -> int:
-            return 0
-
-    names, first, noted = jit.decorated_names(), warming._first_names(), list[bool]()
-    others = sorted(names - first)
-    found = [set(others[:3]), first | set(others[:3]), first | set(others[:3]), first | set(others[:4])]
-    there = iter(found)
-    monkeypatch.setattr(warming, "_start", lambda programs, **_: [Process(3 - len(programs)) for _ in programs])
-    monkeypatch.setattr(jit, "compiled_names", lambda: frozenset(next(there)))
-    monkeypatch.setattr(jit, "note_all_compiled", lambda: noted.append(True))
-    steps = list(warming.compile_in_steps())
-    assert steps[:2] == [(0, len(first), False), (len(first), len(first), False)]
-    assert steps[2:] == [(len(first) + 3, len(names), True), (len(first) + 4, len(names), True)]
-    assert noted == [True]
-
-
 @pytest.fixture
 def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder with a copy of what is compiled, of which a test may take away what others would compile again."""
-    place = jit.place_of_code()
+    place = codecache.place_of_code()
     assert place is not None
     folder = tmp_path / "cache"
     (folder / place.name).mkdir(0o700, parents=True)
-    for one in [*jit._folders(), *place.glob("all-*")]:  # not what earlier states of the sources have left
+    for one in [*codecache._folders(), *place.glob("all-*")]:  # not what earlier states of the sources have left
         copy = shutil.copytree if one.is_dir() else shutil.copy
         copy(one, folder / place.name / one.name)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
-    jit._folder.cache_clear()
+    codecache._folder.cache_clear()
     yield folder / place.name
-    jit._folder.cache_clear()
+    codecache._folder.cache_clear()
 
 
 @pytest.mark.usefixtures("own_cache")
 def test_warm_says_what_it_did_and_does_nothing_a_second_time(run: Run) -> None:
-    note = jit._note()
+    note = codecache._note()
     assert note is not None
     note.unlink(missing_ok=True)
     done = run("warm")
     assert done.code == 0
-    assert done.out.startswith(f"compiled {len(jit.decorated_names())} functions in ")
-    assert jit.decorated_names() == jit.compiled_names()
+    assert done.out.startswith(f"compiled {len(codecache.decorated_names())} functions in ")
+    assert codecache.decorated_names() == codecache.compiled_names()
     done = run("warm")
-    assert (done.code, done.out) == (0, f"nothing to do: all {len(jit.decorated_names())} functions are compiled\n")
+    assert (done.code, done.out) == (
+        0,
+        f"nothing to do: all {len(codecache.decorated_names())} functions are compiled\n",
+    )
 
 
-@pytest.mark.parametrize("is_first", [True, False])
-def test_the_first_search_alone_says_what_it_waits_for(is_first: bool, tmp_path: Path, own_cache: Path) -> None:
-    # From a posture to itself there is no move to search for, and so nothing is compiled while the test waits.
-    command = [sys.executable, "-m", "motionmind", "tween", "ballet/fifth", "ballet/fifth", "-o", "still.json"]
-    warming.search()
-    if is_first:  # all is there but what is compiled last, and so compiling takes the test no time
-        module, _, name = warming._LAST.replace("/", ".").rpartition(".")
-        for file in [*own_cache.glob("all-*"), *own_cache.glob(f"{module}-*/{name}-*.nbc")]:
-            file.unlink()
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert ("compiling" in done.stderr) == is_first
-    assert done.stderr.count("\n") <= 1
+# From a posture to itself there is no move to search for, and so nothing is compiled while a test waits.
+STILL = ["tween", "ballet/fifth", "ballet/fifth", "-o", "still.json"]
 
 
-def test_what_an_interruption_left_uncompiled_is_said_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    names = jit.decorated_names()
-    assert warming._LAST in names
-    monkeypatch.setattr(jit, "compiled_names", lambda: names - {warming._LAST})
-    assert warming.is_cold()
-    monkeypatch.setattr(jit, "compiled_names", lambda: names)
-    assert not warming.is_cold()
+def command(*words: str) -> list[str]:
+    return [sys.executable, "-m", "motionmind", *words]
+
+
+def wait_until(is_so: Callable[[], bool]) -> None:
+    """Wait for another process, a minute at most."""
+    for _ in range(600):
+        if is_so():
+            return
+        sleep(0.1)
+    raise AssertionError("it never was")
+
+
+def test_the_first_run_prepares_in_the_background_and_says_so_until_all_is_compiled(
+    tmp_path: Path, own_cache: Path
+) -> None:
+    def tell() -> str:
+        return subprocess.run(command(*STILL), cwd=tmp_path, capture_output=True, text=True, check=True).stderr
+
+    codecache.note_all_compiled()
+    assert "preparing" not in tell()
+    for file in [*own_cache.glob("all-*"), *own_cache.glob("search.astar-*/search-*.nbc")]:
+        file.unlink()
+    try:
+        first = tell()
+        assert first.startswith("first run: preparing in the background")
+        wait_until(lambda: warming._is_running(own_cache))
+        again = tell()
+        assert again.startswith("still preparing in the background (")
+        assert (first + again).count("\n") == 2
+    finally:
+        stopped = subprocess.run(command("warm", "--stop"), capture_output=True, text=True, check=True).stdout
+    assert stopped == "stopped preparing\n"
+    wait_until(lambda: not warming._is_running(own_cache))
+    assert not list(own_cache.glob("all-*"))
+    stopped = subprocess.run(command("warm", "--stop"), capture_output=True, text=True, check=True).stdout
+    assert stopped == "nothing is preparing in the background\n"
+
+
+def test_of_several_processes_one_compiles(own_cache: Path) -> None:
+    with warming._alone(own_cache) as is_first:
+        assert is_first
+        assert warming._is_running(own_cache)
+        with warming._alone(own_cache) as is_second:
+            assert not is_second
+        warming.compile_in_background()  # returns at once
+    assert not warming._is_running(own_cache)
+
+
+def test_nothing_is_started_where_code_cannot_be_kept(
+    own_cache: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(codecache, "is_all_compiled", lambda: False)
+    monkeypatch.setattr(warming, "_start", lambda *_, **__: pytest.fail("started"))
+    monkeypatch.setattr(warming, "_ROOM", float("inf"))  # as on a full disk
+    warming.prepare()
+    assert list(warming.prepare_in_steps()) == []
+    monkeypatch.setattr(warming, "_ROOM", 0.0)
+    monkeypatch.setattr(codecache, "place_of_code", lambda: None)
+    warming.prepare()
+    assert capsys.readouterr().err == ""
+    assert own_cache.is_dir()
 
 
 def test_a_build_compiles_once_its_files_are_read(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupt() -> None:
         raise MotionMindError("compiling")
 
-    monkeypatch.setattr(changes, "warm_once", interrupt)
-    monkeypatch.setattr(corpora, "warm_once", interrupt)
+    monkeypatch.setattr(changes, "prepare", interrupt)
+    monkeypatch.setattr(corpora, "prepare", interrupt)
     write_motion("clip.bvh", ballet_clip("jump").resample(30.0))
     for words, message in [
         (["nothing.bvh"], "nothing.bvh: cannot be read: there is no such file"),
@@ -181,8 +194,10 @@ def test_the_first_search_says_what_it_waits_for_before_it_learns_a_corpus(
         raise MotionMindError("learning")
 
     monkeypatch.setattr(Engine, "load", interrupt)
-    monkeypatch.setattr(jit, "compiled_names", frozenset[str])
-    monkeypatch.setattr(warming, "NOTICE", "compiling")
+    monkeypatch.setattr(codecache, "is_all_compiled", lambda: False)
+    monkeypatch.setattr(warming, "_is_running", lambda place: False)
+    monkeypatch.setattr(warming, "_start", lambda *_, **__: [])
+    monkeypatch.setattr(warming, "FIRST", "compiling")
     for words, said in [
         (("ballet/arabesque", "ballet/fifth"), "compiling\nerror: learning\n"),
         (("ballet/arabesk", "ballet/fifth"), "error: ballet: no posture or clip 'arabesk'"),
@@ -196,7 +211,7 @@ def test_the_first_search_says_what_it_waits_for_before_it_learns_a_corpus(
 
 
 def test_a_place_that_cannot_be_written_is_an_error_in_one_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(jit, "_folder", lambda source: None)
+    monkeypatch.setattr(codecache, "_folder", lambda source: None)
     done = run("warm")
     assert done.code == 2
     assert done.err.count("\n") == 1

@@ -19,8 +19,9 @@ from typing import NamedTuple
 import pytest
 
 import motionmind
+from motionmind import codecache as door
 from motionmind import files
-from motionmind import jit as door
+from motionmind.jit import jit
 
 PACKAGE = Path(motionmind.__file__).parent
 # It prints what functions of two rooms return, of those that take the least time to compile, and how many of them were
@@ -246,7 +247,7 @@ def test_code_that_cannot_be_written_at_any_step_is_done_without(
         door._say.cache_clear()
         with monkeypatch.context() as patch, caplog.at_level(logging.WARNING):
             patch.setattr(files.os, name, failing(error))
-            assert door.jit(lambda x: 2.0 * x)(4.0) == 8.0
+            assert jit(lambda x: 2.0 * x)(4.0) == 8.0
         assert kept(tmp_path) == []
     door._folder.cache_clear()
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numpy._core import _multiarray_umath as processor  # type: ignore[attr-defined]
 
+from motionmind.codecache import place_of_code
 from motionmind.geometry import rotations as rot
-from motionmind.jit import place_of_code
 
 PAIRS = 6
 SCRIPT = f"""
