@@ -13,7 +13,8 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Generator, Iterator, Sequence
+import threading
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -83,7 +84,7 @@ def prepare() -> None:
         click.echo(STILL.format(done=len(compiled_names()), total=len(decorated_names())), err=True)
     elif shutil.disk_usage(place).free > _ROOM:
         click.echo(FIRST, err=True)
-        _start(["compile_in_background()"], in_background=True)
+        _start([[compile_in_background]], in_background=True)
 
 
 def prepare_in_steps() -> Generator[tuple[int, int, bool]]:
@@ -97,7 +98,7 @@ def prepare_in_steps() -> Generator[tuple[int, int, bool]]:
     if (place := place_of_code()) is None or shutil.disk_usage(place).free < _ROOM:
         return
     if not _is_running(place):
-        _start(["compile_in_background()"], in_background=True)
+        _start([[compile_in_background]], in_background=True)
     began = monotonic()
     while _is_running(place) or monotonic() < began + _STARTS:
         yield len(compiled_names()), len(decorated_names()), True
@@ -135,7 +136,7 @@ def _compile(processes: int, *, hidden: bool) -> None:
     total, known = len(decorated_names()), 0
     works = [realise, draw, seek, learn, search]  # a first run beside it comes to these last, and begins with a search
     side_by_side = min(processes, _AT_ONCE)
-    programs = ["; ".join(f"{work.__name__}()" for work in works[first::side_by_side]) for first in range(side_by_side)]
+    programs = [works[first::side_by_side] for first in range(side_by_side)]
     with click.progressbar(length=total, label="compiling", file=sys.stderr, hidden=hidden, show_pos=True) as bar:
         workers = _start(programs)
         try:
@@ -152,31 +153,47 @@ def _compile(processes: int, *, hidden: bool) -> None:
     note_all_compiled()
 
 
-def _start(programs: Sequence[str], *, in_background: bool = False) -> list[subprocess.Popen[bytes]]:
+def _start(
+    programs: Sequence[Sequence[Callable[[], None]]], *, in_background: bool = False
+) -> list[subprocess.Popen[bytes]]:
     """Start a process for each program, with this package on its path, and without the working directory.
 
     Args:
-        programs: calls of functions of this module, for each process.
+        programs: functions of this module to call in turn, for each process.
         in_background: whether they go on without this process, and let others go first.
     """
     root = str(Path(__file__).parents[2])
     # Compiling makes many objects that stay: with rarer collections it takes a tenth less time and a sixth more memory.
     begin = f"import gc, sys; gc.set_threshold(100_000); sys.path.insert(0, {root!r}); import os"
     begin += f"; os.nice({_NICER})" * (in_background and hasattr(os, "nice"))
-    begin += "; from motionmind.cli.warming import *"
+    begin += "; from motionmind.cli import warming"
+    begin += f"; warming.end_with({os.getpid()})" * (not in_background)
+    calls = ["; ".join(f"warming.{work.__name__}()" for work in works) for works in programs]
     workers = [
         subprocess.Popen(
-            [sys.executable, "-P", "-c", f"{begin}; {program}"],
+            [sys.executable, "-P", "-c", f"{begin}; {call}"],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=in_background,
         )
-        for program in programs
+        for call in calls
     ]
     if in_background:
         _started.extend(workers)
     return workers
+
+
+def end_with(parent: int) -> None:
+    """End this process when the one that started it has ended, even if that was killed."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            sleep(1.0)
+        os._exit(1)
+
+    if os.name == "posix":
+        threading.Thread(target=watch, daemon=True).start()
 
 
 _started = list[subprocess.Popen[bytes]]()  # processes in the background, which Python would else warn of as they go on

@@ -154,6 +154,29 @@ def test_of_several_processes_one_compiles(own_cache: Path) -> None:
     assert not warming._is_running(own_cache)
 
 
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="this system does not show its processes")
+def test_workers_end_with_the_process_that_started_them_even_if_it_is_killed() -> None:
+    worker = "from motionmind.cli import warming; warming.end_with(PARENT); import time; time.sleep(60)"
+    parent = f"""
+import os, subprocess, sys, time
+worker = subprocess.Popen([sys.executable, "-c", {worker!r}.replace("PARENT", str(os.getpid()))])
+print(worker.pid, flush=True)
+time.sleep(60)
+"""
+
+    def is_over(process: int) -> bool:
+        stat = Path(f"/proc/{process}/stat")
+        return not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] == "Z"
+
+    with subprocess.Popen([sys.executable, "-c", parent], stdout=subprocess.PIPE, text=True) as started:
+        assert started.stdout is not None
+        process = int(started.stdout.readline())
+        sleep(2.0)
+        assert not is_over(process)
+        started.kill()
+        wait_until(lambda: is_over(process))
+
+
 def test_nothing_is_started_where_code_cannot_be_kept(
     own_cache: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
