@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 
 _LISTED = 5  # projects that are named at the start
 _TERMINAL = "terminal"  # the window of edits that the command makes
-_COLD = "first run: preparing in the background; searches are slower for a minute or two (`motionmind warm --stop`)"
+_COLD = (
+    "first run: preparing in the background; searches wait for it, up to a minute (`motionmind warm --stop` ends it)"
+)
 
 
 @command("motionmind studio dance.motionmind --corpus ballet")

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 FIRST = "first run: preparing in the background, this one may take a minute (`motionmind warm --stop` ends it)"
 STILL = "still preparing in the background ({done} of {total} functions are compiled): this run is slower"
+_LAST = "search/astar.search"  # calls most of what is compiled for a search, and is there only once all of that is
 _LOOK = 0.2  # seconds between two looks at what is compiled
 _STARTS = 5.0  # seconds that the background process may take to begin
 _AT_ONCE = 3  # processes at most that share the work
@@ -84,28 +85,39 @@ def prepare() -> None:
         click.echo(STILL.format(done=len(compiled_names()), total=len(decorated_names())), err=True)
     elif shutil.disk_usage(place).free > _ROOM:
         click.echo(FIRST, err=True)
-        _start([[compile_in_background]], in_background=True)
+        _start([[compile_beside_search]], in_background=True)
 
 
 def prepare_in_steps() -> Generator[tuple[int, int, bool]]:
     """Have the inner loops compiled in the background, as `prepare` does without a word, and yield how far that is.
 
-    Yields the number of functions that are compiled, that of all, and that searches may begin. To close the iterator
-    ends nothing: the next run finds what has been compiled by then.
+    Yields the number of functions that are compiled, that of all, and whether the search is, so that searches may begin
+    and need not compile it themselves. To close the iterator ends nothing.
     """
     from motionmind.codecache import compiled_names, decorated_names, place_of_code
 
     if (place := place_of_code()) is None or shutil.disk_usage(place).free < _ROOM:
         return
     if not _is_running(place):
-        _start([[compile_in_background]], in_background=True)
+        _start([[compile_before_searches]], in_background=True)
     began = monotonic()
     while _is_running(place) or monotonic() < began + _STARTS:
-        yield len(compiled_names()), len(decorated_names()), True
+        names = compiled_names()
+        yield len(names), len(decorated_names()), _LAST in names
 
 
-def compile_in_background() -> None:
-    """Compile all, unless another process does: the whole of a process that `prepare` has started."""
+def compile_beside_search() -> None:
+    """Compile all beside a search, which comes to `realise` last: the whole of a process that `prepare` has started."""
+    _compile_in_background([realise, draw, seek, learn, search], max(_processors() - 1, 1))
+
+
+def compile_before_searches() -> None:
+    """Compile all, what searches need first: the whole of a process that `prepare_in_steps` has started."""
+    _compile_in_background([search, realise, draw, seek, learn], _processors())
+
+
+def _compile_in_background(works: Sequence[Callable[[], None]], processes: int) -> None:
+    """Compile what some works come by, unless another process does; SIGTERM ends it."""
     from motionmind.codecache import place_of_code
 
     place = place_of_code()
@@ -113,7 +125,7 @@ def compile_in_background() -> None:
     with suppress(OSError), _alone(place) as is_alone:
         if is_alone:
             signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # workers are ended on the way out
-            _compile(max(_processors() - 1, 1), hidden=True)
+            _compile(works, processes, hidden=True)
 
 
 def _wait_or_compile(place: Path) -> None:
@@ -121,20 +133,19 @@ def _wait_or_compile(place: Path) -> None:
     while True:
         with _alone(place) as is_alone:
             if is_alone:
-                _compile(_processors(), hidden=not sys.stderr.isatty())
+                _compile([search, realise, draw, learn, seek], _processors(), hidden=not sys.stderr.isatty())
                 return
         sleep(_LOOK)
 
 
-def _compile(processes: int, *, hidden: bool) -> None:
-    """Compile all that the workers come by, side by side, with or without a bar.
+def _compile(works: Sequence[Callable[[], None]], processes: int, *, hidden: bool) -> None:
+    """Compile all that the works come by, dealt out among some processes, with or without a bar.
 
     A worker that fails leaves its part to whoever needs it: its errors are not of interest here.
     """
     from motionmind.codecache import compiled_names, decorated_names, note_all_compiled
 
     total, known = len(decorated_names()), 0
-    works = [realise, draw, seek, learn, search]  # a first run beside it comes to these last, and begins with a search
     side_by_side = min(processes, _AT_ONCE)
     programs = [works[first::side_by_side] for first in range(side_by_side)]
     with click.progressbar(length=total, label="compiling", file=sys.stderr, hidden=hidden, show_pos=True) as bar:

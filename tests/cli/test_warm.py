@@ -150,7 +150,7 @@ def test_of_several_processes_one_compiles(own_cache: Path) -> None:
         assert warming._is_running(own_cache)
         with warming._alone(own_cache) as is_second:
             assert not is_second
-        warming.compile_in_background()  # returns at once
+        warming.compile_beside_search()  # returns at once
     assert not warming._is_running(own_cache)
 
 
