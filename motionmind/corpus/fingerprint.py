@@ -12,7 +12,18 @@ from motionmind.files import read_bytes
 # The sources of the package by which a corpus is read and learned, and no others: see `fingerprint`.
 LEARNED_BY = (
     *("_cells.py", "_typing.py", "arguments.py", "bundled.py", "display.py", "errors.py", "files.py", "jit.py"),
-    *("plugins.py", "executors", "geometry", "credits", "body", "retarget", "formats", "notation", "corpus"),
+    *(
+        "codecache.py",
+        "plugins.py",
+        "executors",
+        "geometry",
+        "credits",
+        "body",
+        "retarget",
+        "formats",
+        "notation",
+        "corpus",
+    ),
     *("discretize", "grammar", "learned"),
 )
 

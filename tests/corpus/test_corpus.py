@@ -132,7 +132,7 @@ def test_what_the_engine_made_is_told(caplog: pytest.LogCaptureFixture) -> None:
 def test_a_floor_that_is_off_is_told(caplog: pytest.LogCaptureFixture) -> None:
     film = ballet_clip("adagio").resample(30.0)
     own = floor_of(film)
-    for height, said in ((0.0, ""), (0.02, ""), (0.045, "film by 4 cm over"), (-0.11, "film by 11 cm under")):
+    for height, said in ((0.0, ""), (0.02, ""), (0.044, "film by 4 cm over"), (-0.11, "film by 11 cm under")):
         caplog.clear()
         with caplog.at_level("INFO", "motionmind"):
             gather("mine", [replace(film, name="film", root=film.root + np.array([0.0, height - own, 0.0]))])

@@ -33,7 +33,7 @@ OUTPUTS = ("-o", "out.json", "--report", "report.json", "--problem", "problem.cf
 @pytest.fixture(autouse=True)
 def _nothing_else_is_written(monkeypatch: pytest.MonkeyPatch) -> None:
     """Keep no compiled code, for faults are to hit the command's own files."""
-    monkeypatch.setattr("motionmind.jit.replace_file", lambda *_: None)
+    monkeypatch.setattr("motionmind.codecache.replace_file", lambda *_: None)
     Engine.load("ballet")  # learned, and kept, once
 
 

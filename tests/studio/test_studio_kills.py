@@ -19,6 +19,7 @@ import pytest
 from command_line import Run
 from studio_server import ROOT, running
 
+from motionmind.cli import warming
 from motionmind.errors import MotionMindError
 from motionmind.studio.edits import Insert
 from motionmind.studio.project import Project
@@ -188,19 +189,22 @@ def test_errors_of_the_command_are_one_line(tmp_path: Path, run: Run) -> None:
 
 
 def test_it_says_at_once_that_it_compiles_first(tmp_path: Path) -> None:
-    with subprocess.Popen(
-        [sys.executable, "-m", "motionmind", "studio", "--no-browser", str(tmp_path / "piece.motionmind")],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ
-        | {"PYTHONPATH": str(ROOT), "MOTIONMIND_HOME": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "code")},
-    ) as process:
+    places = {"PYTHONPATH": str(ROOT), "MOTIONMIND_HOME": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "code")}
+    compiled = tmp_path / "code/compiled"
+    compiled.mkdir(0o700, parents=True)
+    command = [sys.executable, "-m", "motionmind", "studio", "--no-browser", str(tmp_path / "piece.motionmind")]
+    # The lock says that another process compiles: so the studio starts none that would outlive it.
+    with (
+        warming._alone(compiled),
+        subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ | places
+        ) as process,
+    ):
         assert process.stderr is not None
         first = process.stderr.readline()
         process.kill()
         out, _ = process.communicate()
-    assert "the page opens in some seconds" in first
+    assert "preparing in the background" in first
     assert out == ""  # the address is yet to come
 
 
