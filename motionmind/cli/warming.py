@@ -75,7 +75,7 @@ def warm(is_stopping: bool) -> None:
 def prepare() -> None:
     """Have the inner loops compiled in the background, unless they are, and say so.
 
-    Nothing is started where compiled code cannot be kept: each run then interprets or compiles what it calls.
+    Nothing is started where compiled code cannot be kept: each run then compiles what it calls.
     """
     from motionmind.codecache import compiled_names, decorated_names, is_all_compiled, place_of_code
 
@@ -129,13 +129,16 @@ def _compile_in_background(works: Sequence[Callable[[], None]], processes: int) 
 
 
 def _wait_or_compile(place: Path) -> None:
-    """Compile all with a bar on a terminal, or wait for the process in the background that does."""
-    while True:
+    """Compile all, unless a process does so already, and then what that has left; with a bar on a terminal."""
+    from motionmind.codecache import is_all_compiled
+
+    hidden = not sys.stderr.isatty()
+    while not is_all_compiled():
         with _alone(place) as is_alone:
             if is_alone:
-                _compile([search, realise, draw, learn, seek], _processors(), hidden=not sys.stderr.isatty())
+                _compile([search, realise, draw, learn, seek], _processors(), hidden=hidden)
                 return
-        sleep(_LOOK)
+        _show_progress(lambda: _is_running(place), hidden=hidden)
 
 
 def _compile(works: Sequence[Callable[[], None]], processes: int, *, hidden: bool) -> None:
@@ -143,25 +146,32 @@ def _compile(works: Sequence[Callable[[], None]], processes: int, *, hidden: boo
 
     A worker that fails leaves its part to whoever needs it: its errors are not of interest here.
     """
-    from motionmind.codecache import compiled_names, decorated_names, note_all_compiled
+    from motionmind.codecache import note_all_compiled
 
-    total, known = len(decorated_names()), 0
     side_by_side = min(processes, _AT_ONCE)
     programs = [works[first::side_by_side] for first in range(side_by_side)]
-    with click.progressbar(length=total, label="compiling", file=sys.stderr, hidden=hidden, show_pos=True) as bar:
-        workers = _start(programs)
-        try:
-            while any(worker.poll() is None for worker in workers):
-                now = len(compiled_names())
-                bar.update(now - known)
-                known = now
-                sleep(_LOOK)
-        finally:
-            for worker in workers:
-                with suppress(OSError):
-                    worker.kill()
-                worker.wait()
+    workers = _start(programs)
+    try:
+        _show_progress(lambda: any(worker.poll() is None for worker in workers), hidden=hidden)
+    finally:
+        for worker in workers:
+            with suppress(OSError):
+                worker.kill()
+            worker.wait()
     note_all_compiled()
+
+
+def _show_progress(is_going_on: Callable[[], bool], *, hidden: bool) -> None:
+    """Show how many functions are compiled, of how many, and the seconds left, unless hidden."""
+    from motionmind.codecache import compiled_names, decorated_names
+
+    total, known = len(decorated_names()), 0
+    with click.progressbar(length=total, label="compiling", file=sys.stderr, hidden=hidden, show_pos=True) as bar:
+        while is_going_on():
+            now = len(compiled_names())
+            bar.update(now - known)
+            known = now
+            sleep(_LOOK)
 
 
 def _start(
