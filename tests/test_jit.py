@@ -91,6 +91,10 @@ def test_compiled_code_is_known_to_be_there_once_it_is(place: Path) -> None:
     assert not door.is_all_compiled()
     door.note_all_compiled()
     assert door.is_all_compiled()
+    noted = set(place.glob("all-*"))
+    assert len(noted) == 2  # by contents, and by ages
+    door._text.cache_clear()
+    assert door.is_all_compiled()
     (file,) = place.rglob("*.nbc")
     file.unlink()
     assert not door.is_all_compiled()
@@ -104,6 +108,7 @@ def test_what_was_all_for_another_numba_or_other_sources_is_not_all(monkeypatch:
     with monkeypatch.context() as patch:
         patch.setattr(door.numba, "__version__", "0.1")
         assert not door.is_all_compiled()
+    monkeypatch.setattr(door, "_ages", lambda: "other")
     monkeypatch.setattr(door, "_folders", lambda: [*folders[:-1], folders[-1].with_name(f"{folders[-1].name[:-1]}x")])
     assert not door.is_all_compiled()
 
