@@ -374,7 +374,7 @@ def _make_private(place: Path) -> None:
 def _remove_unused(place: Path) -> None:
     """Remove compiled code that no process has asked for in a month: of sources that have changed since, most likely.
 
-    Whoever comes for it now compiles it again.
+    A process that needs it compiles it again.
     """
     for found in [*place.glob("*.*-" + "[0-9a-f]" * 16), *place.glob("all-" + "[0-9a-f]" * 24)]:
         with suppress(OSError):
