@@ -29,8 +29,8 @@ LOOKED_AT = 32  # founders that are compared with a posture at most, those that 
 BLOCK = 2048  # postures that are compared at a time
 SHOWN = 4096  # postures that show the directions
 SLACK = 1e-6  # of rounding, in squared distances seen along few directions
-# Squared distances, radians^2, that differ by less are a tie. Rounding makes differences of 1e-15, and of 13,932
-# memberships in recordings of one dancer (cmu-05) 15 are exact ties, from frames that the recording repeats.
+# Squared distances, radians^2, that differ by less are a tie. Rounding makes differences of 1e-15; of the 13,932
+# memberships in recordings of one dancer (cmu-05), two dozen went by these from one processor to another.
 TIE = 1e-12
 
 
