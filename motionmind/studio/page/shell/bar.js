@@ -28,7 +28,7 @@ export function Bar({ studio }) {
   ]);
   return html`<header class="bar">
     <h1 class="brand">${icon("brand")}<span>MotionMind</span></h1>
-    <${Title} studio=${studio} title=${state?.title ?? ""} />
+    <${Title} studio=${studio} title=${state?.title} />
     ${state?.corpus && html`<span class="hint corpus cut">moves like <strong>${state.corpus}</strong></span>`}
     <span class="space"></span>
     <${Readiness} store=${store} />
@@ -96,8 +96,9 @@ function button(name, label, what, act) {
   </button>`;
 }
 
-/** @param {{studio: any, title: string}} props */
-function Title({ studio, title }) {
+/** @param {{studio: any, title?: string}} props; the title is missing until the piece is there */
+function Title({ studio, title: known }) {
+  const title = known ?? "";
   const [written, write] = useState(title);
   const field = useRef(/** @type {any} */ (null));
   const before = useRef(""); // what it held when somebody came to it: another window may call the piece something else meanwhile
@@ -118,6 +119,7 @@ function Title({ studio, title }) {
     title="Title of the piece"
     placeholder="Untitled"
     maxlength="200"
+    disabled=${known === undefined}
     value=${written}
     onFocus=${() => (before.current = written)}
     onInput=${(/** @type {any} */ event) => write(event.target.value)}
