@@ -20,7 +20,7 @@ from motionmind.cli.printing import Interruption, note, print_alternatives, prin
 from motionmind.cli.search_options import request_options, searching, via_sources
 from motionmind.cli.sources import ends_reader
 from motionmind.cli.types import FILE, Whole
-from motionmind.cli.warming import prepare
+from motionmind.cli.warming import preparing
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError, NoPathError
 from motionmind.files import all_or_none, sha256_of
@@ -136,13 +136,13 @@ def tween(
     request = request_options(options, home, read) | {"what_if": what_if}
     for source in sources:
         check_named(source, home)
-    prepare()  # before a bundled corpus is learned
-    start, request["before"] = read_end(named[0], around[0], "before", home, read)
-    end, request["after"] = read_end(named[1], around[1], "after", home, read)
-    engine = Engine.load(corpus, home)
-    with _diagnosing(files), Interruption() as interruption:
-        results = _find_tweens(engine, (start, end), request, files.count, interruption)
-    written, reports = files.write(results)
+    with preparing():  # before a bundled corpus is learned
+        start, request["before"] = read_end(named[0], around[0], "before", home, read)
+        end, request["after"] = read_end(named[1], around[1], "after", home, read)
+        engine = Engine.load(corpus, home)
+        with _diagnosing(files), Interruption() as interruption:
+            results = _find_tweens(engine, (start, end), request, files.count, interruption)
+        written, reports = files.write(results)
     if files.is_report_printed:
         printed = list(map(plain, reports))
         click.echo(json.dumps(printed[0] if alternatives is None else printed))

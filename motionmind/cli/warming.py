@@ -88,6 +88,25 @@ def prepare() -> None:
         _start([[compile_beside_search]], in_background=True)
 
 
+@contextmanager
+def preparing() -> Iterator[None]:
+    """Do what `prepare` does; on a terminal, show within the context how many functions are compiled."""
+    from motionmind.codecache import is_all_compiled
+
+    prepare()
+    if is_all_compiled() or not sys.stderr.isatty():
+        yield
+        return
+    has_ended = threading.Event()
+    shower = threading.Thread(target=_show_progress, args=(lambda: not has_ended.is_set(),), kwargs={"hidden": False})
+    shower.start()
+    try:
+        yield
+    finally:
+        has_ended.set()
+        shower.join()
+
+
 def prepare_in_steps() -> Generator[tuple[int, int, bool]]:
     """Have the inner loops compiled in the background, as `prepare` does without a word, and yield how far that is.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import subprocess
 import sys
@@ -140,6 +141,25 @@ def test_the_first_run_prepares_in_the_background_and_says_so_until_all_is_compi
     assert not list(own_cache.glob("all-*"))
     stopped = subprocess.run(command("warm", "--stop"), capture_output=True, text=True, check=True).stdout
     assert stopped == "nothing is preparing in the background\n"
+
+
+def test_a_terminal_shows_how_much_is_compiled_until_the_first_run_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    terminal = Terminal()
+    monkeypatch.setattr(warming, "prepare", lambda: None)
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setattr(codecache, "is_all_compiled", lambda: False)
+    total = len(codecache.decorated_names())
+    with warming.preparing():
+        wait_until(lambda: f"{total}/{total}" in terminal.getvalue())
+    monkeypatch.setattr(codecache, "is_all_compiled", lambda: True)
+    terminal.truncate(0)
+    with warming.preparing():
+        sleep(2 * warming._LOOK)
+    assert not terminal.getvalue()
 
 
 def test_of_several_processes_one_compiles(own_cache: Path) -> None:
