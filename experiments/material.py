@@ -19,7 +19,14 @@ from motionmind.corpus.gather import gather
 from motionmind.metrics import find_floor
 from motionmind.metrics.measure import at_rate
 
-RECORDED = {"cmu-05": "*.bvh", "cmu-135": "*.amc", "bandai": "*.bvh", "indian": "*.bvh", "cmu-16": "*.amc"}
+RECORDED = {
+    "cmu-05": "*.bvh",
+    "cmu-135": "*.amc",
+    "bandai": "*.bvh",
+    "indian": "*.bvh",
+    "cmu-16": "*.amc",
+    "cmu-29": "*.amc",
+}
 SKIP = {"indian": 30}  # frames that lead from an added T-pose into the movement; elsewhere it is the first alone
 LEVELLED = ("indian",)  # whose floor lies up to 17 cm below 0, in each clip elsewhere
 TOLD_APART = ("cmu-05", "cmu-135", "bandai")  # by style, where that is the question

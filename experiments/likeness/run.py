@@ -1,0 +1,187 @@
+"""Likeness: whether a classifier tells in-betweens from the dancer's own held-out movement.
+
+    python -m experiments likeness
+    python -m experiments.likeness.run DANCER ... --label NAME --out FOLDER [--options JSON] [--windows N]
+
+The second command tries options of `Engine.tween`, or a changed engine. It keeps the movement of each label in a
+folder, makes only what is not there yet, and prints all labels side by side.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import click
+
+import motionmind
+from experiments.harness import Row, Setting, single_threaded
+from experiments.inbetween.run import GAPS, TUNED_ON, keep_apart, lesson_of
+from experiments.likeness.filled import RIVALS, Filled, Method, engine, fill, rival
+from experiments.likeness.measure import Truth, rows_of
+from experiments.likeness.tables import board, board_of_takes, chart, tell
+from experiments.likeness.windows import Case, cases_of, key_of, window_of
+from experiments.material import families, recorded
+
+__all__ = ["chart", "jobs", "tell", "work"]
+
+DANCERS = ("cmu-05", "indian", "cmu-16", "cmu-135", "bandai", "cmu-29")
+WINDOWS = 24  # of a family and a length, at most
+ENGINES: dict[str, dict[str, Any]] = {"motionmind": {}}  # options of `Engine.tween`, by what the result is called
+
+
+def jobs(setting: Setting) -> list[dict[str, Any]]:
+    """Return a job for each dancer: classifiers need all of their families at once."""
+    data = str(setting.data) if setting.data else None
+    names = recorded(data, *(TUNED_ON if setting.tuning else DANCERS)) or ["karate"]
+    size = (
+        {"gaps": [0.6, 1.2], "count": 3, "most": 3}
+        if setting.quick
+        else {"gaps": list(GAPS), "count": WINDOWS, "most": None}
+    )
+    return [{"data": data, "name": name} | size for name in names]
+
+
+def work(data: str | None, name: str, gaps: list[float], count: int, most: int | None) -> list[Row]:
+    """Fill the windows of a dancer with what was learned without their family, and measure each method's results."""
+    together = families(data, name)[:most]
+    cases = cases_of(data, name, together, gaps, count)
+    truth = Truth.of(cases, [window_of(data, name, case) for case in cases])
+    methods = methods_of(ENGINES)
+    return [
+        row
+        for kind, filled in filled_by(methods, data, name, together, truth).items()
+        for row in rows_of(name, kind, truth, filled)
+    ]
+
+
+def methods_of(engines: dict[str, dict[str, Any]]) -> dict[str, Method]:
+    """Return the truth, the rivals and engines with some options, by name."""
+    return {kind: rival(kind) for kind in RIVALS} | {label: engine(options) for label, options in engines.items()}
+
+
+def filled_by(
+    methods: dict[str, Method],
+    data: str | None,
+    name: str,
+    together: Sequence[Sequence[str]],
+    truth: Truth,
+    report: bool = False,
+) -> dict[str, Filled]:
+    """Return what methods make of cases, which are in the order of their families; report each on standard error."""
+    parts: dict[str, list[Filled]] = {kind: [] for kind in methods}
+    for takes in together:
+        ks = [k for k, case in enumerate(truth.cases) if case.family == takes[0]]
+        if not ks:
+            continue
+        began = perf_counter()
+        lesson = lesson_of(data, (name,), tuple(takes))
+        keep_apart(lesson.engine.corpus, list(takes))
+        learned = perf_counter()
+        for kind, method in methods.items():
+            parts[kind].append(fill(method, lesson, [truth.windows[k] for k in ks], [truth.cases[k] for k in ks]))
+        if report:
+            spent = f"learned {learned - began:.1f} s, filled {perf_counter() - learned:.1f} s"
+            click.echo(f"{name} {takes[0]}: {len(ks)} windows, {spent}", err=True)
+    return {kind: Filled.joined(found) for kind, found in parts.items()}
+
+
+# --- labels -----------------------------------------------------------------------------------------------------------
+
+
+@click.command(help=__doc__)
+@click.argument("names", nargs=-1, required=True)
+@click.option("--label", required=True, help="What to call the engine's results.")
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), required=True, help="Folder of all labels.")
+@click.option("--options", default="{}", help="Options of Engine.tween, as JSON.")
+@click.option("--windows", type=click.IntRange(min=1), default=WINDOWS, help="Of a family and a length, at most.")
+@click.option("--families", "most", type=click.IntRange(min=1), help="Only so many families of each dancer.")
+@click.option("--data", type=click.Path(exists=True, file_okay=False), default="../shared/data", show_default=True)
+@click.option(
+    "--baseline",
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    multiple=True,
+    help="Another folder whose labels are shown, too, such as one of another checkout.",
+)
+@click.option("--again", is_flag=True, help="Make the label's movement anew.")
+def main(
+    names: tuple[str, ...],
+    label: str,
+    out: Path,
+    options: str,
+    windows: int,
+    most: int | None,
+    data: str,
+    baseline: tuple[Path, ...],
+    again: bool,
+) -> None:
+    warnings.simplefilter("ignore", motionmind.MotionMindWarning)  # recorded speeds are asked for: some are fast
+    about = {"options": json.loads(options), "engine": code_of(Path(motionmind.__file__).parent)}
+    for name in names:
+        began = perf_counter()
+        together = families(data, name)[:most]
+        cases = cases_of(data, name, together, GAPS, windows)
+        truth = Truth.of(cases, [window_of(data, name, case) for case in cases])
+        folder = out / name / f"{windows}-{key_of(cases)}"
+        if again:
+            (folder / f"{label}.npz").unlink(missing_ok=True)
+        missing = [kind for kind in (*RIVALS, label) if not (folder / f"{kind}.npz").exists()]
+        if label in missing:
+            folder.mkdir(parents=True, exist_ok=True)
+        elif json.loads((folder / f"{label}.about").read_text()) != about:
+            raise click.UsageError(
+                f"{label} was made with other options or another engine: use --again or another label"
+            )
+        methods = {kind: one for kind, one in methods_of({label: about["options"]}).items() if kind in missing}
+        if methods:
+            for kind, filled in filled_by(methods, data, name, together, truth, report=True).items():
+                filled.save(folder / f"{kind}.npz")
+            (folder / f"{label}.about").write_text(json.dumps(about))
+        made = perf_counter()
+        rows = kept_rows(folder, name, truth)
+        for other in baseline:
+            if (found := other / name / folder.name).exists():
+                rows += [
+                    row | {"kind": f"{other.name}/{row['kind']}"}
+                    for row in kept_rows(found, name, truth)
+                    if row["kind"] not in RIVALS
+                ]
+        click.echo(
+            f"\n## {name}: {len(together)} families, {len(cases)} windows\n\n{board(rows)}\n\n{board_of_takes(rows)}"
+        )
+        click.echo(f"\n{name}: made in {made - began:.0f} s, measured in {perf_counter() - made:.0f} s", err=True)
+
+
+def kept_rows(folder: Path, name: str, truth: Truth) -> list[Row]:
+    """Return the rows of all labels in a folder, the rivals first, then the oldest; measured once, unless this changed."""
+    paths = sorted(folder.glob("*.npz"), key=lambda path: path.stat().st_mtime_ns)
+    order = {kind: k for k, kind in enumerate(RIVALS)}
+    paths.sort(key=lambda path: order.get(path.stem, len(order)))
+    by = code_of(Path(__file__).parent)
+    rows: list[Row] = []
+    for path in paths:
+        kept, stamp = path.with_suffix(".json"), [by, path.stat().st_mtime_ns]
+        found = json.loads(kept.read_text()) if kept.exists() else {}
+        if found.get("of") != stamp:
+            found = {"of": stamp, "rows": rows_of(name, path.stem, truth, Filled.load(path))}
+            kept.write_text(json.dumps(found))
+        rows += found["rows"]
+    return rows
+
+
+def code_of(folder: Path) -> str:
+    """Return a digest of all Python modules in a folder."""
+    digest = hashlib.sha256()
+    for path in sorted(folder.rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+if __name__ == "__main__":
+    single_threaded()
+    main()
