@@ -141,7 +141,7 @@ def features(skeleton: Skeleton, rotations: Floats, root: Floats, floor: Floats)
 
 def of_upper_body(name: str) -> bool:
     """Return whether a feature is of spine, head, arms and hands alone."""
-    return name.split()[0] in (*UPPER, "upper")
+    return name.split(maxsplit=1)[0] in (*UPPER, "upper")
 
 
 # --- signals ----------------------------------------------------------------------------------------------------------

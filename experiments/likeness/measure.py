@@ -11,7 +11,7 @@ from experiments.harness import Row
 from experiments.inbetween.rivals import slerp
 from experiments.inbetween.run import INNER, Window, power
 from experiments.likeness.classify import CLASSIFIERS, UNKNOWN, told_apart
-from experiments.likeness.features import LOW_M, feet_of, features, joints_of, of_upper_body
+from experiments.likeness.features import LOW_M, features, feet_of, joints_of, of_upper_body
 from experiments.likeness.filled import Filled
 from experiments.likeness.windows import Case
 from experiments.material import FPS

@@ -25,7 +25,7 @@ from experiments.inbetween.run import GAPS, TUNED_ON, keep_apart, lesson_of
 from experiments.likeness.filled import RIVALS, Filled, Method, engine, fill, rival
 from experiments.likeness.measure import Truth, rows_of
 from experiments.likeness.tables import board, board_of_takes, chart, tell
-from experiments.likeness.windows import Case, cases_of, key_of, window_of
+from experiments.likeness.windows import cases_of, key_of, window_of
 from experiments.material import families, recorded
 
 __all__ = ["chart", "jobs", "tell", "work"]

@@ -9,7 +9,7 @@ import numpy as np
 from experiments.charts import Panel, svg
 from experiments.harness import Row, markdown
 from experiments.likeness.filled import RIVALS
-from experiments.likeness.measure import AREAS, COMPARED, MOVING_GROUPS
+from experiments.likeness.measure import AREAS, MOVING_GROUPS
 from experiments.likeness.windows import POSTURES
 from motionmind._typing import Floats
 
