@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from experiments.material import FPS
-from motionmind._typing import Floats
+from motionmind._typing import Bools, Floats
 from motionmind.body.contact import find_feet
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
@@ -98,12 +98,12 @@ OF_TRAVEL: dict[str, Callable[[Travel], Floats]] = {
     "root level speed": lambda x: _log(_mean(_level(x.velocity)), STILL_M_S),
     "root level acceleration": lambda x: _log(_mean(_level(x.acceleration)), FPS * STILL_M_S),
     "root level top acceleration": lambda x: _log(_top(_level(x.acceleration)), FPS * STILL_M_S),
-    "root vertical speed": lambda x: _log(_mean(np.abs(x.velocity[..., 1])), STILL_M_S),
-    "root vertical acceleration": lambda x: _log(_mean(np.abs(x.acceleration[..., 1])), FPS * STILL_M_S),
-    "root vertical top acceleration": lambda x: _log(_top(np.abs(x.acceleration[..., 1])), FPS * STILL_M_S),
+    "root vertical speed": lambda x: _log(_mean(abs(x.velocity[..., 1])), STILL_M_S),
+    "root vertical acceleration": lambda x: _log(_mean(abs(x.acceleration[..., 1])), FPS * STILL_M_S),
+    "root vertical top acceleration": lambda x: _log(_top(abs(x.acceleration[..., 1])), FPS * STILL_M_S),
     "root height range": lambda x: _log(np.ptp(x.height, axis=1), LOW_M),
-    "feet low": lambda x: _mean(1.0 * (x.feet < LOW_M)),
-    "feet low and still": lambda x: _mean(1.0 * ((x.feet < LOW_M) & (x.sliding < STILL_M_S))),
+    "feet low": lambda x: _share(x.feet < LOW_M),
+    "feet low and still": lambda x: _share((x.feet < LOW_M) & (x.sliding < STILL_M_S)),
     "feet low, speed": lambda x: _log(low_speed(x.feet, x.sliding, axis=(1, 2)), STILL_M_S),
     "feet lowest": lambda x: x.feet.min(axis=(1, 2)),
     "feet lowest, spread": lambda x: x.feet.min(axis=2).std(axis=1),
@@ -203,6 +203,10 @@ def low_speed(heights: Floats, speeds: Floats, axis: tuple[int, ...]) -> Floats:
 
 
 def _mean(x: Floats) -> Floats:
+    return np.asarray(x.reshape(len(x), -1).mean(axis=1))
+
+
+def _share(x: Bools) -> Floats:
     return np.asarray(x.reshape(len(x), -1).mean(axis=1))
 
 

@@ -9,6 +9,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.inbetween.rivals import Made, hermite, slerp
 from experiments.inbetween.run import Lesson, Window, tween
@@ -27,27 +28,26 @@ class Filled:
 
     Attributes:
         found: whether it fills each case [C].
-        rotations: local rotations of those that it fills, [T, J, 4] each.
-        root: positions of the root, [T, 3] each, metres.
+        rotations: local rotations of those that it fills, [T, J, 4] each, in single precision.
+        root: positions of the root, [T, 3] each, metres, in single precision.
         followed: share of joint-moves within tolerance of the path [C], NaN without a path.
         spent: time that each case took [C], seconds.
     """
 
     found: Bools
-    rotations: list[Floats]
-    root: list[Floats]
+    rotations: list[NDArray[np.float32]]
+    root: list[NDArray[np.float32]]
     followed: Floats
     spent: Floats
 
     def save(self, path: Path) -> None:
-        """Write it with rotations and positions in single precision."""
         path.parent.mkdir(parents=True, exist_ok=True)
         np.savez(
             path,
             found=self.found,
             lengths=np.array([len(one) for one in self.root], dtype=np.int64),
-            rotations=np.concatenate(self.rotations or [np.zeros((0, 1, 4))]).astype(np.float32),
-            root=np.concatenate(self.root or [np.zeros((0, 3))]).astype(np.float32),
+            rotations=np.concatenate(self.rotations or [np.zeros((0, 1, 4), np.float32)]),
+            root=np.concatenate(self.root or [np.zeros((0, 3), np.float32)]),
             followed=self.followed,
             spent=self.spent,
         )
@@ -56,7 +56,7 @@ class Filled:
     def load(cls, path: Path) -> Filled:
         with np.load(path) as kept:
             ends = np.cumsum(kept["lengths"])
-            rotations, root = (np.split(kept[key].astype(float), ends)[:-1] for key in ("rotations", "root"))
+            rotations, root = (np.split(kept[key], ends)[:-1] for key in ("rotations", "root"))
             return cls(kept["found"], rotations, root, kept["followed"], kept["spent"])
 
     @classmethod
@@ -82,8 +82,8 @@ def fill(method: Method, lesson: Lesson, windows: Sequence[Window], cases: Seque
         except NoPathError:
             continue
         spent[k], found[k] = perf_counter() - began, True
-        rotations.append(turned)
-        root.append(moved)
+        rotations.append(turned.astype(np.float32))
+        root.append(moved.astype(np.float32))
     return Filled(found, rotations, root, followed, spent)
 
 

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.harness import Row
-from experiments.inbetween.rivals import slerp
+from experiments.inbetween.rivals import Made, slerp
 from experiments.inbetween.run import INNER, Window, power
 from experiments.likeness.classify import CLASSIFIERS, UNKNOWN, told_apart
-from experiments.likeness.features import LOW_M, features, feet_of, joints_of, of_upper_body
+from experiments.likeness.features import LOW_M, cuts, features, feet_of, joints_of, of_upper_body
 from experiments.likeness.filled import Filled
 from experiments.likeness.windows import Case
 from experiments.material import FPS
 from motionmind._typing import Floats
+from motionmind.geometry import rotations as rot
 from motionmind.metrics import angular_speed, l2q, npss, seen
 
 MOVING_GROUPS = ("arms", "spine", "head", "legs")
+AnyFloats = NDArray[Any]
 BODIES = ("upper", "whole")
 MEASURES = ("l2q", "slerp", "npss", "power", "followed", "spent")
 COMPARED = (*MOVING_GROUPS, "bounce", "low", "slid")  # each beside the truth's, in the same windows
@@ -45,20 +49,41 @@ class Truth:
         floor = {piece: window.floor for piece, window in floors.items()}
         return cls(cases, windows, np.array([floor[id(window.piece)] for window in windows]))
 
-    def alike(self, filled: Filled) -> Iterator[tuple[list[int], Floats, Floats, Floats, Floats]]:
-        """Yield the cases of each length and kind that were filled, with rotations and roots made, and danced."""
+    def alike(self, filled: Filled) -> Iterator[Alike]:
+        """Yield the cases that were filled, those of the same length and with the same given together."""
         row = np.cumsum(filled.found) - 1
         for key in dict.fromkeys((case.given, case.frames) for case in self.cases):
             ks = [k for k, c in enumerate(self.cases) if (c.given, c.frames) == key and filled.found[k]]
             if ks:
                 real = [self.windows[k].real for k in ks]
-                yield (
-                    ks,
-                    np.stack([filled.rotations[row[k]] for k in ks]),
-                    np.stack([filled.root[row[k]] for k in ks]),
-                    np.stack([one.rotations for one in real]),
-                    np.stack([one.root for one in real]),
-                )
+                made = _stacked([filled.rotations[row[k]] for k in ks], [filled.root[row[k]] for k in ks])
+                danced = _stacked([one.rotations for one in real], [one.root for one in real])
+                yield Alike(*key, ks, made, danced, self.floor[ks])
+
+
+class Alike(NamedTuple):
+    """Cases of the same length with the same given.
+
+    Attributes:
+        given: what is given.
+        frames: steps from the first frame to the last.
+        ks: their places among all cases.
+        made: rotations [B, T, J, 4] and root [B, T, 3] that a method made, both rounded to single precision.
+        danced: the truth, rounded alike.
+        floor: height of the floor in each [B], metres.
+    """
+
+    given: str
+    frames: int
+    ks: list[int]
+    made: Made
+    danced: Made
+    floor: Floats
+
+
+def _stacked(rotations: Sequence[AnyFloats], root: Sequence[AnyFloats]) -> Made:
+    turned, moved = (np.stack(one).astype(np.float32).astype(float) for one in (rotations, root))
+    return rot.normalise(turned), moved
 
 
 def measured(truth: Truth, filled: Filled) -> dict[str, Floats]:
@@ -72,21 +97,20 @@ def measured(truth: Truth, filled: Filled) -> dict[str, Floats]:
     out = {name: np.full(len(truth.cases), np.nan) for name in names}
     out["followed"], out["spent"] = filled.followed, np.where(filled.found, filled.spent, np.nan)
     skeleton = truth.windows[0].piece.skeleton
-    for ks, rotations, root, real, real_root in truth.alike(filled):
-        turned, _ = seen(skeleton, rotations, root, real, real_root)
-        danced, _ = seen(skeleton, real, real_root, real, real_root)
-        ways = [slerp(truth.windows[k].ends(truth.cases[k].given)) for k in ks]
-        straight, _ = seen(skeleton, *(np.stack(one) for one in zip(*ways, strict=True)), real, real_root)
-        turned, danced, straight = turned[INNER], danced[INNER], straight[INNER]
-        out["l2q"][ks], out["slerp"][ks] = l2q(danced, turned), l2q(danced, straight)
-        out["npss"][ks] = [npss(danced[[k]], turned[[k]]) for k in range(len(ks))]
+    for one in truth.alike(filled):
+        ks = one.ks
+        turned, lines = zip(*(slerp(truth.windows[k].ends(one.given)) for k in ks), strict=True)
+        ways: list[Made] = [one.made, one.danced, (np.stack(turned), np.stack(lines))]
+        made, danced, straight = (seen(skeleton, *way, *one.danced)[0][INNER] for way in ways)
+        out["l2q"][ks], out["slerp"][ks] = l2q(danced, made), l2q(danced, straight)
+        out["npss"][ks] = [npss(danced[[k]], made[[k]]) for k in range(len(ks))]
         out["power"][ks] = [power(danced[[k]]) for k in range(len(ks))]
-        for end, (q, place) in {"": (rotations, root), " danced": (real, real_root)}.items():
-            speed = angular_speed(q, FPS)
+        for end, (rotations, root) in {"": one.made, " danced": one.danced}.items():
+            speed = angular_speed(rotations, FPS)
             for group in MOVING_GROUPS:
                 out[group + end][ks] = speed[..., joints_of(skeleton, group)].mean(axis=(1, 2))
-            out["bounce" + end][ks] = place[..., 1].std(axis=1)
-            heights, speeds = feet_of(skeleton, q, place, truth.floor[ks])
+            out["bounce" + end][ks] = root[..., 1].std(axis=1)
+            heights, speeds = feet_of(skeleton, rotations, root, one.floor)
             out["low" + end][ks] = (heights < LOW_M).mean(axis=(1, 2))
             out["slid" + end][ks] = (speeds * (heights < LOW_M)).mean(axis=(1, 2))
     return out
@@ -121,42 +145,37 @@ def _weighted(values: Floats, weights: Floats) -> float:
     return float(np.average(values[known], weights=weights[known])) if known.any() else float("nan")
 
 
-def areas_of(truth: Truth, filled: Filled) -> dict[str, dict[str, float]]:
+def areas_of(truth: Truth, filled: Filled) -> dict[str, Row]:
     """Return how well each classifier tells a method's pieces from the dancer's, by what is given."""
     out = {}
     for given in dict.fromkeys(case.given for case in truth.cases):
         made, danced, families = pieces_of(truth, filled, given)
-        row = {}
+        same = not families or all(np.array_equal(made[name], danced[name]) for name in made)
+        row: Row = {"pieces": len(families)}
         for body in BODIES:
             kept = [name for name in made if body == "whole" or of_upper_body(name)]
-            x, y = (
-                np.stack([one[name] for name in kept], axis=1) if kept else np.empty((0, 0)) for one in (danced, made)
-            )
             for classifier, make in CLASSIFIERS.items():
-                same = not len(x) or np.array_equal(x, y)
-                area = UNKNOWN if same else told_apart(x, y, families, make)
+                area = UNKNOWN
+                if not same:
+                    x, y = (np.stack([one[name] for name in kept], axis=1) for one in (danced, made))
+                    area = told_apart(x, y, families, make)
                 key = f"{body} {classifier}"
                 row |= {key: area.value, f"{key} low": area.low, f"{key} high": area.high}
-        row["pieces"] = len(families)
         out[given] = row
     return out
 
 
-def pieces_of(truth: Truth, filled: Filled, given: str) -> tuple[dict[str, Floats], dict[str, Floats], Sequence[str]]:
+def pieces_of(truth: Truth, filled: Filled, given: str) -> tuple[dict[str, Floats], dict[str, Floats], list[str]]:
     """Return features of the pieces that a method made and of those danced, and the family of each."""
     skeleton = truth.windows[0].piece.skeleton
-    parts: tuple[list[dict[str, Floats]], list[dict[str, Floats]]] = [], []
-    families: list[str] = []
-    for ks, rotations, root, real, real_root in truth.alike(filled):
-        if truth.cases[ks[0]].given == given and truth.cases[ks[0]].seconds > 1.0:
-            floor = truth.floor[ks]
-            # Both in single precision, as what was made is kept.
-            real, real_root = real.astype(np.float32).astype(float), real_root.astype(np.float32).astype(float)
-            parts[0].append(features(skeleton, rotations, root, floor))
-            parts[1].append(features(skeleton, real, real_root, floor))
-            count = len(next(iter(parts[0][-1].values()))) // len(ks)
-            families += [truth.cases[k].family for k in ks for _ in range(count)]
-    made, danced = (
-        {key: np.concatenate([part[key] for part in one]) for key in one[0]} if one else {} for one in parts
-    )
-    return made, danced, families
+    made, danced, families = [], [], []
+    for one in truth.alike(filled):
+        if one.given == given and cuts(one.frames):
+            made.append(features(skeleton, *one.made, one.floor))
+            danced.append(features(skeleton, *one.danced, one.floor))
+            families += [truth.cases[k].family for k in one.ks for _ in cuts(one.frames)]
+    return _joined(made), _joined(danced), families
+
+
+def _joined(parts: Sequence[dict[str, Floats]]) -> dict[str, Floats]:
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts else {}

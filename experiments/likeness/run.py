@@ -1,15 +1,14 @@
 """Likeness: whether a classifier tells in-betweens from the dancer's own held-out movement.
 
     python -m experiments likeness
-    python -m experiments.likeness.run DANCER ... --label NAME --out FOLDER [--options JSON] [--windows N]
+    python -m experiments.likeness.run DANCER ... --out FOLDER [--label NAME] [--options JSON] [--windows N]
 
-The second command tries options of `Engine.tween`, or a changed engine. It keeps the movement of each label in a
-folder, makes only what is not there yet, and prints all labels side by side.
+The second command tries options of `Engine.tween`, or a changed engine. It keeps what each label made in a folder,
+makes only what is not there yet, and prints all labels side by side.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import warnings
 from collections.abc import Sequence
@@ -23,6 +22,7 @@ import motionmind
 from experiments.harness import Row, Setting, single_threaded
 from experiments.inbetween.run import GAPS, TUNED_ON, keep_apart, lesson_of
 from experiments.likeness.filled import RIVALS, Filled, Method, engine, fill, rival
+from experiments.likeness.labels import Labels, code_of
 from experiments.likeness.measure import Truth, rows_of
 from experiments.likeness.tables import board, board_of_takes, chart, tell
 from experiments.likeness.windows import cases_of, key_of, window_of
@@ -96,8 +96,8 @@ def filled_by(
 
 @click.command(help=__doc__)
 @click.argument("names", nargs=-1, required=True)
-@click.option("--label", required=True, help="What to call the engine's results.")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), required=True, help="Folder of all labels.")
+@click.option("--label", help="What to call the engine's results; without it, only those that are there are shown.")
 @click.option("--options", default="{}", help="Options of Engine.tween, as JSON.")
 @click.option("--windows", type=click.IntRange(min=1), default=WINDOWS, help="Of a family and a length, at most.")
 @click.option("--families", "most", type=click.IntRange(min=1), help="Only so many families of each dancer.")
@@ -108,80 +108,47 @@ def filled_by(
     multiple=True,
     help="Another folder whose labels are shown, too, such as one of another checkout.",
 )
+@click.option("--show", multiple=True, help="Show only this label, and others named like this, beside the rivals.")
 @click.option("--again", is_flag=True, help="Make the label's movement anew.")
 def main(
     names: tuple[str, ...],
-    label: str,
     out: Path,
+    label: str | None,
     options: str,
     windows: int,
     most: int | None,
     data: str,
     baseline: tuple[Path, ...],
+    show: tuple[str, ...],
     again: bool,
 ) -> None:
-    warnings.simplefilter("ignore", motionmind.MotionMindWarning)  # recorded speeds are asked for: some are fast
+    warnings.simplefilter("ignore", motionmind.MotionMindWarning)  # lengths are the recording's: some are fast
     about = {"options": json.loads(options), "engine": code_of(Path(motionmind.__file__).parent)}
     for name in names:
         began = perf_counter()
         together = families(data, name)[:most]
         cases = cases_of(data, name, together, GAPS, windows)
         truth = Truth.of(cases, [window_of(data, name, case) for case in cases])
-        folder = out / name / f"{windows}-{key_of(cases)}"
-        if again:
-            (folder / f"{label}.npz").unlink(missing_ok=True)
-        missing = [kind for kind in (*RIVALS, label) if not (folder / f"{kind}.npz").exists()]
-        if label in missing:
-            folder.mkdir(parents=True, exist_ok=True)
-        elif json.loads((folder / f"{label}.about").read_text()) != about:
-            raise click.UsageError(
-                f"{label} was made with other options or another engine: use --again or another label"
-            )
-        methods = {kind: one for kind, one in methods_of({label: about["options"]}).items() if kind in missing}
-        if methods:
+        inside = Path(name) / f"{windows}-{key_of(cases)}"
+        labels = Labels(out / inside)
+        missing = labels.missing(label, about, again)
+        if missing:
+            engines = {label: about["options"]} if label else {}
+            methods = {kind: method for kind, method in methods_of(engines).items() if kind in missing}
             for kind, filled in filled_by(methods, data, name, together, truth, report=True).items():
-                filled.save(folder / f"{kind}.npz")
-            (folder / f"{label}.about").write_text(json.dumps(about))
+                labels.keep(kind, filled, about)
         made = perf_counter()
-        rows = kept_rows(folder, name, truth)
+        rows = labels.rows(name, truth)
         for other in baseline:
-            if (found := other / name / folder.name).exists():
-                rows += [
-                    row | {"kind": f"{other.name}/{row['kind']}"}
-                    for row in kept_rows(found, name, truth)
-                    if row["kind"] not in RIVALS
-                ]
-        click.echo(
-            f"\n## {name}: {len(together)} families, {len(cases)} windows\n\n{board(rows)}\n\n{board_of_takes(rows)}"
-        )
+            found = Labels(other / inside).rows(name, truth)
+            rows += [row | {"kind": f"{other.name}/{row['kind']}"} for row in found if row["kind"] not in RIVALS]
+        if show:
+            rows = [row for row in rows if row["kind"] in (*RIVALS, *show)]
+        title = f"{name}: {len(together)} families, {len(cases)} windows"
+        click.echo(f"\n## {title}\n\n{board(rows)}\n\n{board_of_takes(rows)}")
         click.echo(f"\n{name}: made in {made - began:.0f} s, measured in {perf_counter() - made:.0f} s", err=True)
 
 
-def kept_rows(folder: Path, name: str, truth: Truth) -> list[Row]:
-    """Return the rows of all labels in a folder, the rivals first, then the oldest; measured once, unless this changed."""
-    paths = sorted(folder.glob("*.npz"), key=lambda path: path.stat().st_mtime_ns)
-    order = {kind: k for k, kind in enumerate(RIVALS)}
-    paths.sort(key=lambda path: order.get(path.stem, len(order)))
-    by = code_of(Path(__file__).parent)
-    rows: list[Row] = []
-    for path in paths:
-        kept, stamp = path.with_suffix(".json"), [by, path.stat().st_mtime_ns]
-        found = json.loads(kept.read_text()) if kept.exists() else {}
-        if found.get("of") != stamp:
-            found = {"of": stamp, "rows": rows_of(name, path.stem, truth, Filled.load(path))}
-            kept.write_text(json.dumps(found))
-        rows += found["rows"]
-    return rows
-
-
-def code_of(folder: Path) -> str:
-    """Return a digest of all Python modules in a folder."""
-    digest = hashlib.sha256()
-    for path in sorted(folder.rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
 if __name__ == "__main__":
-    single_threaded()
+    single_threaded()  # boosted trees start their threads later
     main()
