@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -11,6 +14,9 @@ from click.testing import CliRunner
 from motionmind import Motion
 from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
+
+if TYPE_CHECKING:
+    from experiments.likeness.classify import Auc
 
 ROOT = Path(__file__).parents[1]
 
@@ -113,11 +119,20 @@ def test_pieces_are_cut_from_the_middle() -> None:
     assert cut(frames).shape == (4, 31)
 
 
+def told(danced: Floats, made: Floats, families: list[str], classifier: Callable[[], Any]) -> Auc:
+    """How well pieces are told apart by what is learned from the others."""
+    from experiments.likeness.classify import Sample, folds_of, lenient, told_apart
+
+    folds = folds_of(families)
+    fold, tested = np.array([folds[family] for family in families]), Sample(danced, made, families)
+    return told_apart(tested, fold, lenient(tested, fold), classifier)
+
+
 # --- classifiers ------------------------------------------------------------------------------------------------------
 
 
 def test_what_is_the_same_cannot_be_told_apart_and_half_the_speed_can() -> None:
-    from experiments.likeness.classify import CLASSIFIERS, told_apart
+    from experiments.likeness.classify import CLASSIFIERS
 
     danced, slow, families = [], [], []
     for take, whole in takes(200).items():
@@ -128,12 +143,12 @@ def test_what_is_the_same_cannot_be_told_apart_and_half_the_speed_can() -> None:
     danced_seen, slow_seen = seen_of(danced), seen_of(slow)
     assert len(set(families)) > 2
     for make in CLASSIFIERS.values():
-        same = told_apart(danced_seen, danced_seen, families, make)
+        same = told(danced_seen, danced_seen, families, make)
         assert same == (0.5, 0.5, 0.5)
         # Frames are counted at 30 a second, so that twice as many are half as fast.
-        assert told_apart(danced_seen, slow_seen, families, make).value > 0.75
+        assert told(danced_seen, slow_seen, families, make).value > 0.75
     still = np.zeros_like(danced_seen)
-    assert told_apart(danced_seen, still, families, CLASSIFIERS["linear"]).value == pytest.approx(1.0)
+    assert told(danced_seen, still, families, CLASSIFIERS["linear"]).value == pytest.approx(1.0)
 
 
 def test_no_family_is_learned_from_and_tested() -> None:
@@ -141,16 +156,16 @@ def test_no_family_is_learned_from_and_tested() -> None:
 
     families = [f"family {k}" for k, size in enumerate((40, 3, 9, 17, 1, 22, 8)) for _ in range(size)]
     folds = folds_of(families)
-    assert len(set(zip(families, folds.tolist(), strict=True))) == 7
-    assert set(folds.tolist()) == set(range(FOLDS))
-    assert np.bincount(folds)[1:].min() >= 9
-    assert set(folds_of(["a", "b", "b"]).tolist()) == {0, 1}
+    assert set(folds) == set(families)
+    assert set(folds.values()) == set(range(FOLDS))
+    assert np.bincount([folds[family] for family in families]).min() >= 9
+    assert set(folds_of(["a", "b", "b"]).values()) == {0, 1}
 
 
 def test_areas_are_those_of_scikit_learn_and_intervals_are_over_families() -> None:
     from sklearn.metrics import roc_auc_score
 
-    from experiments.likeness.classify import auc_over_families, linear, told_apart
+    from experiments.likeness.classify import auc_over_families, linear
 
     rng = np.random.default_rng(0)
     danced, made = rng.integers(8, size=60) / 8.0, rng.integers(3, 11, size=60) / 8.0
@@ -160,7 +175,35 @@ def test_areas_are_those_of_scikit_learn_and_intervals_are_over_families() -> No
     assert found.low < found.value < found.high
     alike = auc_over_families(np.tile(danced[:10], 6), np.tile(made[:10], 6), np.repeat(list("abcdef"), 10).tolist())
     assert alike.low == pytest.approx(alike.high)
-    assert np.isnan(told_apart(danced[:, None], made[:, None], ["one"] * 60, linear).value)
+    assert np.isnan(told(danced[:, None], made[:, None], ["one"] * 60, linear).value)
+
+
+def test_what_is_learned_from_is_made_without_the_tested_families(monkeypatch: pytest.MonkeyPatch) -> None:
+    from experiments.likeness import making
+    from experiments.likeness.filled import Filled, rival
+    from experiments.likeness.run import maker_of
+
+    maker = maker_of(None, "karate", (1.2,), 4, 3)
+    learned = []
+
+    def lesson_of(data: str | None, names: tuple[str, ...], left_out: tuple[str, ...]) -> Any:
+        learned.append(left_out)
+        return SimpleNamespace(engine=SimpleNamespace(corpus=SimpleNamespace(clips=[])))
+
+    monkeypatch.setattr(making, "lesson_of", lesson_of)
+    folds = maker.practise({"slerp": rival("slerp")})["slerp"]
+    assert len(folds) == 3
+    assert len(learned) == 6
+    truth = maker.truth
+    for fold, filled in enumerate(folds):
+        families = {case.family for case, found in zip(truth.cases, filled.found, strict=True) if found}
+        assert families == {family for family, its in truth.folds.items() if its != fold}
+        tested = next(family for family, its in truth.folds.items() if its == fold)
+        assert sum(tested in left_out for left_out in learned) == 2 + 2  # as the tested, and each as its own
+    again = Filled.joined(folds).split(3)
+    for one, other in zip(folds, again, strict=True):
+        np.testing.assert_array_equal(one.found, other.found)
+        assert all(np.array_equal(a, b) for a, b in zip(one.rotations, other.rotations, strict=True))
 
 
 # --- windows, labels and tables ---------------------------------------------------------------------------------------
@@ -244,13 +287,15 @@ def test_only_a_new_label_is_made(tmp_path: Path) -> None:
     code, shown = run("--label", "one")
     assert code == 0
     assert "| two postures | one |" in shown
-    before = {path.name: path.stat().st_mtime_ns for path in tmp_path.rglob("*.npz")}
+    before = {path.name: path.stat().st_mtime_ns for path in tmp_path.rglob("1-*/*.npz")}
     assert len(before) == 5
+    practice = [path.name for path in tmp_path.rglob("practice/*.npz")]
+    assert sorted(practice) == ["nearest segment.npz", "one.npz"]
     code, shown = run("--label", "two", "--options", '{"guide": 0.0}')
     assert code == 0
     assert "beside one" in shown
     assert "| two postures | two |" in shown
-    after = {path.name: path.stat().st_mtime_ns for path in tmp_path.rglob("*.npz")}
+    after = {path.name: path.stat().st_mtime_ns for path in tmp_path.rglob("1-*/*.npz")}
     assert after.items() - before.items() == {("two.npz", after["two.npz"])}
     code, shown = run("--label", "one", "--options", '{"guide": 0.0}')
     assert code != 0

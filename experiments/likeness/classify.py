@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from motionmind._typing import Floats, Ints
+from motionmind._typing import Bools, Floats, Ints
 
 FOLDS = 5  # at most
 DRAWS = 2_000  # of families, for an interval
@@ -45,37 +45,67 @@ def boosted() -> Any:
 CLASSIFIERS: dict[str, Callable[[], Any]] = {"linear": linear, "boosted": boosted}
 
 
-def folds_of(families: Sequence[str]) -> Ints:
-    """Return the fold of each piece: whole families, the largest first, each into the fold that has fewest pieces."""
+def folds_of(families: Sequence[str]) -> dict[str, int]:
+    """Return the fold of each family, of which one stands here for each piece.
+
+    Families are taken the largest first, each into the fold that has fewest pieces.
+    """
     names, sizes = np.unique(families, return_counts=True)
     filled = np.zeros(min(FOLDS, len(names)), dtype=np.int64)
-    fold = {}
+    fold: dict[str, int] = {}
     for k in np.argsort(-sizes, kind="stable"):
-        fold[names[k]] = int(filled.argmin())
-        filled[fold[names[k]]] += sizes[k]
-    return np.array([fold[family] for family in families])
+        fold[str(names[k])] = int(filled.argmin())
+        filled[filled.argmin()] += sizes[k]
+    return fold
 
 
-def told_apart(danced: Floats, made: Floats, families: Sequence[str], classifier: Callable[[], Any]) -> Auc:
-    """Return how well a classifier tells pieces made from the dancer's, in families that it has not learned from.
+class Sample(NamedTuple):
+    """Pieces of both classes.
 
-    Args:
+    Attributes:
         danced: features of the dancer's pieces [N, F].
         made: features of what a method made of the same pieces [N, F].
         families: the family of each piece [N].
+    """
+
+    danced: Floats
+    made: Floats
+    families: list[str]
+
+    def of(self, features: Bools) -> Sample:
+        """Return the same pieces with some of their features."""
+        return Sample(self.danced[:, features], self.made[:, features], self.families)
+
+    def part(self, kept: Bools) -> Sample:
+        return Sample(self.danced[kept], self.made[kept], [self.families[k] for k in np.flatnonzero(kept)])
+
+
+def told_apart(tested: Sample, fold: Ints, practice: Sequence[Sample], classifier: Callable[[], Any]) -> Auc:
+    """Return how well a classifier tells pieces made from the dancer's, in families that it has not learned from.
+
+    Args:
+        tested: the pieces to tell.
+        fold: the fold of each of them [N].
+        practice: the pieces to learn from before each fold is tested.
         classifier: makes a new one.
     """
-    fold = folds_of(families)
-    if fold.max(initial=0) < 1:
+    if len(practice) < 2:
         return UNKNOWN
-    both = np.stack([danced, made])
-    scores = np.empty(both.shape[:2])
-    for k in range(fold.max() + 1):
-        learned = both[:, fold != k].reshape(-1, both.shape[2])
-        model = classifier().fit(learned, np.repeat([0, 1], len(learned) // 2))
-        tested = both[:, fold == k]
-        scores[:, fold == k] = model.predict_proba(tested.reshape(-1, both.shape[2]))[:, 1].reshape(2, -1)
-    return auc_over_families(scores[0], scores[1], families)
+    scores = np.full((2, len(fold)), np.nan)
+    for k, learned in enumerate(practice):
+        here = fold == k
+        if not here.any():
+            continue
+        classes = np.repeat([0, 1], [len(learned.danced), len(learned.made)])
+        model = classifier().fit(np.concatenate([learned.danced, learned.made]), classes)
+        for score, pieces in zip(scores, (tested.danced, tested.made), strict=True):
+            score[here] = model.predict_proba(pieces[here])[:, 1]
+    return auc_over_families(scores[0], scores[1], tested.families)
+
+
+def lenient(tested: Sample, fold: Ints) -> list[Sample]:
+    """Return the pieces of all other folds for each fold, as they were made: what they copy may be of that fold."""
+    return [tested.part(fold != k) for k in range(fold.max(initial=0) + 1)]
 
 
 def auc_over_families(danced: Floats, made: Floats, families: Sequence[str]) -> Auc:

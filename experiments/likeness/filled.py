@@ -59,6 +59,26 @@ class Filled:
             rotations, root = (np.split(kept[key], ends)[:-1] for key in ("rotations", "root"))
             return cls(kept["found"], rotations, root, kept["followed"], kept["spent"])
 
+    def split(self, count: int) -> list[Filled]:
+        """Undo `joined` of so many parts of the same number of cases."""
+        size = len(self.found) // count
+        ends = np.cumsum(self.found)[size - 1 :: size]
+        return [
+            Filled(
+                self.found[k * size : (k + 1) * size],
+                self.rotations[(ends[k - 1] if k else 0) : ends[k]],
+                self.root[(ends[k - 1] if k else 0) : ends[k]],
+                self.followed[k * size : (k + 1) * size],
+                self.spent[k * size : (k + 1) * size],
+            )
+            for k in range(count)
+        ]
+
+    @classmethod
+    def nothing(cls, count: int) -> Filled:
+        """Return what fills none of so many cases."""
+        return cls(np.zeros(count, dtype=bool), [], [], np.full(count, np.nan), np.zeros(count))
+
     @classmethod
     def joined(cls, parts: Sequence[Filled]) -> Filled:
         """Join what was made of consecutive cases."""
@@ -71,11 +91,22 @@ class Filled:
         )
 
 
-def fill(method: Method, lesson: Lesson, windows: Sequence[Window], cases: Sequence[Case]) -> Filled:
-    """Fill the cases of one family by a method; those that it does not serve or finds no path through stay open."""
-    found, followed, spent = np.zeros(len(cases), dtype=bool), np.full(len(cases), np.nan), np.zeros(len(cases))
-    rotations, root = [], []
+def fill(method: Method, lesson: Lesson, windows: Sequence[Window], cases: Sequence[Case], wanted: Bools) -> Filled:
+    """Fill the cases of one family by a method, those that are wanted [C].
+
+    Cases that the method does not serve or finds no path through stay open.
+    """
+    filled = Filled.nothing(len(cases))
+    found, rotations, root, followed, spent = (
+        filled.found,
+        filled.rotations,
+        filled.root,
+        filled.followed,
+        filled.spent,
+    )
     for k, (window, case) in enumerate(zip(windows, cases, strict=True)):
+        if not wanted[k]:
+            continue
         began = perf_counter()
         try:
             (turned, moved), followed[k] = method(lesson, window, case)
@@ -84,7 +115,7 @@ def fill(method: Method, lesson: Lesson, windows: Sequence[Window], cases: Seque
         spent[k], found[k] = perf_counter() - began, True
         rotations.append(turned.astype(np.float32))
         root.append(moved.astype(np.float32))
-    return Filled(found, rotations, root, followed, spent)
+    return filled
 
 
 # --- methods ----------------------------------------------------------------------------------------------------------
@@ -93,6 +124,11 @@ def fill(method: Method, lesson: Lesson, windows: Sequence[Window], cases: Seque
 def serves(kind: str, case: Case) -> bool:
     """Return whether a rival fills cases of that sort; the engine and the truth fill all."""
     return {"slerp": POSTURES, "nearest segment": POSTURES, "hermite": MOVING}.get(kind, case.given) == case.given
+
+
+def copies(kind: str) -> bool:
+    """Return whether a method makes its movement of what it has learned: all but the truth and interpolation."""
+    return kind not in ("danced", "slerp", "hermite")
 
 
 def rival(kind: str) -> Method:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,9 @@ MEASURING = ("classify", "features", "filled", "measure", "windows")  # modules 
 
 @dataclass(frozen=True)
 class Labels:
-    """A folder with three files of each label: the movement, what made it, and rows measured of it.
+    """A folder with the files of each label: the movement, what made it, and rows measured of it.
+
+    A folder in it has the movement that classifiers learn from, fold by fold.
 
     Attributes:
         folder: where they are.
@@ -44,8 +46,18 @@ class Labels:
         """Write what a method made and, unless it is a rival, what made it."""
         self.folder.mkdir(parents=True, exist_ok=True)
         filled.save(self._path(kind))
+        self._practice(kind).unlink(missing_ok=True)
         if kind not in RIVALS:
             (self.folder / f"{kind}.about").write_text(json.dumps(about))
+
+    def unpractised(self, label: str | None) -> list[str]:
+        """Return the rivals, and the label, without movement that classifiers learn from."""
+        wanted = [*RIVALS, *([label] if label else [])]
+        return [kind for kind in wanted if not self._practice(kind).exists()]
+
+    def keep_practice(self, kind: str, folds: Sequence[Filled]) -> None:
+        """Write what a method made for classifiers to learn from, fold by fold."""
+        Filled.joined(folds).save(self._practice(kind))
 
     def rows(self, name: str, truth: Truth) -> list[Row]:
         """Return the rows of all labels, the rivals first, then the oldest; measured anew if the measures changed."""
@@ -54,16 +66,22 @@ class Labels:
         paths.sort(key=lambda path: order.get(path.stem, len(order)))
         out: list[Row] = []
         for path in paths:
-            rows, stamp = path.with_name(f"{path.stem}.json"), [_MEASURED_BY, path.stat().st_mtime_ns]
+            rows, practice = path.with_name(f"{path.stem}.json"), self._practice(path.stem)
+            stamp = [_MEASURED_BY, *(one.stat().st_mtime_ns for one in (path, practice) if one.exists())]
             found = json.loads(rows.read_text()) if rows.exists() else {}
             if found.get("of") != stamp:
-                found = {"of": stamp, "rows": rows_of(name, path.stem, truth, Filled.load(path))}
+                count = max(truth.folds.values(), default=0) + 1
+                folds = Filled.load(practice).split(count) if practice.exists() else None
+                found = {"of": stamp, "rows": rows_of(name, path.stem, truth, Filled.load(path), folds)}
                 rows.write_text(json.dumps(found))
             out += found["rows"]
         return out
 
     def _path(self, kind: str) -> Path:
         return self.folder / f"{kind}.npz"
+
+    def _practice(self, kind: str) -> Path:
+        return self.folder / "practice" / f"{kind}.npz"
 
 
 def code_of(folder: Path) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,17 +13,18 @@ from numpy.typing import NDArray
 from experiments.harness import Row
 from experiments.inbetween.rivals import Made, slerp
 from experiments.inbetween.run import INNER, Window, power
-from experiments.likeness.classify import CLASSIFIERS, UNKNOWN, told_apart
+from experiments.likeness.classify import CLASSIFIERS, UNKNOWN, Sample, folds_of, lenient, told_apart
 from experiments.likeness.features import LOW_M, cuts, features, feet_of, joints_of, of_upper_body
 from experiments.likeness.filled import Filled
-from experiments.likeness.windows import Case
+from experiments.likeness.windows import POSTURES, Case
 from experiments.material import FPS
-from motionmind._typing import Floats
+from motionmind._typing import Bools, Floats
 from motionmind.geometry import rotations as rot
 from motionmind.metrics import angular_speed, l2q, npss, seen
 
 MOVING_GROUPS = ("arms", "spine", "head", "legs")
 AnyFloats = NDArray[Any]
+PRACTICE_EVERY = 2  # cases: to make what is learned from takes most of the time
 BODIES = ("upper", "whole")
 MEASURES = ("l2q", "slerp", "npss", "power", "followed", "spent")
 COMPARED = (*MOVING_GROUPS, "bounce", "low", "slid")  # each beside the truth's, in the same windows
@@ -48,6 +50,20 @@ class Truth:
         floors = {id(window.piece): window for window in windows}
         floor = {piece: window.floor for piece, window in floors.items()}
         return cls(cases, windows, np.array([floor[id(window.piece)] for window in windows]))
+
+    @cached_property
+    def folds(self) -> dict[str, int]:
+        """The fold of each family that has pieces."""
+        return folds_of([c.family for c in self.cases if c.given == POSTURES for _ in cuts(c.frames)])
+
+    def practice(self, fold: int) -> Bools:
+        """Which cases to learn from before a fold is tested [C]: every second one with pieces, of other folds."""
+        out = np.zeros(len(self.cases), dtype=bool)
+        for key in dict.fromkeys((c.given, c.family, c.frames) for c in self.cases):
+            ks = [k for k, c in enumerate(self.cases) if (c.given, c.family, c.frames) == key]
+            if cuts(key[2]) and self.folds.get(key[1]) != fold:
+                out[ks[::PRACTICE_EVERY]] = True
+        return out
 
     def alike(self, filled: Filled) -> Iterator[Alike]:
         """Yield the cases that were filled, those of the same length and with the same given together."""
@@ -119,12 +135,19 @@ def measured(truth: Truth, filled: Filled) -> dict[str, Floats]:
 # --- rows -------------------------------------------------------------------------------------------------------------
 
 
-def rows_of(name: str, kind: str, truth: Truth, filled: Filled) -> list[Row]:
+def rows_of(name: str, kind: str, truth: Truth, filled: Filled, practised: Sequence[Filled] | None = None) -> list[Row]:
     """Return a row for each take, length and what is given, of what a method made of a dancer's windows.
 
     Measures are means over windows. The classifiers' areas are of all pieces of what is given, so the same in its rows.
+
+    Args:
+        name: the dancer.
+        kind: the method.
+        truth: what was danced.
+        filled: what the method made.
+        practised: what it made without a fold's families, for each fold, to learn from; None for a lenient test.
     """
-    found, areas = measured(truth, filled), areas_of(truth, filled)
+    found, areas = measured(truth, filled), areas_of(truth, filled, practised)
     groups: dict[tuple[str, str, str, float], list[int]] = {}
     for k, case in enumerate(truth.cases):
         if filled.found[k]:
@@ -145,37 +168,38 @@ def _weighted(values: Floats, weights: Floats) -> float:
     return float(np.average(values[known], weights=weights[known])) if known.any() else float("nan")
 
 
-def areas_of(truth: Truth, filled: Filled) -> dict[str, Row]:
+def areas_of(truth: Truth, filled: Filled, practised: Sequence[Filled] | None) -> dict[str, Row]:
     """Return how well each classifier tells a method's pieces from the dancer's, by what is given."""
     out = {}
     for given in dict.fromkeys(case.given for case in truth.cases):
-        made, danced, families = pieces_of(truth, filled, given)
-        same = not families or all(np.array_equal(made[name], danced[name]) for name in made)
-        row: Row = {"pieces": len(families)}
+        tested, names = pieces_of(truth, filled, given)
+        fold = np.array([truth.folds[family] for family in tested.families], dtype=np.int64)
+        same = np.array_equal(tested.danced, tested.made)
+        learned = [pieces_of(truth, one, given)[0] for one in practised] if practised else lenient(tested, fold)
+        row: Row = {"pieces": len(fold), "lenient": int(practised is None)}
         for body in BODIES:
-            kept = [name for name in made if body == "whole" or of_upper_body(name)]
+            kept = np.array([body == "whole" or of_upper_body(name) for name in names], dtype=bool)
             for classifier, make in CLASSIFIERS.items():
                 area = UNKNOWN
                 if not same:
-                    x, y = (np.stack([one[name] for name in kept], axis=1) for one in (danced, made))
-                    area = told_apart(x, y, families, make)
+                    shown = [Sample(one.danced[:, kept], one.made[:, kept], one.families) for one in (tested, *learned)]
+                    area = told_apart(shown[0], fold, shown[1:], make)
                 key = f"{body} {classifier}"
                 row |= {key: area.value, f"{key} low": area.low, f"{key} high": area.high}
         out[given] = row
     return out
 
 
-def pieces_of(truth: Truth, filled: Filled, given: str) -> tuple[dict[str, Floats], dict[str, Floats], list[str]]:
-    """Return features of the pieces that a method made and of those danced, and the family of each."""
+def pieces_of(truth: Truth, filled: Filled, given: str) -> tuple[Sample, list[str]]:
+    """Return the pieces that a method made of what is given, and the names of their features."""
     skeleton = truth.windows[0].piece.skeleton
-    made, danced, families = [], [], []
+    made, danced, families, names = [np.empty((0, 0))], [np.empty((0, 0))], [], []
     for one in truth.alike(filled):
         if one.given == given and cuts(one.frames):
-            made.append(features(skeleton, *one.made, one.floor))
-            danced.append(features(skeleton, *one.danced, one.floor))
+            for parts, way in ((made, one.made), (danced, one.danced)):
+                found = features(skeleton, *way, one.floor)
+                names = list(found)
+                parts.append(np.stack(list(found.values()), axis=1))
             families += [truth.cases[k].family for k in one.ks for _ in cuts(one.frames)]
-    return _joined(made), _joined(danced), families
-
-
-def _joined(parts: Sequence[dict[str, Floats]]) -> dict[str, Floats]:
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts else {}
+    first = 1 if families else 0
+    return Sample(np.concatenate(danced[first:]), np.concatenate(made[first:]), families), names

@@ -20,9 +20,10 @@ import click
 
 import motionmind
 from experiments.harness import Row, Setting, single_threaded
-from experiments.inbetween.run import GAPS, TUNED_ON, keep_apart, lesson_of
-from experiments.likeness.filled import RIVALS, Filled, Method, engine, fill, rival
+from experiments.inbetween.run import GAPS, TUNED_ON
+from experiments.likeness.filled import RIVALS, Method, copies, engine, rival
 from experiments.likeness.labels import Labels, code_of
+from experiments.likeness.making import Maker
 from experiments.likeness.measure import Truth, rows_of
 from experiments.likeness.tables import board, board_of_takes, chart, tell
 from experiments.likeness.windows import cases_of, key_of, window_of
@@ -49,46 +50,26 @@ def jobs(setting: Setting) -> list[dict[str, Any]]:
 
 def work(data: str | None, name: str, gaps: list[float], count: int, most: int | None) -> list[Row]:
     """Fill the windows of a dancer with what was learned without their family, and measure each method's results."""
+    maker = maker_of(data, name, gaps, count, most)
+    methods = methods_of(ENGINES)
+    filled = maker.fill(methods)
+    practised = maker.practise({kind: method for kind, method in methods.items() if copies(kind)})
+    return [row for kind, one in filled.items() for row in rows_of(name, kind, maker.truth, one, practised.get(kind))]
+
+
+def maker_of(
+    data: str | None, name: str, gaps: Sequence[float], count: int, most: int | None, report: bool = False
+) -> Maker:
+    """Choose the windows of a dancer."""
     together = families(data, name)[:most]
     cases = cases_of(data, name, together, gaps, count)
     truth = Truth.of(cases, [window_of(data, name, case) for case in cases])
-    methods = methods_of(ENGINES)
-    return [
-        row
-        for kind, filled in filled_by(methods, data, name, together, truth).items()
-        for row in rows_of(name, kind, truth, filled)
-    ]
+    return Maker(data, name, together, truth, report)
 
 
 def methods_of(engines: dict[str, dict[str, Any]]) -> dict[str, Method]:
     """Return the truth, the rivals and engines with some options, by name."""
     return {kind: rival(kind) for kind in RIVALS} | {label: engine(options) for label, options in engines.items()}
-
-
-def filled_by(
-    methods: dict[str, Method],
-    data: str | None,
-    name: str,
-    together: Sequence[Sequence[str]],
-    truth: Truth,
-    report: bool = False,
-) -> dict[str, Filled]:
-    """Return what methods make of cases, which are in the order of their families; report each on standard error."""
-    parts: dict[str, list[Filled]] = {kind: [] for kind in methods}
-    for takes in together:
-        ks = [k for k, case in enumerate(truth.cases) if case.family == takes[0]]
-        if not ks:
-            continue
-        began = perf_counter()
-        lesson = lesson_of(data, (name,), tuple(takes))
-        keep_apart(lesson.engine.corpus, list(takes))
-        learned = perf_counter()
-        for kind, method in methods.items():
-            parts[kind].append(fill(method, lesson, [truth.windows[k] for k in ks], [truth.cases[k] for k in ks]))
-        if report:
-            spent = f"learned {learned - began:.1f} s, filled {perf_counter() - learned:.1f} s"
-            click.echo(f"{name} {takes[0]}: {len(ks)} windows, {spent}", err=True)
-    return {kind: Filled.joined(found) for kind, found in parts.items()}
 
 
 # --- labels -----------------------------------------------------------------------------------------------------------
@@ -109,6 +90,7 @@ def filled_by(
     help="Another folder whose labels are shown, too, such as one of another checkout.",
 )
 @click.option("--show", multiple=True, help="Show only this label, and others named like this, beside the rivals.")
+@click.option("--lenient", is_flag=True, help="Learn to tell from the same movement: quicker, kind to copies.")
 @click.option("--again", is_flag=True, help="Make the label's movement anew.")
 def main(
     names: tuple[str, ...],
@@ -120,23 +102,24 @@ def main(
     data: str,
     baseline: tuple[Path, ...],
     show: tuple[str, ...],
+    lenient: bool,
     again: bool,
 ) -> None:
     warnings.simplefilter("ignore", motionmind.MotionMindWarning)  # lengths are the recording's: some are fast
     about = {"options": json.loads(options), "engine": code_of(Path(motionmind.__file__).parent)}
     for name in names:
         began = perf_counter()
-        together = families(data, name)[:most]
-        cases = cases_of(data, name, together, GAPS, windows)
-        truth = Truth.of(cases, [window_of(data, name, case) for case in cases])
-        inside = Path(name) / f"{windows}-{key_of(cases)}"
+        maker = maker_of(data, name, GAPS, windows, most, report=True)
+        truth = maker.truth
+        inside = Path(name) / f"{windows}-{key_of(truth.cases)}"
         labels = Labels(out / inside)
+        methods = methods_of({label: about["options"]} if label else {})
         missing = labels.missing(label, about, again)
-        if missing:
-            engines = {label: about["options"]} if label else {}
-            methods = {kind: method for kind, method in methods_of(engines).items() if kind in missing}
-            for kind, filled in filled_by(methods, data, name, together, truth, report=True).items():
-                labels.keep(kind, filled, about)
+        for kind, filled in maker.fill({kind: methods[kind] for kind in missing}).items():
+            labels.keep(kind, filled, about)
+        unpractised = [] if lenient else [kind for kind in labels.unpractised(label) if copies(kind)]
+        for kind, folds in maker.practise({kind: methods[kind] for kind in unpractised}).items():
+            labels.keep_practice(kind, folds)
         made = perf_counter()
         rows = labels.rows(name, truth)
         for other in baseline:
@@ -144,7 +127,7 @@ def main(
             rows += [row | {"kind": f"{other.name}/{row['kind']}"} for row in found if row["kind"] not in RIVALS]
         if show:
             rows = [row for row in rows if row["kind"] in (*RIVALS, *show)]
-        title = f"{name}: {len(together)} families, {len(cases)} windows"
+        title = f"{name}: {len(maker.together)} families, {len(truth.cases)} windows"
         click.echo(f"\n## {title}\n\n{board(rows)}\n\n{board_of_takes(rows)}")
         click.echo(f"\n{name}: made in {made - began:.0f} s, measured in {perf_counter() - made:.0f} s", err=True)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from experiments.charts import Panel, svg
 from experiments.harness import Row, markdown
-from experiments.likeness.filled import RIVALS
+from experiments.likeness.filled import RIVALS, copies
 from experiments.likeness.measure import AREAS, MOVING_GROUPS
 from experiments.likeness.windows import POSTURES
 from motionmind._typing import Floats
@@ -205,7 +205,8 @@ def _method(row: Row) -> str:
 def _area(row: Row, area: str, spread: bool = False) -> str:
     if not np.isfinite(row[area]):
         return ""
-    return f"{row[area]:.2f}" + (f" ({row[f'{area} low']:.2f} to {row[f'{area} high']:.2f})" if spread else "")
+    value = f"{row[area]:.2f}" + ("~" if row["lenient"] and copies(str(row["kind"])) else "")
+    return value + (f" ({row[f'{area} low']:.2f} to {row[f'{area} high']:.2f})" if spread else "")
 
 
 def _spread(rows: list[Row]) -> str:
