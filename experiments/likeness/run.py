@@ -54,7 +54,8 @@ def work(data: str | None, name: str, gaps: list[float], count: int, most: int |
     methods = methods_of(ENGINES)
     filled = maker.fill(methods)
     practised = maker.practise({kind: method for kind, method in methods.items() if copies(kind)})
-    return [row for kind, one in filled.items() for row in rows_of(name, kind, maker.truth, one, practised.get(kind))]
+    rows = [row for kind, one in filled.items() for row in rows_of(name, kind, maker.truth, one, practised.get(kind))]
+    return [{key: value for key, value in row.items() if key != "spent"} for row in rows]  # the same again
 
 
 def maker_of(

@@ -224,7 +224,7 @@ def _beside(rows: list[Row], base: list[Row]) -> str:
 
 
 def _counted(rows: list[Row]) -> str:
-    return f"{100 * gain(rows):.1f} ({sum(row['windows'] for row in rows)})" if rows else ""
+    return f"{_percent(gain(rows))} ({sum(row['windows'] for row in rows)})" if rows else ""
 
 
 def _percent(share: float, unit: str = "") -> str:
