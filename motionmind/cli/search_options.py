@@ -212,6 +212,21 @@ SEARCH_OPTIONS = (
         advanced=True,
     ),
     SearchOption(
+        "liveliness",
+        "--liveliness",
+        _MOTION,
+        "Move like the mean of what the corpus does on such a way (0), or like one passage of it (1).",
+        Number(min=0, max=1),
+    ),
+    SearchOption(
+        "passage",
+        "--passage",
+        _MOTION,
+        "Follow the corpus's passage that begins at CLIP@TIME, such as adagio@3.2s, in place of the mean.",
+        str,
+        "CLIP@TIME",
+    ),
+    SearchOption(
         "without",
         "--without",
         _MOTION,

@@ -328,22 +328,18 @@ def seek() -> None:
 
 
 def learn() -> None:
-    """Learn a clip anew, find its moves in the corpus, realise them by few of its moments; sample a path; read it."""
+    """Learn a clip anew, realise its moves by few of its moments; sample a path; read it."""
     from motionmind.discretize import make_discretization
     from motionmind.learned.neighbours import build_neighbours
     from motionmind.search.sample import sample_path
     from motionmind.search.solve import solve
     from motionmind.tween.engine import Engine
-    from motionmind.walks.detail import likest_moves, moves_near
 
     engine = Engine.load("ballet")
     clip = engine.corpus.motion(engine.corpus.clips[0])
-    moves = engine.corpus.moves
     trees = build_neighbours(engine.corpus.skeleton, engine.carriage.orientations, engine.carriage.weights)
     of_few = replace(engine.carriage, trees=trees)
     _realise(engine, of_few)
-    for among in (None, moves_near(moves, of_few, clip.rotations)):
-        likest_moves(moves, engine.corpus.rotations, clip.rotations, among)
     Engine.fit([clip], discretization=make_discretization("codebook", 15.0)).check()
     problem = _problem()
     sample_path(problem, solve(problem), 0)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motionmind._typing import Bools, Floats, Int32s, Ints
+from motionmind._typing import Bools, Floats, Int32s
 from motionmind.body.contact import lowest_height
 from motionmind.body.limits import within_limits
 from motionmind.body.motion import Insertion, Motion, Posture, Velocity
@@ -24,7 +24,7 @@ from motionmind.footing.feet import KNEE
 from motionmind.footing.ground import Given, Stance, ends_in_air, floors_at_ends, set_on_floor
 from motionmind.footing.legs import find_legs
 from motionmind.geometry import rotations as rot
-from motionmind.geometry.splines import natural_spline, rotation_spline
+from motionmind.geometry.splines import rotation_spline
 from motionmind.grammar.grammar import Grammar
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.bending import allowed_off, bend_to_states
@@ -41,14 +41,18 @@ from motionmind.realise.retime import (
 )
 from motionmind.realise.settling import keeper, settled
 from motionmind.realise.timeline import Timeline, stretch, timeline
-from motionmind.walks.detail import detail_of, likest_moves, moves_near, share_of_detail
 from motionmind.walks.expectation import Expectation, expect
 from motionmind.walks.headings import travel_along
 from motionmind.walks.minimal import departure
+from motionmind.walks.passages import Danced, Place, dance
 from motionmind.walks.stops import Stop, stop_at
 
-# Power of the trust in walks by which their detail is trusted: roughness is less particular than movement.
-LINGERS = 0.1
+# Of a passage's displacement that legs get: feet find their places elsewhere. Chosen on ballet: with all of it a foot
+# that stands makes a step; with none, legs are as slow as the mean's.
+LEGS_SHARE = 0.4
+DANCED_WITHIN = (
+    0.9  # tolerances by which a dance may take a joint off its state, with room for the arc between two frames
+)
 _SAME = 1e-9  # radians: two orientations no farther apart are the same but for rounding
 _UNSEEN = 2e-3  # radians: a joint that comes back to where it began, and goes no farther, does not move
 
@@ -58,12 +62,12 @@ class Realised(NamedTuple):
 
     Attributes:
         motion: the motion.
-        detail: the corpus's moves whose fine detail it has, one after another; none if the corpus keeps no detail.
+        danced: the passage of the corpus that it is danced like; None if like none.
         left_out: share of walks that begin or end in moments that others stand for (`mean_walk.MeanWalk`).
     """
 
     motion: Motion
-    detail: Ints
+    danced: Danced | None
     left_out: float
 
 
@@ -87,6 +91,8 @@ def realise(
     fastest: Floats | None = None,
     peaks: Callable[[float, float], Floats] | None = None,
     slides: float = np.inf,
+    liveliness: float = 0.5,
+    place: Place | None = None,
 ) -> Realised:
     """Return the motion from posture `a` to posture `b` in the moves of a path, on the body of `a`.
 
@@ -94,7 +100,7 @@ def realise(
     in the postures there. Between them the body is, at the times of the moves, at the mean of the walks that the corpus
     knows from `a` to `b` in that time and that count the more the nearer they are to the path
     (`motionmind.walks.likelihood`); a C2 spline joins them. Where that leaves a chain too far from its state, the
-    movement is bent towards it, smoothly. Fine detail of the corpus's recordings is added (`motionmind.walks.detail`).
+    movement is bent towards it, smoothly. It is danced like a passage of the corpus (`motionmind.walks.passages`).
 
     Feet that stand carry the body; where none stands it travels as the corpus's bodies do, and it ends where `b`
     stands. The legs hold what one root cannot (`motionmind.footing.feet`), but for those with `fixed` joints. The
@@ -125,10 +131,12 @@ def realise(
         peaks: returns what the greatest of movement of so many seconds keep to at a pace [J + 4], as
             `motionmind.learned.pace.Pace.peaks_in` does; None for any.
         slides: speed of a foot near the floor, heights/s, that movement with `peaks` keeps to at a pace of 1.
+        liveliness: from 0, the mean of walks, to 1, a passage of the corpus (`motionmind.walks.passages`).
+        place: where in the corpus that passage begins; None for any.
     """
     if len(path) == 1:
         still = Motion(a.skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", (Insertion(np.zeros(1)),))
-        return Realised(still, np.zeros(0, dtype=np.int64), 0.0)
+        return Realised(still, None, 0.0)
     clock = timeline(path, grammar.transitions, fps, length)
     postures = {0: a, **through, len(path) - 1: b}
     stops = {move: stop_at(corpus, posture) for move, posture in postures.items()}
@@ -159,9 +167,10 @@ def realise(
                 longer *= _for_jumps(walk, longer, corpus, a.skeleton, stance, low, moving, pace * fastest)
         clock, half_steps = stretch(clock, walk.half_steps, longer, fps)
         walk, stance = walk._replace(half_steps=half_steps), stance._replace(half_steps=half_steps)
-    smooth, quick = corpus.from_chains(walk.chains(corpus, clock.frames)), None if fastest is None else pace * fastest
-    detail, detailed = _detail(walk, clock, corpus, carriage, smooth, quick)
-    rotations = rot.mul(smooth, rot.exp(detail))
+    quick = None if fastest is None else pace * fastest
+    danced = _danced(walk, clock, stops, corpus, carriage, liveliness, place, states, tolerances, fixed)
+    chains = walk.chains(corpus, clock.frames)
+    rotations = corpus.from_chains(danced.move(chains, clock.frames) if danced else chains)
     rotations = _with_rates(rotations, clock, [*stops], leaving, arriving)
     # Once so that feet find places to stand at, and once for where they have been put.
     keep_apart = keeper(clock, [*stops], fixed, wished, carriage, a.skeleton, without)
@@ -170,13 +179,11 @@ def realise(
     greatest = None if windows is None else windows(LONGER * float(clock.frames[-1]), pace)
     most = None if peaks is None else greatest
     if most is not None:
-        high = np.sqrt(2.0 * GRAVITY * stance.leaps) > JUMPS_AT * most[-2] * a.skeleton.height
-        high[given] = False
-        stance = stance._replace(aloft=np.where(high, 0.0, stance.aloft))
+        stance = _without_high_jumps(stance, JUMPS_AT * most[-2] * a.skeleton.height, given)
     rotations, root = set_on_floor(
         a.skeleton,
         rotations,
-        rot.mul(rotations, rot.exp(-detail)) if len(detailed) else rotations,
+        rotations,
         clock.frames,
         stance,
         Given(low, (a.root, b.root), (_rate(leaving), _rate(arriving))),
@@ -201,7 +208,7 @@ def realise(
         if length is None:
             greatest = _quickest(greatest, speeds, pace, len(a.skeleton))
         motion, clock = slow_down(motion, clock, greatest, moving, pace * slides, settle, lasts=length is not None)
-    return Realised(replace(motion, name="tween", insertions=(Insertion(clock.moves),)), detailed, walk.left_out)
+    return Realised(replace(motion, name="tween", insertions=(Insertion(clock.moves),)), danced, walk.left_out)
 
 
 def _allowed(body: Skeleton, fixed: Bools, carriage: Carriage, quick: Floats | None, most: Floats | None) -> Allowed:
@@ -280,6 +287,13 @@ def _stance(walk: Expectation, carriage: Carriage, travel: Floats, size: float, 
     )
 
 
+def _without_high_jumps(stance: Stance, fastest: float, given: Sequence[int]) -> Stance:
+    """Return a stance that leaves the floor at most so fast, metres a second, but for the half steps that are given."""
+    high = np.sqrt(2.0 * GRAVITY * stance.leaps) > fastest
+    high[given] = False
+    return stance._replace(aloft=np.where(high, 0.0, stance.aloft))
+
+
 def _for_jumps(
     walk: Expectation,
     longer: Floats,
@@ -328,36 +342,46 @@ def _quickest(most: Floats, speeds: Floats | None, pace: float, joints: int) -> 
     return out
 
 
-def _detail(
-    walk: Expectation, clock: Timeline, corpus: Corpus, carriage: Carriage, smooth: Floats, fastest: Floats | None
-) -> tuple[Floats, Ints]:
-    """Return the corpus's fine detail of a walk, rotation vectors [N, J, 3], and the moves that it comes from.
+def _danced(
+    walk: Expectation,
+    clock: Timeline,
+    stops: Mapping[int, Stop],
+    corpus: Corpus,
+    carriage: Carriage,
+    liveliness: float,
+    place: Place | None,
+    states: Floats,
+    tolerances: Floats,
+    fixed: Bools,
+) -> Danced | None:
+    """Return how a walk is danced; no joint leaves its states' tolerance for that, and `fixed` ones do not move.
 
-    Each joint has it as far as it is trusted to the corpus's walks, to the power of LINGERS, and less or more of it
-    where the body moves slower than in the moves that it comes from (`share_of_detail`): never so much more that a
-    joint of the `smooth` movement [N, J, 4] is too fast.
+    Args:
+        walk: the movement at its half steps.
+        clock: its times.
+        stops: what is passed exactly, by the number of moves that lead there.
+        corpus: what it was learned from.
+        carriage: how its bodies hold themselves.
+        liveliness: from 0 to 1, as `motionmind.walks.passages.dance` takes it.
+        place: where the passage begins; None for any.
+        states: orientations of the path's states at the moves [T + 1, L, 4].
+        tolerances: radians within which a state of each chain stands for an orientation [L].
+        fixed: chains that are not displaced [L].
     """
-    between, joints = corpus.detail.shape[1], walk.poses.shape[1]
-    if not between:
-        return np.zeros((len(clock.frames), joints, 3)), np.zeros(0, dtype=np.int64)
-    orientations, poses, at = carriage.orientations[: len(corpus)], walk.poses[::2], walk.half_steps[::2]
-    moves = likest_moves(corpus.moves, orientations, poses, moves_near(corpus.moves, carriage, poses))
-    of_legs, of_others = share_of_detail(corpus.moves, orientations[:, :joints], moves, poses, np.diff(at))
-    times, own = subdivide_times(at, between), detail_of(corpus, moves)
-
-    def scaled(share: Floats) -> Floats:
-        scale = np.repeat(share[:, None] * walk.trust[::2] ** LINGERS, between + 1, axis=0)
-        return natural_spline(times, own * np.concatenate([scale, scale[-1:]])[..., None], clock.frames)
-
-    calm, lively = scaled(of_legs), scaled(of_others)
-    kept = [joint for leg, _ in find_legs(corpus.skeleton)[1] for joint in leg]
-    lively[:, kept] = calm[:, kept]
-    if fastest is not None:
-        made = rot.mul(smooth, rot.exp(lively))
-        speeds = rot.angle(made[:-1], made[1:]) / np.diff(clock.frames)[:, None]
-        quick = np.any(speeds > fastest[:joints], axis=0)
-        lively[:, quick] = calm[:, quick]
-    return lively, moves
+    passed = {float(clock.moves[move]): stop for move, stop in stops.items()}
+    danced = dance(corpus, carriage, walk, passed, liveliness, place)
+    if danced is None:
+        return None
+    chains, joints = walk.chains(corpus, clock.moves), danced.off.shape[1]
+    off, most = danced.at(clock.moves), DANCED_WITHIN * tolerances[:joints]
+    moved = danced.move(chains, clock.moves)
+    before, after = (rot.angle(found[:, :joints], states[:, :joints]) for found in (chains, moved))
+    room = np.maximum(most - before, 0.0) / np.maximum(rot.norm(off), 1e-9)
+    share = np.where(after <= np.maximum(most, before), 1.0, np.minimum(room, 1.0))
+    share[:, fixed[:joints]] = 0.0
+    share[:, [joint for leg, _ in find_legs(corpus.skeleton)[1] for joint in leg]] *= LEGS_SHARE
+    shares = np.stack([np.interp(danced.times, clock.moves, own) for own in share.T], axis=1)
+    return danced._replace(off=shares[..., None] * danced.off)
 
 
 def _with_rates(

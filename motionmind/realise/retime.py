@@ -14,6 +14,7 @@ not in the air, where the body falls as it does. One that dips as fast with its 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -187,6 +188,7 @@ def slow_down(
         settle: returns a slower movement in which limbs do not meet and who is slower is in balance; None for as it is.
         lasts: whether it is to last as long as before: then what is slower takes its time from where nothing is fast.
     """
+    given = clock
     for again in range(AGAIN if settle else 1):
         before = clock
         for number in range(ROUNDS):
@@ -200,6 +202,11 @@ def slow_down(
         if settle is None or clock is before:
             break
         motion = settle(motion, clock)
+    if lasts and clock is not given:  # it is given to the last digit how long it lasts
+        end = given.frames[-1]
+        frames = np.append(np.minimum(clock.frames[:-1], end), end)
+        clock = clock._replace(frames=frames, moves=np.append(np.minimum(clock.moves[:-1], end), end))
+        motion = replace(motion, times=frames)
     return motion, clock
 
 

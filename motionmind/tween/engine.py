@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import islice
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Literal
@@ -35,6 +37,7 @@ from motionmind.tween.certificate import Bridge, Source, break_down_cost, source
 from motionmind.tween.constraints import find_conflicts
 from motionmind.tween.crediting import credit_tween
 from motionmind.tween.formulate import Formulation, formulate
+from motionmind.tween.modes import Modes
 from motionmind.tween.nearest_body import diagnose_posturewise
 from motionmind.tween.pacing import tempo_of, worded
 from motionmind.tween.problem import ingredients_of
@@ -43,6 +46,7 @@ from motionmind.tween.result import Tween
 from motionmind.tween.what_if import Answer, WhatIf, find_what_if
 from motionmind.tween.whole_body import Bodies, find_bodies, solve_posturewise
 
+TRIED = 2  # passages that are tried for an alternative, at most, before it is a variant of the best movement
 SAME_ANGLE = 0.1  # degrees: a movement that was bent to within a tolerance is within it to this, as frames tell
 
 if TYPE_CHECKING:
@@ -147,8 +151,11 @@ class Engine(LearnedCorpus):
     ) -> Iterator[Tween]:
         """Find the best movement, then others with as many moves, each of which differs from all before by `differ`.
 
-        Samples (`sample`) differ by their seeds instead, the one that is asked for and those that follow it. What
-        restrictions cost (`what_if`) is reported of the first.
+        The others are danced like passages of the corpus that lead from A to B in other ways, which their
+        `request.passage` names. Their paths follow these, so their costs are not to be compared with the best one's.
+        Where the corpus shows no other way, they are the next best paths. Samples (`sample`) differ by their seeds
+        instead, the one that is asked for and those that follow it. What restrictions cost (`what_if`) is reported of
+        the first.
 
         Args:
             a: where the motion starts, exactly.
@@ -161,7 +168,8 @@ class Engine(LearnedCorpus):
             options: see `tween`.
 
         Yields:
-            The tweens. The cost of each is least among what differs from those before, as far as its bound says.
+            The tweens. The cost of each is least among what differs from those before, as far as its bound says, for
+            the passage that it is danced like.
 
         Raises:
             NoPathError: nothing joins the postures, or, after the first tween, nothing else differs by so much.
@@ -170,19 +178,32 @@ class Engine(LearnedCorpus):
         >>> engine = Engine.load("ballet")
         >>> motion = engine.corpus.motion(engine.corpus.clips[0])
         >>> best, other = engine.alternatives(motion.posture(0), motion.posture(9), 2)
-        >>> other.moves == best.moves, other.cost >= best.cost, min(other.differs) >= 0.2
-        (True, True, True)
+        >>> other.moves == best.moves, min(other.differs) >= 0.2, other.request.passage
+        (True, True, 'adagio@0.000s')
         """
         check_integer("count", count)
         request = TweenRequest.of(request, **options)
         found: list[Tween] = []
-        for number in range(count):
-            other: dict[str, Any] = {"unlike": (*request.unlike, *found)}
-            if request.sample:
-                other = {"seed": request.seed + number}
-            if found:
-                other["what_if"] = False
-            found.append(self.tween(a, b, request, before=before, after=after, watch=watch, **other))
+        modes: Modes | None = None
+        passages: Iterator[str] = iter(())
+
+        def find(**other: Any) -> Tween:
+            unlike = {"seed": request.seed + len(found)} if request.sample else {"unlike": (*request.unlike, *found)}
+            first = {"what_if": False} if found else {}
+            return self.tween(a, b, request, before=before, after=after, watch=watch, **unlike, **first, **other)
+
+        while len(found) < count:
+            tween = None
+            for passage in islice(passages, TRIED):
+                with suppress(NoPathError):
+                    tween = find(passage=passage)
+                    break
+            found.append(tween or find())
+            if modes is not None:
+                modes.know(found[-1].motion)
+            elif request.takes_passages and found[-1].moves > 1:
+                modes = Modes(self, found[-1].motion, found[-1].before is not None, found[-1].after is not None)
+                passages = iter(modes)
             yield found[-1]
 
     def _find_path(self, formulation: Formulation, watch: Watch | None) -> Certificate:
@@ -248,6 +269,8 @@ class Engine(LearnedCorpus):
             self.pace.fastest if paced else None,
             self.pace.peaks_in if paced else None,
             float(self.plausibility.slides[0]) if paced else np.inf,
+            0.0 if request.posturewise else request.liveliness,
+            formulation.place,
         )
 
     def _account_for(
@@ -278,13 +301,14 @@ class Engine(LearnedCorpus):
             warnings.warn(
                 f"faster than anything in the corpus: {worded(tempo.faster)}", MotionMindWarning, stacklevel=3
             )
-        moves = self.corpus.moves.take(realised.detail)
+        begins = np.zeros(0, dtype=np.int64) if realised.danced is None else realised.danced.passage.postures
+        last = self.corpus.columns.starts[np.searchsorted(self.corpus.columns.starts, begins, side="right")] - 1
         # A curve through the frames: a move may fall between two, and the arc between them is a chord.
         reached = rotation_spline(motion.times, motion.rotations, motion.insertions[0].times)
         path_degrees = self.space.distance(self.corpus.to_chains(reached), path)
         followed = path_degrees <= self.space.tolerances + SAME_ANGLE
         shown = _shown(sources, followed)
-        found = tuple(sources_of(self.corpus, moves.begins, moves.ends, [""] * len(moves)))
+        found = tuple(sources_of(self.corpus, begins, np.minimum(begins + 1, last), [""] * len(begins)))
         return Tween(
             motion=_credited(motion, credit_tween(self.corpus, shown, found, motion.insertions[0].times)),
             joints=self.corpus.chains,

@@ -30,11 +30,13 @@ from motionmind.search.problem import Model, Problem, Rules, Via
 from motionmind.search.solve import MOST_STATES_OF_CHAIN
 from motionmind.tween.constraints import Constraint, constraints_of, restrict
 from motionmind.tween.guide import find_detour, make_guide
+from motionmind.tween.modes import find_place
 from motionmind.tween.nearest_body import nearest_posture
 from motionmind.tween.pacing import UsualTime, tolls, usual_times
 from motionmind.tween.problem import build_model
 from motionmind.tween.progression import lift_to_moves
 from motionmind.tween.request import MOST_MOVES, TweenRequest
+from motionmind.walks.passages import Place
 
 _Movement = TypeVar("_Movement", Motion, Posture)
 
@@ -67,6 +69,7 @@ class Formulation:
         usual_moves: how many moves of the corpus's usual length a given duration holds, where that is too few to lead
             to B, and more are made; None elsewhere.
         detours: whether what the corpus does before and after such postures fills time that is left over.
+        place: where the passage begins that it is to be danced like; None for any.
     """
 
     a: Posture
@@ -87,6 +90,7 @@ class Formulation:
     times: tuple[UsualTime, ...]
     usual_moves: int | None
     detours: bool
+    place: Place | None
 
     @property
     def wished(self) -> Bools:
@@ -167,12 +171,14 @@ def formulate(
     searched, coordination = problem, learned.grammar.coordination
     if by_moves:
         searched, coordination = _lifted(learned, problem, factor)
-    detour = None
+    detour, place = None, find_place(learned.corpus, request.passage) if request.passage else None
     if request.kappa:
         rows = problem.model.starts[:-1].repeat(np.diff(searched.model.starts)) + searched.model.place
-        if request.paced and request.duration is not None:
+        if request.paced and request.duration is not None and place is None:
             detour = find_detour(learned, (a, b), (leaving, arriving), request.duration)
-        guide = make_guide(learned, (a, b), (leaving, arriving), request.kappa, request.duration, rows, detour)
+        ends, velocities = (a, b), (leaving, arriving)
+        length, lively = request.duration, request.liveliness
+        guide = make_guide(learned, ends, velocities, request.kappa, length, rows, detour, lively, place)
         searched = replace(searched, guide=guide)
     times = usual_times(learned, (a, *through, b))
     if request.paced:
@@ -196,6 +202,7 @@ def formulate(
         times,
         usual_moves,
         detour is not None,
+        place,
     )
 
 

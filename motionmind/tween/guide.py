@@ -30,7 +30,8 @@ from motionmind.realise.timeline import usual
 from motionmind.tween.pacing import usual_times
 from motionmind.walks.expectation import expect
 from motionmind.walks.minimal import NO_WAY
-from motionmind.walks.stops import stop_at
+from motionmind.walks.passages import Place, dance
+from motionmind.walks.stops import Stop, stop_at
 
 CREEPING = 0.25  # share of the time in which walks may creep
 SELDOM = 2.0  # standard deviations: dancers seldom, one time in forty, take so long for so far a way
@@ -45,6 +46,8 @@ def make_guide(
     duration: float | None,
     rows: Ints,
     path: Floats | None = None,
+    liveliness: float = 0.0,
+    place: Place | None = None,
 ) -> Callable[[int], Floats]:
     """Return the guide of a search from one posture to another, as `motionmind.search.problem.Problem` takes it.
 
@@ -59,6 +62,8 @@ def make_guide(
         rows: the row of the grammar's states that each row of the searched model is at [G].
         path: orientations of the joints that walks are to be near to, after each move of the corpus's usual length
             that the duration holds, as `find_detour` gives them; None for all walks.
+        liveliness: of the motion, from 0 to 1: the guide is danced as the motion will be.
+        place: where in the corpus a passage begins that the path is to follow, in place of the mean; None for none.
     """
     space, seconds = learned.space, usual(learned.grammar.transitions)
     stops = [stop_at(learned.corpus, *end) for end in zip(ends, velocities, strict=True)]
@@ -74,6 +79,11 @@ def make_guide(
         chains = expected.chains(learned.corpus, at)
         if path is not None:  # the walks near it are its mean with what is like it, and move less
             chains[:, : path.shape[1]] = rotation_spline(half_steps[::2], path, at)
+        else:
+            met: dict[float, Stop] = {0.0: stops[0], length: stops[1]}
+            danced = dance(learned.corpus, learned.carriage, expected, met, 1.0 if place else liveliness, place)
+            if danced is not None:
+                chains = danced.move(chains, at)
         price = kappa * length / moves / MOVE
         return price * departures(chains, space.centres, space.starts, np.radians(space.tolerances))[:, rows]
 

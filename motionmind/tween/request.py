@@ -87,6 +87,11 @@ class TweenRequest:
         bridge_price: nats for each degree of an unattested move.
         guide: kappa, nats for a joint that is off what walks through the corpus expect by its tolerance for 0.2 s; 0
             leaves their guide out. It shrinks as novelty grows, and a search of whole postures has none.
+        liveliness: from 0, where the motion is the mean of what the corpus does on such a way, to 1, where it is one
+            passage of the corpus, displaced to lead from A to B; between these it has the mean's slow movement, and the
+            passage's quick one.
+        passage: a passage of the corpus that the movement follows in place of the mean, by its clip and the time at
+            which it begins there: "adagio@3.2s"; None for none.
         without: corrections of the movement to leave out: see `motionmind.footing.corrections`.
         fps: frames a second of the motion.
 
@@ -128,6 +133,8 @@ class TweenRequest:
     tau: float = 1.0
     bridge_price: float = 1.0
     guide: float = 1.0
+    liveliness: float = 0.5
+    passage: str | None = None
     without: Sequence[Correction] = ()
     fps: float = 30.0
 
@@ -162,7 +169,7 @@ class TweenRequest:
             raise MotionMindError(f"pace must be a factor of the speed from {slowest} to {fastest:g}, not {self.pace}")
         if self.duration is not None and self.pace != 1.0:
             raise MotionMindError("a duration says how fast to move; leave out pace")
-        for name in ("novelty", "differ", "within"):
+        for name in ("novelty", "differ", "within", "liveliness"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise MotionMindError(f"{name} must be a number from 0 to 1, not {getattr(self, name)}")
         for name in ("lambda_", "beta", "tau", "bridge_price", "guide"):
@@ -181,8 +188,22 @@ class TweenRequest:
         check_integer("memory", self.memory, or_none=True)
         check_integer("seed", self.seed)
         check_real("duration", self.duration, or_none=True)
-        for name in ("pace", "differ", "within", "novelty", "lambda_", "beta", "tau", "bridge_price", "guide", "fps"):
+        for name in (
+            "pace",
+            "differ",
+            "within",
+            "novelty",
+            "lambda_",
+            "beta",
+            "tau",
+            "bridge_price",
+            "guide",
+            "fps",
+            "liveliness",
+        ):
             check_real(name.rstrip("_"), getattr(self, name))
+        check_real("liveliness", self.liveliness)
+        check_text("passage", self.passage, or_none=True)
         for name in ("what_if", "sample", "strict", "posturewise"):
             check_flag(name, getattr(self, name))
         for name in ("weights", "coordination"):
@@ -199,8 +220,10 @@ class TweenRequest:
             self._check_unlike()
         if not self.posturewise:
             return
-        if self.pin or self.hold or self.avoid or self.via or self.unlike or self.sample:
-            raise MotionMindError("posturewise knows whole postures alone: no pin, hold, avoid, via, unlike or sample")
+        if self.pin or self.hold or self.avoid or self.via or self.unlike or self.sample or self.passage:
+            raise MotionMindError(
+                "posturewise knows whole postures alone: no pin, hold, avoid, via, unlike, sample or passage"
+            )
         if self.coordination == "progression":
             raise MotionMindError("posturewise: coordination can be posture or none, not progression")
 
@@ -251,6 +274,11 @@ class TweenRequest:
     def vias(self) -> list[tuple[Posture, int | None]]:
         """Postures to pass through, each with its move or None."""
         return [given if isinstance(given, tuple) else (given, None) for given in self.via]
+
+    @property
+    def takes_passages(self) -> bool:
+        """Whether alternatives may be danced like other passages: none is asked for, and the search has a guide."""
+        return self.kappa > 0.0 and self.passage is None and not self.sample
 
     @property
     def kappa(self) -> float:

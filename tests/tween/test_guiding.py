@@ -89,7 +89,7 @@ def test_the_guide_is_about_what_walks_expect(engine: Engine) -> None:
     stops = {0: stop_at(engine.corpus, a), moves: stop_at(engine.corpus, b)}
     expected = expect(engine.corpus, engine.carriage, stops, np.linspace(0.0, moves * seconds, 2 * moves + 1))
     chains = expected.chains(engine.corpus, seconds * np.arange(1, moves))
-    found, starts = guide_of(engine, moves, guide=0.7), engine.space.starts
+    found, starts = guide_of(engine, moves, guide=0.7, liveliness=0.0), engine.space.starts
     assert found.shape == (moves - 1, starts[-1])
     for chain, tolerance in enumerate(np.radians(engine.space.tolerances)):
         rows = slice(starts[chain], starts[chain + 1])

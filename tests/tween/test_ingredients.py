@@ -89,7 +89,7 @@ def test_each_ingredient_of_an_alternative_is_what_its_report_says() -> None:
 def test_bridges_and_waits_are_among_what_is_tested() -> None:
     counts: Counter[str] = Counter()
     for request in ({"moves": 8, "beta": 0.1}, {"moves": 3}, {"coordination": "progression", "moves": 3, "beta": 0.1}):
-        for a, b, _ in drawn(engine_of("ballet"), 3, seed=21):
+        for a, b, _ in drawn(engine_of("ballet"), 6, seed=21):
             try:
                 paid = assert_reported(engine_of("ballet").tween(a, b, **request))
             except NoPathError:

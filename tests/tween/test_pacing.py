@@ -279,7 +279,7 @@ def test_who_has_too_much_time_fills_it_as_the_corpus_does(engine: Engine) -> No
     for seed in range(4):
         a, b = ends(engine, seed)
         long = 4.0 * seconds(tween_of(engine, a, b))
-        plain, tween = (engine.tween(a, b, duration=long, without=names) for names in (["pace"], []))
+        plain, tween = (engine.tween(a, b, duration=long, without=names, liveliness=0.0) for names in (["pace"], []))
         assert not plain.tempo.detours
         assert seconds(tween) == pytest.approx(long)
         np.testing.assert_array_equal(tween.motion.rotations[[0, -1]], [a.rotations, b.rotations])

@@ -1,0 +1,142 @@
+"""Frames: a corpus's recordings at 30 frames a second, or those of them that are near a movement."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Floats, Ints
+from motionmind.body.contact import RATE
+from motionmind.corpus.corpus import Corpus
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.splines import rotation_spline
+from motionmind.jit import jit, read_only
+from motionmind.learned.carriage import Carriage
+from motionmind.learned.nearest import postures_near
+
+NEAREST = 16  # postures of a large corpus near each of a movement's around which recordings are looked at
+BESIDE = 8  # postures before and after these, at least
+LEAVES = 32  # of the tree over a large corpus that are searched for them
+KNOTS = 4  # postures beyond a stretch that its spline is made through, too: farther ones change it by a hundredth
+
+
+class Frames(NamedTuple):
+    """Recordings of a corpus at 30 frames a second, stretch after stretch.
+
+    Attributes:
+        chains: orientations of the joint chains [F, L, 4].
+        stretches: number of the stretch that each frame is in, rising [F].
+        postures: the corpus's last posture that is not after each [F].
+        times: of the frames in their clips [F], seconds.
+        rates: angular velocities of the chains, in their own frames [F, L, 3], radians a second.
+    """
+
+    chains: Floats
+    stretches: Ints
+    postures: Ints
+    times: Floats
+    rates: Floats
+
+
+@lru_cache(maxsize=2)
+def all_frames(corpus: Corpus) -> Frames:
+    """Return all of a corpus's recordings; keyframes, as of a score, are joined by splines."""
+    starts = corpus.columns.starts
+    return _joined([_sample(corpus, int(a), int(b) - 1, (int(a), int(b))) for a, b in pairwise(starts)])
+
+
+def frames_near(corpus: Corpus, carriage: Carriage, poses: Floats, beside: int = BESIDE) -> Frames:
+    """Return the recordings near some postures [K, J, 4], and so many postures before and after; all of a corpus
+    without trees."""
+    if carriage.trees is None:
+        return all_frames(corpus)
+    count, starts = len(corpus), corpus.columns.starts
+    near = [postures_near(carriage.trees, carriage.orientations, pose, NEAREST, count, LEAVES) for pose in poses]
+    around = np.unique(np.clip(np.concatenate(near)[:, None] + np.arange(-beside, beside + 1), 0, count - 1))
+    clips = np.searchsorted(starts, around, side="right") - 1
+    breaks = np.flatnonzero((np.diff(around) > 1) | (np.diff(clips) > 0)) + 1
+    parts = []
+    for run in np.split(around, breaks):
+        clip = int(np.searchsorted(starts, run[0], side="right")) - 1
+        known = max(int(run[0]) - KNOTS, int(starts[clip])), min(int(run[-1]) + KNOTS + 1, int(starts[clip + 1]))
+        parts.append(_sample(corpus, int(run[0]), int(run[-1]), known))
+    return _joined(parts)
+
+
+def _sample(corpus: Corpus, first: int, last: int, known: tuple[int, int]) -> tuple[Floats, Ints, Floats]:
+    """Return chains [n, L, 4], postures [n] and times [n] of the frames from one posture of a clip to another.
+
+    Args:
+        corpus: the corpus.
+        first, last: the postures.
+        known: the first of the postures that the curve is made through, and the one after the last.
+    """
+    knots, between = slice(*known), corpus.detail.shape[1]
+    keys, begin = corpus.times[knots], corpus.times[first]
+    times = begin + np.arange(np.floor((corpus.times[last] - begin) * RATE + 1e-3) + 1.0) / RATE
+    times = np.minimum(times, corpus.times[last])
+    rotations = rotation_spline(keys, corpus.rotations[knots], times)
+    postures = first + np.searchsorted(corpus.times[first : last + 1], times + 1e-6, side="right") - 1
+    if between and last > first:
+        begins = np.minimum(postures, last - 1)
+        share = (times - corpus.times[begins]) / (corpus.times[begins + 1] - corpus.times[begins]) * (between + 1)
+        below = np.clip(np.floor(share + 1e-6), 0, between).astype(np.int64)
+        rest = np.maximum(share - below, 0.0)[:, None, None]
+        edge = np.zeros((len(times), 1, *corpus.detail.shape[2:]))
+        detail = np.concatenate([edge, corpus.detail[begins], edge], axis=1)  # none at the postures
+        rows = np.arange(len(times))
+        rotations = rot.mul(rotations, rot.exp((1.0 - rest) * detail[rows, below] + rest * detail[rows, below + 1]))
+    return rot.normalise(corpus.to_chains(rotations)), postures, times
+
+
+def _joined(parts: Sequence[tuple[Floats, Ints, Floats]]) -> Frames:
+    """Return the frames of some stretches, one after another."""
+    chains, postures, times = (np.concatenate(found) for found in zip(*parts, strict=True))
+    stretches = np.repeat(np.arange(len(parts)), [len(found) for found, _, _ in parts])
+    rates = RATE * rot.log(rot.inv_mul(chains[:-1], chains[1:]))
+    rates = np.concatenate([rates, np.zeros((1, *rates.shape[1:]))])
+    ends = np.flatnonzero(np.diff(stretches, append=len(parts)) > 0)
+    rates[ends] = np.where((np.diff(ends, prepend=-1) > 1)[:, None, None], rates[ends - 1], 0.0)  # one frame is at rest
+    return Frames(np.ascontiguousarray(chains), stretches, postures, times, rates)
+
+
+def frames_of(corpus: Corpus, clip: int, begin: float, end: float) -> Frames:
+    """Return the recording of a clip, by its number, from the last posture before a time to the first after another.
+
+    Args:
+        corpus: the corpus.
+        clip: number of the clip.
+        begin, end: times in the clip's own recording, seconds.
+    """
+    first, stop = (int(at) for at in corpus.columns.starts[clip : clip + 2])
+    times = corpus.times[first:stop]
+    lower = first + max(int(np.searchsorted(times, begin, side="right")) - 1, 0)
+    upper = first + min(int(np.searchsorted(times, end)), stop - first - 1)
+    return _joined(
+        [_sample(corpus, lower, max(upper, lower), (max(lower - KNOTS, first), min(upper + KNOTS + 1, stop)))]
+    )
+
+
+def squared_distances(recorded: Frames, poses: Floats) -> Floats:
+    """Return the squared distances of all frames from some postures [K, J, 4]: means over joints [K, F], radians^2."""
+    shown = np.ascontiguousarray(poses.transpose(1, 2, 0))
+    return np.ascontiguousarray(_sums_of_squares(read_only(recorded.chains), shown).T) / len(shown)
+
+
+@jit
+def _sums_of_squares(orientations: Floats, poses: Floats) -> Floats:
+    """Return the squared distance of all `orientations` [N, L, 4] from each of poses [J, 4, T], summed over the joints
+    [N, T], radians^2."""
+    out = np.zeros((len(orientations), poses.shape[2]))
+    for i in range(len(orientations)):
+        off = out[i]
+        for j in range(len(poses)):
+            x, y, z, w = orientations[i, j]
+            for t in range(len(off)):  # side by side, so that several are measured at once; as `squared_turn`
+                cosine = x * poses[j, 0, t] + y * poses[j, 1, t] + z * poses[j, 2, t] + w * poses[j, 3, t]
+                off[t] += 4.0 * max(1.0 - cosine * cosine, 0.0)
+    return out

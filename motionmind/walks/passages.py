@@ -1,0 +1,303 @@
+"""Passages: what a real dancer did on a way like a movement's, and the movement danced like that.
+
+A mean of walks is near the truth on average and like nothing that was ever danced: averaging removes the middle
+frequencies. Here a movement keeps its mean in the low band, and takes everything above a cut-off from a passage: frames
+of the corpus's recordings that follow one another, all joints from the same frames. The trade between the two is that
+of Blau and Michaeli, "The Perception-Distortion Tradeoff", CVPR 2018.
+
+The passage is the path of least cost through the recordings along the mean (Viterbi's algorithm), with a cost for each
+change to another one. It may be faster or slower than it was danced by a third: its time is warped to the movement's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Floats, Ints
+from motionmind.body.contact import RATE
+from motionmind.corpus.corpus import Corpus
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.splines import natural_spline
+from motionmind.learned.carriage import Carriage
+from motionmind.walks.expectation import Expectation
+from motionmind.walks.frames import Frames, frames_near, frames_of, squared_distances
+from motionmind.walks.minimal import NO_WAY
+from motionmind.walks.stops import Stop
+
+STRIDE = 3  # frames of a recording from one node of a passage to the next, 0.1 s, as it was danced
+WARPS = 2, 3, 4  # frames that it may take instead: a passage is danced up to a third faster or slower
+SLOWEST = WARPS[-1] / STRIDE  # seconds of a passage in a second of movement, at most
+WARP_COST = 0.3  # radians^2 for each of these frames more or less
+CHANGE_COST = 0.72  # radians^2 for a change to another passage: 0.6 radians a joint off, before and after
+ENDS_WEIGHT = 20.0  # how many times as much the distance at a given posture counts as that on the way
+# How many times as much it counts on the way: a mean is quiet, and so are the frames nearest to it. Chosen on cmu-05:
+# at 1 passages are a tenth slower and told from the dancer more often (AUC 0.77, not 0.74), at an error as great.
+WAY_WEIGHT = 0.05
+RATES_S = 0.2  # seconds for which a difference of velocity at an end counts as the distance that it leads to
+BLEND_S = 0.2  # seconds in which the velocities of one passage give way to the next one's
+HALF_HZ = 0.6  # cut-off at a liveliness of a half; chosen on cmu-05: lower ones cost more error for each point of AUC
+HALF_CYCLES = 0.9  # of it in a short movement, at least
+
+
+class Place(NamedTuple):
+    """A place in a corpus: the number of a clip, and a time in its recording, seconds."""
+
+    clip: int
+    seconds: float
+
+
+class Danced(NamedTuple):
+    """A walk's mean danced as a passage.
+
+    Attributes:
+        passage: the passage.
+        times: of the displacements [n + 1], seconds.
+        off: displacements of the joints from the mean, rotation vectors, radians [n + 1, J, 3]. The body faces where
+            the mean does: passages turn elsewhere.
+    """
+
+    passage: Passage
+    times: Floats
+    off: Floats
+
+    def at(self, times: Floats) -> Floats:
+        """Return the displacements at some times [N, J, 3]."""
+        return natural_spline(self.times, self.off, times)
+
+    def move(self, chains: Floats, times: Floats) -> Floats:
+        """Return the mean's chains [N, L, 4] at some times [N] as they are danced."""
+        off, joints = self.at(times), self.off.shape[1]
+        return np.concatenate([rot.mul(chains[:, :joints], rot.exp(off)), chains[:, joints:]], axis=1)
+
+
+class Passage(NamedTuple):
+    """A passage along a movement: at each node the frame of the recordings that is danced there.
+
+    Attributes:
+        times: of the nodes in the movement, evenly spaced [K], seconds.
+        frames: number of the frame at each [K].
+        recorded: the recordings.
+        starts: nodes at which another stretch begins, the first among them.
+    """
+
+    times: Floats
+    frames: Ints
+    recorded: Frames
+    starts: Ints
+
+    @property
+    def postures(self) -> Ints:
+        """The corpus's last posture before each node's frame [K]."""
+        return self.recorded.postures[self.frames]
+
+
+def find_passage(recorded: Frames, poses: Floats, times: Floats, ends: tuple[Stop, Stop], given: Ints) -> Passage:
+    """Return the passage of least cost along a movement.
+
+    Args:
+        recorded: the recordings to choose from.
+        poses: orientations of the joints at the nodes [K, J, 4].
+        times: of the nodes, evenly spaced [K], seconds.
+        ends: what is known of the first and the last posture.
+        given: nodes whose postures are given, the first and the last among them.
+    """
+    weights = np.full(len(poses), WAY_WEIGHT)
+    weights[given] = ENDS_WEIGHT
+    costs = weights[:, None] * distances(recorded, poses, ends)
+    stretches, count = recorded.stretches, len(recorded.stretches)
+    goes_on = {warp: np.flatnonzero(stretches[warp:] == stretches[:-warp]) for warp in WARPS}
+    total, came_from = costs[0], []
+    for own in costs[1:]:
+        least = int(total.argmin())
+        best, before = np.full(count, total[least] + CHANGE_COST), np.full(count, least)
+        for warp, starts in goes_on.items():
+            on = total[starts] + WARP_COST * abs(warp - STRIDE)
+            better = on < best[starts + warp]
+            best[starts[better] + warp], before[starts[better] + warp] = on[better], starts[better]
+        came_from.append(before)
+        total = best + own
+    found = [int(total.argmin())]
+    for before in reversed(came_from):
+        found.append(int(before[found[-1]]))
+    frames = np.array(found[::-1])
+    return Passage(times, frames, recorded, _starts(frames, stretches))
+
+
+def distances(recorded: Frames, poses: Floats, ends: tuple[Stop, Stop]) -> Floats:
+    """Return squared distances of all frames from some postures, at the ends also of their rates [K, F], radians^2.
+
+    Args:
+        recorded: the frames.
+        poses: orientations of the joints [K, J, 4].
+        ends: the first and the last of the postures.
+    """
+    out = squared_distances(recorded, poses)
+    for row, stop in zip((0, -1), ends, strict=True):
+        if stop.rates is not None:
+            off = recorded.rates[:, : poses.shape[1]] - stop.rates.joints
+            out[row] += RATES_S**2 * np.mean(np.sum(off**2, axis=-1), axis=-1)
+    return out
+
+
+def velocities(passage: Passage, times: Floats) -> Floats:
+    """Return the angular velocities of a passage's chains from each of some times to the next [n, L, 3], rad/s.
+
+    Where one passage gives way to another, theirs are blended.
+
+    Args:
+        passage: the passage.
+        times: increasing [n + 1], seconds.
+    """
+    recorded, middles = passage.recorded, 0.5 * (times[1:] + times[:-1])
+    out = np.zeros((len(middles), *recorded.chains.shape[1:-1], 3))
+    weights = np.zeros(len(middles))
+    bounds = [*passage.starts.tolist(), len(passage.frames)]
+    for begin, end in pairwise(bounds):
+        weight = np.ones(len(middles))
+        if begin > 0:
+            change = 0.5 * (passage.times[begin - 1] + passage.times[begin])
+            weight *= np.clip(0.5 + (middles - change) / BLEND_S, 0.0, 1.0)
+        if end < len(passage.frames):
+            change = 0.5 * (passage.times[end - 1] + passage.times[end])
+            weight *= np.clip(0.5 - (middles - change) / BLEND_S, 0.0, 1.0)
+        here = np.flatnonzero(weight > 0.0)
+        if len(here) == 0:
+            continue
+        around = times[here[0] : here[-1] + 2]
+        shown = _chains_at(recorded, passage, (begin, end), around)
+        turned = rot.log(rot.inv_mul(shown[:-1], shown[1:])) / np.diff(around)[:, None, None]
+        out[here] += weight[here, None, None] * turned
+        weights[here] += weight[here]
+    return out / np.maximum(weights, 1e-9)[:, None, None]
+
+
+def _chains_at(recorded: Frames, passage: Passage, nodes: tuple[int, int], times: Floats) -> Floats:
+    """Return the chains that one of a passage's parts shows at some times [n, L, 4], beyond its nodes, too.
+
+    Args:
+        recorded: the recordings.
+        passage: the passage.
+        nodes: the first node of the part, and the one after its last.
+        times: the times [n], seconds.
+    """
+    at, frames = passage.times[slice(*nodes)], passage.frames[slice(*nodes)].astype(np.float64)
+    frames[1:-1] = 0.25 * frames[:-2] + 0.5 * frames[1:-1] + 0.25 * frames[2:]  # its tempo does not jump
+    first = last = RATE
+    if len(at) > 1:
+        first, last = (np.diff(frames) / np.diff(at))[[0, -1]]
+    where = np.interp(times, at, frames)
+    where += first * np.minimum(times - at[0], 0.0) + last * np.maximum(times - at[-1], 0.0)
+    own = np.flatnonzero(recorded.stretches == recorded.stretches[passage.frames[nodes[0]]])
+    where = np.clip(where, own[0], own[-1])
+    before = np.clip(np.floor(where).astype(np.int64), own[0], max(own[-1] - 1, own[0]))
+    after = np.minimum(before + 1, own[-1])
+    return rot.slerp(recorded.chains[before], recorded.chains[after], (where - before)[:, None])
+
+
+def displacements(base: Floats, times: Floats, rates: Floats, given: Ints, cutoff: float) -> Floats:
+    """Return how a movement is displaced to move as a passage does above a cut-off: rotation vectors [n + 1, J, 3].
+
+    They minimise, over each joint's displacements d that are 0 at the given times,
+
+        sum over t of |d'(t) - (rate of the passage - rate of the movement)|^2 + (2 pi cutoff)^2 |d(t)|^2,
+
+    a screened Poisson problem. So velocities are the passage's above the cut-off, and places the movement's below it.
+    Source: Bhat, Curless, Cohen and Zitnick, "Fourier analysis of the 2D screened Poisson equation for gradient domain
+    problems", ECCV 2008.
+
+    Args:
+        base: orientations of the joints in the movement [n + 1, J, 4].
+        times: of these, evenly spaced from one given time to the next [n + 1], seconds.
+        rates: angular velocities of the passage from each to the next [n, J, 3], radians a second.
+        given: rows of times at which nothing is displaced, rising, the first and the last among them.
+        cutoff: in hertz.
+    """
+    steps = np.diff(times)
+    missing = steps[:, None, None] * rates - rot.log(rot.inv_mul(base[:-1], base[1:]))
+    out = np.zeros((*base.shape[:-1], 3))
+    for begin, end in pairwise(given.tolist()):
+        out[begin + 1 : end] = _screened(missing[begin:end], 2.0 * np.pi * cutoff * float(steps[begin]))
+    return out
+
+
+def _screened(steps: Floats, screen: float) -> Floats:
+    """Return d[1], ..., d[n - 1] that minimise sum |d[t + 1] - d[t] - steps[t]|^2 + screen^2 |d[t]|^2, with d[0] = d[n]
+    = 0, for steps [n, ...]: a tridiagonal system, solved from its first row to its last and back (Thomas)."""
+    out = steps[:-1] - steps[1:]
+    diagonal, pivots = 2.0 + screen**2, np.empty(len(out))
+    for row in range(len(out)):
+        pivots[row] = diagonal - (1.0 / pivots[row - 1] if row else 0.0)
+        if row:
+            out[row] += out[row - 1] / pivots[row - 1]
+    for row in range(len(out) - 1, -1, -1):
+        if row < len(out) - 1:
+            out[row] += out[row + 1]
+        out[row] /= pivots[row]
+    return out
+
+
+def dance(
+    corpus: Corpus,
+    carriage: Carriage,
+    walk: Expectation,
+    stops: Mapping[float, Stop],
+    liveliness: float,
+    place: Place | None = None,
+) -> Danced | None:
+    """Return how a walk's mean is danced as a passage of the corpus; None where nothing is added.
+
+    Args:
+        corpus: the movement that was learned from.
+        carriage: how its bodies hold themselves.
+        walk: the mean of walks.
+        stops: what is passed exactly, by the seconds that lead there; increasing, with the first and the last.
+        liveliness: 0 for the mean itself, 1 for the passage, displaced to meet the stops.
+        place: where the passage begins; None for any.
+    """
+    (first, *_, last), passed = stops.values(), np.array([*stops])
+    joints, length = walk.poses.shape[1], float(passed[-1])
+    way = np.sqrt(np.mean(rot.angle(first.chains[:joints], last.chains[:joints]) ** 2))
+    is_still = way < NO_WAY and len(stops) == 2 and first.rates is None and last.rates is None
+    if liveliness == 0.0 or (is_still and place is None):
+        return None
+    nodes = np.linspace(0.0, length, max(1, round(length * RATE / STRIDE)) + 1)
+    poses = walk.chains(corpus, nodes)[:, :joints]
+    given = np.unique(np.abs(nodes[:, None] - passed).argmin(axis=0))
+    if place is None:
+        recorded = frames_near(corpus, carriage, poses[::4])
+    else:
+        recorded = frames_of(corpus, place.clip, place.seconds, place.seconds + SLOWEST * length)
+    passage = find_passage(recorded, poses, nodes, (first, last), given)
+    times, rows = _grid(passed)
+    rates, base = velocities(passage, times)[:, :joints], walk.chains(corpus, times)[:, :joints]
+    off = displacements(base, times, rates, rows, cutoff_of(liveliness, length))
+    return Danced(passage, times, off)
+
+
+def _grid(passed: Floats) -> tuple[Floats, Ints]:
+    """Return times some 1 / RATE apart, evenly from each of the times passed to the next, and the rows of these."""
+    parts, rows = [passed[:1]], [0]
+    for begin, end in pairwise(passed.tolist()):
+        count = max(1, round((end - begin) * RATE))
+        parts.append(np.linspace(begin, end, count + 1)[1:])
+        rows.append(rows[-1] + count)
+    return np.concatenate(parts), np.array(rows)
+
+
+def cutoff_of(liveliness: float, seconds: float) -> float:
+    """Return the cut-off, hertz, for a liveliness above 0 and a movement that lasts so long.
+
+    It is 0 for 1, and for a half HALF_HZ, or HALF_CYCLES in a movement too short for that: it has no slower ones.
+    """
+    return max(HALF_HZ, HALF_CYCLES / seconds) * (1.0 - liveliness) / liveliness
+
+
+def _starts(frames: Ints, stretches: Ints) -> Ints:
+    """Return the nodes at which a passage begins or changes to another [C]."""
+    steps, apart = np.diff(frames), np.diff(stretches[frames]) != 0
+    changes = apart | (steps < min(WARPS)) | (steps > max(WARPS))
+    return np.concatenate([[0], np.flatnonzero(changes) + 1])
