@@ -24,7 +24,7 @@ LEARNED_BY = (
         "notation",
         "corpus",
     ),
-    *("discretize", "grammar", "learned"),
+    *("discretize", "grammar", "learned", "walks"),
 )
 
 

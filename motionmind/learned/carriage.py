@@ -22,6 +22,7 @@ from motionmind.learned.clusters import clusters_of
 from motionmind.learned.neighbours import MANY, Neighbours, build_neighbours
 from motionmind.learned.percentiles import Percentile
 from motionmind.learned.sampled import BLOCK
+from motionmind.learned.trust import PRIOR, Trust
 
 SLIDES = 0.3  # metres a second at which a limb on the floor stands half as firmly as one at rest
 LEAVES = 0.06  # metres that a body's lowest point is off the floor in the air, at least; as long as it moves
@@ -57,6 +58,7 @@ class Carriage:
         touches: how deep limbs are in each other at most, but for RARE postures, by the pairs of `Capsules.pairs` [P],
             metres.
         trees: by which few of the moments are looked at; None where there are few, or an earlier version learned.
+        trust: which share of the departures of walks from the minimal movement is kept.
     """
 
     orientations: Floats
@@ -74,6 +76,7 @@ class Carriage:
     loose: Bools
     touches: Floats
     trees: Neighbours | None = None
+    trust: Trust = PRIOR
 
 
 def learn_carriage(

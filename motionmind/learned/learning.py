@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -24,6 +24,7 @@ from motionmind.learned.carriage import Carriage, learn_carriage
 from motionmind.learned.gauge import Gauge
 from motionmind.learned.pace import Pace, measure_pace, refit_pace
 from motionmind.learned.plausibility import Plausibility, learn_plausibility
+from motionmind.walks.evidence import learn_trust
 
 MOST_STATES_LEARNED = 50_000  # of a joint: a search among them takes some 6 GB
 MOST_FACINGS = 10_000  # each of which makes all turns that any makes
@@ -191,6 +192,7 @@ def _learn_all(
 
     # One calls NumPy for little at a time, and the other compiled loops for long, which leave the interpreter free.
     (gauge, pace), carriage = workshop.both(pace_of, partial(learn_carriage, corpus, workshop, kept, carriage_before))
+    carriage = replace(carriage, trust=learn_trust(corpus, carriage, workshop))
     plausibility = learn_plausibility(corpus, pace.fastest)
     return Learned(corpus, space, states, grammar, carriage, pace, plausibility, gauge, code_name())
 

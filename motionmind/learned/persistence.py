@@ -47,11 +47,23 @@ from motionmind.learned.learning import Learned, learn, learn_from_states
 from motionmind.learned.neighbours import Neighbours
 from motionmind.learned.pace import Pace, measure_pace
 from motionmind.learned.plausibility import Plausibility
-from motionmind.learned.validity import ENTRIES, FORMS, GAUGE, MOVEMENT, TREES, check_entries, check_forms, check_values
+from motionmind.learned.trust import PRIOR, Trust
+from motionmind.learned.validity import (
+    ENTRIES,
+    FORMS,
+    GAUGE,
+    MOVEMENT,
+    TREES,
+    TRUST,
+    check_entries,
+    check_forms,
+    check_values,
+)
 from motionmind.notation.sources import sources
 from motionmind.retarget.retarget import own_skeleton
+from motionmind.walks.evidence import spread_of
 
-_Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage, Pace, Plausibility, Gauge)
+_Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage, Pace, Plausibility, Gauge, Trust)
 
 _CORPUS_KEYS = ("name", "title", "author", "source", "licence", "facing", "rate", "skip", "citation")
 _PARTS = {
@@ -80,6 +92,7 @@ def save(learned: Learned, folder: str | os.PathLike[str]) -> None:
         arrays |= {f"{name}.{key}": getattr(part, key) for key in _array_names(kind)}
     gauge = learned.gauge or measure_pace(Kept.none(learned.corpus))
     arrays |= {f"gauge.{key}": getattr(gauge, key) for key in _array_names(Gauge)}
+    arrays |= {f"trust.{key}": getattr(learned.carriage.trust, key) for key in _array_names(Trust)}
     if learned.carriage.trees is not None:
         arrays |= {f"neighbours.{key}": array for key, array in learned.carriage.trees.arrays.items()}
     store.save(Path(folder), _manifest(learned), arrays)
@@ -196,6 +209,7 @@ def _open(folder: Path, stored: store.Stored) -> Learned:
         _part(Coordination, "coordination", arrays),
     )
     carriage = replace(_part(Carriage, "carriage", arrays), trees=_trees(arrays, corpus.skeleton))
+    carriage = replace(carriage, trust=_trust(arrays, corpus, carriage))
     return Learned(
         corpus,
         space,
@@ -305,6 +319,13 @@ def _trees(arrays: Mapping[str, NDArray[Any]], skeleton: Skeleton) -> Neighbours
     if own:
         own.setdefault("codes", np.zeros(0, np.int8))
     return Neighbours(parts_of(skeleton), **own) if own else None
+
+
+def _trust(arrays: Mapping[str, NDArray[Any]], corpus: Corpus, carriage: Carriage) -> Trust:
+    """Return how far a corpus's walks are to be trusted; the prior if an earlier version learned."""
+    if arrays.keys() >= TRUST.keys():
+        return _part(Trust, "trust", arrays)
+    return replace(PRIOR, spread=spread_of(corpus, carriage))
 
 
 def _clip_entry(clip: Clip) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from motionmind.learned.neighbours import node_bounds
 from motionmind.learned.peaks import LENGTHS
 from motionmind.learned.plausibility import EVERYDAY, MEASURES
 from motionmind.learned.sampled import FPS
+from motionmind.learned.trust import RATIOS
 
 _MOST = 1e6  # metres, seconds, rad/s, nats: far beyond any movement, and far below where sums overflow
 _SMALL, _TINY = 1e-9, 1e-300
@@ -115,6 +116,12 @@ TREES = {  # of a corpus of many moments, in versions that have them
     "neighbours.codes": _Form("i1", "codes"),
 }
 
+TRUST = {  # in versions that have it
+    "trust.table": _Form("f8", f"{len(RATIOS)}", 0.0, 1.0),
+    "trust.lasts": _Form("f8", "1", _SMALL, 10.0),
+    "trust.spread": _Form("f8", "parts", _SMALL),
+}
+
 MOVEMENT = [name for name in FORMS if "." not in name]  # from these, and the clips, all the others can be learned
 GAUGE = [name for name in FORMS if name.startswith("gauge.")]  # that earlier versions did not keep
 ENTRIES = [name for name in FORMS if name.startswith(("clips.", "faults."))]  # listed in the manifest of early versions
@@ -131,7 +138,7 @@ def check_forms(arrays: Mapping[str, NDArray[Any]], skeleton: Skeleton, facing: 
     sizes = {"J": len(skeleton), "L": len(skeleton) + (facing == "free"), "P": len(capsules_of(skeleton).pairs())}
     sizes |= {"parts": len(parts_of(skeleton)), "limbs": len(limbs_of(skeleton))}
     sizes["joints"] = sum(map(len, parts_of(skeleton)))
-    for name, form in (FORMS | TREES).items():
+    for name, form in (FORMS | TREES | TRUST).items():
         if name not in arrays:
             continue
         array = arrays[name]
@@ -208,6 +215,8 @@ def check_values(arrays: Mapping[str, NDArray[Any]], corpus: Corpus, space: Stat
         _check_carriage(arrays, len(corpus), len(later))
     if TREES.keys() & arrays.keys():
         _check_trees(arrays)
+    if (own := TRUST.keys() & arrays.keys()) and len(own) < len(TRUST):
+        raise ValueError(f"lists no array {min(TRUST.keys() - own)}")
     if arrays.keys() >= set(GAUGE):
         _check_gauge(arrays, corpus)
 

@@ -28,8 +28,8 @@ from motionmind.learned.pace import over_seconds, way_between
 from motionmind.realise.detour import detour
 from motionmind.realise.timeline import usual
 from motionmind.tween.pacing import usual_times
+from motionmind.learned.trust import NO_WAY
 from motionmind.walks.expectation import expect
-from motionmind.walks.minimal import NO_WAY
 from motionmind.walks.passages import Place, dance
 from motionmind.walks.stops import Stop, stop_at
 

@@ -87,7 +87,8 @@ def expect(
         facing = {move: stop.chains[-1] for move, stop in stops.items()}
         turned = carriage.turn[of]
         turn, spread = moves @ turned, moves @ turned**2
-        headings = turn_with_walks(turn, spread, walk.trust[:, 0], half_steps, facing, (ends[0], ends[1]), near)
+        lasts = float(carriage.trust.lasts[0])
+        headings = turn_with_walks(turn, spread, walk.trust[:, 0], half_steps, facing, (ends[0], ends[1]), near, lasts)
     else:
         headings = rot.heading(walk.poses[:, 0])
     return Expectation(half_steps, walk.poses, headings, walk.moments, moves, walk.trust, walk.of, of, walk.left_out)

@@ -9,7 +9,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
-from motionmind.walks.minimal import departure
+from motionmind.walks.minimal import LASTS, departure
 
 NEARLY = np.radians(150.0)  # of half a turn: by so much a body may as well turn the other way
 SPINS = 4.0  # radians a second from which a body goes on turning as the corpus does, even the far way
@@ -24,6 +24,7 @@ def turn_with_walks(
     facing: Mapping[int, Floats],
     rates: tuple[float | None, float | None],
     near: bool = False,
+    lasts: float = LASTS,
 ) -> Floats:
     """Return headings [2 T + 1], unwrapped, of a body that turns as the walks do and meets the given facings.
 
@@ -45,6 +46,7 @@ def turn_with_walks(
         facing: the rotations [4] that the headings meet, by the number of moves; with the first and the last.
         rates: turning at the first and at the last, radians a second; None where it is unknown.
         near: whether the body is to turn the near way from each facing to the next.
+        lasts: seconds for which turning at an end is felt at most.
     """
     spins = [rate for rate in rates if rate is not None and abs(rate) >= SPINS]
     varies = np.maximum(spread - turn**2, 1e-4)
@@ -72,7 +74,7 @@ def turn_with_walks(
     )
     moves = [*facing]
     until = half_steps[2 * moves[1]], half_steps[2 * moves[-2]]
-    return np.asarray(out + departure(half_steps, first, last, until))
+    return np.asarray(out + departure(half_steps, first, last, until, lasts))
 
 
 def correct_headings(headings: Floats, centres: Floats, within: Floats) -> Floats:

@@ -19,6 +19,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit, read_only
 from motionmind.learned.carriage import Carriage
+from motionmind.learned.trust import Trust
 from motionmind.walks.likelihood import (
     LEAVES_WITHIN,
     SIZES,
@@ -36,7 +37,7 @@ from motionmind.walks.likelihood import (
 )
 from motionmind.walks.marginals import posterior_marginals
 from motionmind.walks.means import counted, mean_of_parts, mean_rotations, that_count
-from motionmind.walks.minimal import LASTS, departure, minimal_movement, trust
+from motionmind.walks.minimal import departure, minimal_movement
 from motionmind.walks.sparse import Chosen, all_of, choose, merged, steps_on
 from motionmind.walks.stops import Rates, Stop
 
@@ -55,7 +56,8 @@ class MeanWalk(NamedTuple):
         poses: orientations of the joints [2 T + 1, J, 4].
         moments: probabilities of moments of the corpus [2 T + 1, n].
         of: which moments these are [n]; all of them in a small corpus.
-        trust: how far each joint is trusted to the walks in each half step [2 T, J], from 0 to 1 (`minimal.trust`).
+        trust: how far each joint is trusted to the walks in each half step [2 T, J], from 0 to 1
+            (`motionmind.learned.trust`).
         left_out: share of walks that begin or end in moments that others stand for, about, in the part of the body
             where it is greatest; 0 in a small corpus.
     """
@@ -79,8 +81,8 @@ def mean_walk(
 
     Walks of limbs count as much as those of larger parts together. The moments, by which the body travels and stands,
     are those of walks of the whole and of the part that carries it. The mean is taken as a departure from the minimal
-    movement between the stops, which shrinks as the corpus's postures are farther from them
-    (`motionmind.walks.minimal`). It comes near the stops but not to them: its offsets there are subtracted along the
+    movement between the stops (`motionmind.walks.minimal`), of which that share is kept that the corpus has been found
+    to know (`motionmind.learned.trust`). It comes near the stops but not to them: its offsets there are subtracted along the
     walk in proportion to time, and those of its velocities as `departure` has it.
 
     Args:
@@ -97,29 +99,41 @@ def mean_walk(
     for start, end in pairwise(stops):
         here, ends = slice(2 * start, 2 * end + 1), (stops[start], stops[end])
         between = path[start + 1 : end] if path is not None and end > start + 1 else None
-        walk = _mean_between(parts, carriage, rates, ends, half_steps[here], between)
-        poses[here], trusted[2 * start : 2 * end], segments[start] = walk.poses, walk.trust, walk
+        walk = walk_between(parts, carriage, rates, ends, half_steps[here], between)
+        share = walk.trusted(carriage.trust)
+        poses[here] = rot.mul(walk.minimal, rot.exp(share[:, None] * walk.departs))
+        trusted[2 * start : 2 * end], segments[start] = share, walk
     for move, stop in stops.items():
         poses[2 * move] = stop.chains[:joints]
     left_out = max(walk.left_out for walk in segments.values())
     return MeanWalk(poses, *_joined(segments, len(half_steps), len(carriage.weights)), trusted, left_out)
 
 
-class _Walk(NamedTuple):
+class Walk(NamedTuple):
     """The mean over the walks from one stop to the next in S steps.
 
     Attributes:
-        poses: orientations [S + 1, J, 4].
+        minimal: the minimal movement, orientations [S + 1, J, 4].
+        departs: departure of the mean from it [S + 1, J, 3]: rotation vectors, radians, 0 at both stops.
+        members: the parts of the body of all three sizes that each joint is in [J, 3].
+        nearest: distance of each stop from the nearest moment of each part [P, 2], radians a joint.
+        ways: how far each part has to go [P], radians a joint.
         moments: probabilities of moments [S + 1, n] in walks of the whole body, and in those of what carries it, each
             with the moments that these are.
-        trust: how far each joint is trusted to the walks [J].
         left_out: as in `MeanWalk`.
     """
 
-    poses: Floats
+    minimal: Floats
+    departs: Floats
+    members: Ints
+    nearest: Floats
+    ways: Floats
     moments: tuple[tuple[Floats, Ints | slice], ...]
-    trust: Floats
     left_out: float
+
+    def trusted(self, trust: Trust) -> Floats:
+        """Return the share of its departure that each joint keeps [J], from 0 to 1."""
+        return trust.shares(self.nearest.mean(axis=1), self.ways)[self.members] @ np.array(SIZES)
 
 
 class _PartWalk(NamedTuple):
@@ -131,7 +145,6 @@ class _PartWalk(NamedTuple):
         marginals: their probabilities [S + 1, n].
         counts: of a corpus with trees, those of them that may count in a mean.
         counted: their probabilities by the part's size, as `mean_of_parts` takes them, once for all joints of the part.
-        trust: how far the part is trusted to the walks.
         left_out: as in `MeanWalk`.
     """
 
@@ -140,11 +153,10 @@ class _PartWalk(NamedTuple):
     marginals: Floats
     counts: Ints
     counted: Floats
-    trust: float
     left_out: float
 
 
-def _joined(segments: Mapping[int, _Walk], count: int, moments: int) -> tuple[Floats, Ints | slice]:
+def _joined(segments: Mapping[int, Walk], count: int, moments: int) -> tuple[Floats, Ints | slice]:
     """Return the probabilities of moments at each of so many half steps, and which moments of the corpus these are.
 
     Args:
@@ -156,7 +168,7 @@ def _joined(segments: Mapping[int, _Walk], count: int, moments: int) -> tuple[Fl
     chosen = reduce(merged, kept) if kept else slice(None)
     out = np.zeros((count, moments if isinstance(chosen, slice) else len(chosen)))
     for start, walk in segments.items():
-        rows = out[2 * start : 2 * start + len(walk.poses)]
+        rows = out[2 * start : 2 * start + len(walk.minimal)]
         rows[0] = 0.0  # of the segment before
         for share, of in walk.moments:
             if isinstance(of, slice) or isinstance(chosen, slice):
@@ -174,14 +186,14 @@ def _add_half(rows: Floats, columns: Ints, shares: Floats) -> None:
             rows[t, columns[k]] += 0.5 * shares[t, k]
 
 
-def _mean_between(
+def walk_between(
     parts: tuple[Ints, ...],
     carriage: Carriage,
     rates: Callable[[Ints | slice], Rates] | None,
     ends: tuple[Stop, Stop],
     times: Floats,
     path: Floats | None,
-) -> _Walk:
+) -> Walk:
     """Return the mean over walks from one stop to the next.
 
     Args:
@@ -195,11 +207,12 @@ def _mean_between(
     joints = max(int(part.max()) for part in parts) + 1
     orientations = np.stack([stop.chains[:joints] for stop in ends])
     leaving, arriving = (None if stop.rates is None else stop.rates.joints for stop in ends)
-    minimal = minimal_movement(orientations, times, leaving, arriving)
-    poses, trusted = np.empty_like(minimal), np.empty(joints)
+    lasts = float(carriage.trust.lasts[0])
+    minimal = minimal_movement(orientations, times, leaving, arriving, lasts)
+    poses, nearest = np.empty_like(minimal), np.empty((len(parts), 2))
 
     members, groups = _members(parts, joints)
-    ways = [_way(part, ends, float(times[-1] - times[0])) for part in parts]
+    ways = [_way(part, ends, float(times[-1] - times[0]), lasts) for part in parts]
     shown, trees = carriage.orientations, carriage.trees
 
     def off(postures: Floats) -> Floats:
@@ -222,12 +235,12 @@ def _mean_between(
                 here = seen.transpose(1, 0, 2)
                 if path is not None:
                     own = np.concatenate([own, distances_of(seen, np.ascontiguousarray(path[:, part]))])
-            likely, nearest, left_out = _likely(part, chosen, rates, ends, own)
+            likely, nearest[number], left_out = _likely(part, chosen, rates, ends, own)
             begins, goals, shares = steps_on(chosen, likely[0])
             steps = read_only(begins), read_only(goals), read_only(shares), chosen.clusters, read_only(chosen.weights)
             size = float(np.dot((members == number).any(axis=0), SIZES))
             found = _marginals(*steps, likely, len(times), size, trees is not None)
-            return _PartWalk(chosen, here, *found, trust(np.array(nearest), ways[number]), left_out)
+            return _PartWalk(chosen, here, *found, left_out)
 
         larger, limbs = {number for numbers in groups for number in numbers[:-1]}, {numbers[-1] for numbers in groups}
         # Where all moments are summed over, what a limb's walks are alone in is not kept: it may be large.
@@ -245,14 +258,14 @@ def _mean_between(
                     poses[:, here] = mean_rotations(weights, shown, np.array(here), about)
                 else:
                     poses[:, here] = _mean_of_few(own, [parts[n] for n in numbers], here, about)
-                trusted[here] = np.dot(SIZES, [one.trust for one in own])
             return mine.left_out
 
         lost = _each(move, sorted(limbs), pool, threads)
-    departs = _without_ends(rot.log(rot.inv_mul(minimal, poses)), times, leaving is not None, arriving is not None)
-    poses = rot.mul(minimal, rot.exp(trusted[:, None] * departs))
+    departs = rot.log(rot.inv_mul(minimal, poses))
+    departs = _without_ends(departs, times, leaving is not None, arriving is not None, lasts)
     moments = tuple((one.marginals, one.chosen.moments) for one in (walks[0], walks[1]))
-    return _Walk(poses, moments, trusted, max(*lost, *(one.left_out for one in walks.values())))
+    left_out = max(*lost, *(one.left_out for one in walks.values()))
+    return Walk(minimal, departs, members, nearest, np.array(ways), moments, left_out)
 
 
 def _each(work: Callable[[_Item], _Made], items: Sequence[_Item], pool: Executor, threads: int) -> list[_Made]:
@@ -286,13 +299,13 @@ def _members(parts: tuple[Ints, ...], joints: int) -> tuple[Ints, dict[tuple[int
     return members, groups
 
 
-def _without_ends(off: Floats, times: Floats, leaving: bool, arriving: bool) -> Floats:
+def _without_ends(off: Floats, times: Floats, leaving: bool, arriving: bool, lasts: float) -> Floats:
     """Return departures [S + 1, m, 3] less what they are at both ends and, where velocities are given, their rates."""
     share = ((times - times[0]) / (times[-1] - times[0]))[:, None, None]
     off = off - (1.0 - share) * off[0] - share * off[-1]
     first = (off[1] - off[0]) / (times[1] - times[0]) if leaving else None
     last = (off[-1] - off[-2]) / (times[-1] - times[-2]) if arriving else None
-    return np.asarray(off - departure(times, first, last))
+    return np.asarray(off - departure(times, first, last, lasts=lasts))
 
 
 def _likely(
@@ -305,7 +318,7 @@ def _likely(
     """Return the likelihoods of moments in one part of the body [K, n], how far the nearest are from both ends, radians
     a joint, and the share of walks' ends that are in moments for which others stand.
 
-    Arguments are those of `_mean_between`, but for the moments that are `chosen`, and how far `off` they are from the
+    Arguments are those of `walk_between`, but for the moments that are `chosen`, and how far `off` they are from the
     two ends, and then from the postures of the path, if there is one: squared distances of the part [K, n], radians^2.
     """
     nearest = nearest_to_ends(off)
@@ -346,11 +359,11 @@ def _marginals(
     return marginals, counts, counted(size, marginals, counts)
 
 
-def _way(part: Ints, ends: tuple[Stop, Stop], seconds: float) -> float:
+def _way(part: Ints, ends: tuple[Stop, Stop], seconds: float, lasts: float) -> float:
     """Return how far a part of the body has to go, radians a joint, root mean square.
 
     It is the root of the sum of three squares: of the turn from one end to the other; of how far the part's speed at
-    the ends goes if it fades as (1 - t / LASTS)^2, sooner where there is less time; and of STRIDE for each of the
+    the ends goes if it fades as (1 - t / lasts)^2, sooner where there is less time; and of STRIDE for each of the
     body's heights that its root travels. A body in one posture of a cycle has a way to go if it moves there, or has to
     get elsewhere.
     """
@@ -358,7 +371,7 @@ def _way(part: Ints, ends: tuple[Stop, Stop], seconds: float) -> float:
     rates = [stop.rates.joints[part] for stop in ends if stop.rates is not None]
     speed = float(np.mean([np.sum(rate**2, axis=-1).mean() for rate in rates])) if rates else 0.0
     travel = float(np.sum((ends[1].place - ends[0].place) ** 2))
-    return float(np.sqrt(turn + (min(seconds, LASTS) / 3.0) ** 2 * speed + STRIDE**2 * travel))
+    return float(np.sqrt(turn + (min(seconds, lasts) / 3.0) ** 2 * speed + STRIDE**2 * travel))
 
 
 def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:

@@ -1,0 +1,137 @@
+"""Trust: which share of the movement that walks add to the minimal one a corpus has been found to know.
+
+Walks through a corpus depart from the minimal movement between two postures (`motionmind.walks.minimal`). How much of
+the departure is true depends on how far both postures are from the corpus's nearest: in comparison with the way from
+one to the other, and with how far the corpus's postures are from each other. So a corpus is asked, clip by clip, what
+it would have made of a clip that it had not seen (`motionmind.walks.evidence`). The share that errs least is kept in a
+table, which this module fits and looks up.
+
+How long a velocity at an end is felt is learned with it, for it differs as much: slow dancers go on for longer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from motionmind._typing import Floats
+
+NO_WAY = 1e-3  # radians a joint: nothing to go, but for the rounding of files
+RATIOS = np.array([0.0, 0.25, 0.5, 1.0, 2.0])  # of the distance from the corpus to the way to go
+
+
+@dataclass(frozen=True, eq=False)
+class Trust:
+    """The share of the walks' departure to keep, and how long velocities last.
+
+    Attributes:
+        table: share by `RATIOS` [5], from 0 to 1.
+        lasts: seconds for which a velocity at an end is felt at most [1].
+        spread: distance between two random postures of the corpus, by part of the body [P], radians a joint, root mean
+            square: nothing is kept as far as that from all postures. Infinity if unknown.
+    """
+
+    table: Floats
+    lasts: Floats
+    spread: Floats
+
+    def shares(self, off: Floats, ways: Floats) -> Floats:
+        """Return the share to keep by part of the body [P], from 0 to 1.
+
+        Args:
+            off: mean distance of both ends from the corpus's nearest posture of each part [P], radians a joint.
+            ways: distance from one end to the other [P], radians a joint.
+        """
+        return counts(off, ways, self.spread) @ self.table
+
+
+def counts(off: Floats, ways: Floats, spread: Floats) -> Floats:
+    """Return how much each entry of the table counts in the share of each part of the body [P, 5].
+
+    The share goes in a straight line from entry to entry with w / (w + d), where d is the distance from the corpus and
+    w the way, and to 0 where there is no way. It is multiplied by 1 - (d / spread)^2, and 0 beyond the spread.
+    Arguments are those of `Trust.shares`.
+    """
+    nearness = np.where(ways < NO_WAY, 0.0, ways / np.maximum(ways + off, NO_WAY))
+    knots = np.append(1.0 / (1.0 + RATIOS), 0.0)[::-1]  # rising
+    before = np.clip(np.searchsorted(knots, nearness, side="right") - 1, 0, len(knots) - 2)
+    along = (nearness - knots[before]) / (knots[before + 1] - knots[before])
+    out, parts = np.zeros((len(ways), len(knots))), np.arange(len(ways))
+    out[parts, before], out[parts, before + 1] = 1.0 - along, along
+    fades = np.maximum(1.0 - (off / spread) ** 2, 0.0)
+    return np.asarray(fades[:, None] * out[:, :0:-1])
+
+
+# --- fitting ----------------------------------------------------------------------------------------------------------
+
+# Of the prior, in mean squares of what one entry of the table makes; from next to nothing to nothing but the prior.
+STRENGTHS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, np.inf)
+SURE = 2.0  # standard errors by which a corpus's own table is to be better than one nearer to the prior: 95 %
+
+
+class Squares(NamedTuple):
+    """Squared errors in some windows, as a quadratic function of the table.
+
+    With x_k the walks' departures, each joint's in the share in which entry k of the table counts for it, y the true
+    departures and c the table, the squared error is c'Ac - 2 b'c + q.
+
+    Attributes:
+        inner: A, sums of <x_k, x_l> [5, 5].
+        along: b, sums of <x_k, y> [5].
+        whole: q, the sum of <y, y>.
+    """
+
+    inner: Floats
+    along: Floats
+    whole: float
+
+    @classmethod
+    def summed(cls, some: Iterable[Squares]) -> Self:
+        """Return the sum over windows."""
+        inner, along, whole = zip(*some, strict=True)
+        return cls(np.sum(inner, axis=0), np.sum(along, axis=0), sum(whole))
+
+    def error(self, table: Floats) -> float:
+        """Return the squared error of a table [5]."""
+        return float(table @ self.inner @ table - 2.0 * table @ self.along + self.whole)
+
+    def fitted(self, prior: Floats, strength: float) -> Floats:
+        """Return the table [5] that errs least, drawn to a prior one by a ridge of some strength."""
+        if np.isinf(strength):
+            return prior
+        ridge = max(strength * float(np.trace(self.inner)) / len(prior), np.finfo(float).tiny) * np.eye(len(prior))
+        return np.clip(np.linalg.solve(self.inner + ridge, self.along + ridge @ prior), 0.0, 1.0)
+
+
+def fit_table(families: Sequence[Squares], prior: Floats) -> Floats:
+    """Return the table [5] for a corpus: a ridge regression about a prior one.
+
+    Of the prior's strengths the greatest is taken whose error, on families that are left out of the fit, is not more
+    than the least by SURE standard errors over families: so a corpus departs from the prior only where its clips agree.
+    Source: Hastie, Tibshirani, Friedman, "The elements of statistical learning" (2009), sections 3.4.1 and 7.10.
+
+    Args:
+        families: of clips that know nothing of each other.
+        prior: what is taken where they tell nothing [5].
+    """
+    if len(families) < 2:
+        return prior
+    rest = [Squares.summed(one for one in families if one is not left) for left in families]
+    errors = np.array(
+        [
+            [left.error(others.fitted(prior, strength)) for strength in STRENGTHS]
+            for left, others in zip(families, rest, strict=True)
+        ]
+    )
+    worse = errors - errors[:, [errors.sum(axis=0).argmin()]]
+    doubt = SURE * np.sqrt(len(worse)) * worse.std(axis=0, ddof=1)
+    strength = STRENGTHS[np.flatnonzero(worse.sum(axis=0) <= doubt)[-1]]
+    return Squares.summed(families).fitted(prior, strength)
+
+
+# What cmu-05, cmu-16, cmu-29 and cmu-135 (mocap.cs.cmu.edu) show together, each counting the same:
+# python -m experiments.trust.prior
+PRIOR = Trust(np.array([1.0, 1.0, 0.35, 0.13, 0.01]), np.array([0.45]), np.array(np.inf))

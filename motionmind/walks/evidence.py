@@ -1,0 +1,245 @@
+"""Evidence for trust: what a corpus would have made of its own clips, had it not seen them.
+
+Clips are left out, each with its copies and the other parts of its take, and windows of them are filled by walks
+through the others. How far the walks' departure from the minimal movement goes along with the true one is the evidence
+from which `motionmind.learned.trust` fits its table.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Floats, Ints
+from motionmind.body.limbs import parts_of
+from motionmind.body.motion import Velocity
+from motionmind.body.skeleton import Skeleton
+from motionmind.corpus.clip import Clip
+from motionmind.corpus.corpus import Corpus
+from motionmind.executors.workshop import Workshop
+from motionmind.geometry import rotations as rot
+from motionmind.learned.carriage import Carriage
+from motionmind.learned.trust import NO_WAY, PRIOR, Squares, Trust, counts, fit_table
+from motionmind.walks.likelihood import SIZES
+from motionmind.walks.mean_walk import Walk, walk_between
+from motionmind.walks.minimal import departure, minimal_movement
+from motionmind.walks.stops import Stop, stop_at
+
+LENGTHS = (0.4, 0.6, 1.2, 2.0, 4.0)  # seconds of the windows
+BRIEF = LENGTHS[1:3]  # of those in which velocities at the ends tell most
+WINDOWS = 12  # of each length, evenly spread over the clips
+MOST = 2_000  # postures of the corpus that are learned from: each window takes time in proportion
+PIECES = 8  # of so many clips at least
+PAIRS = 1_000  # of random postures
+LASTS = (0.2, 0.3, 0.45, 0.7, 1.0)  # seconds for which a velocity may be felt
+
+
+class _Piece(NamedTuple):
+    """Consecutive postures of a clip.
+
+    Attributes:
+        clip: its number.
+        start, stop: the first posture, and the one after the last.
+        family: names all clips that are left out with it.
+    """
+
+    clip: int
+    start: int
+    stop: int
+    family: tuple[str, str]
+
+
+class _Window(NamedTuple):
+    """Postures of a corpus from one to another, both included."""
+
+    piece: _Piece
+    first: int
+    last: int
+
+
+def learn_trust(corpus: Corpus, carriage: Carriage, workshop: Workshop | None = None) -> Trust:
+    """Learn how far the walks through a corpus are to be trusted, and how long velocities are felt.
+
+    Args:
+        corpus: the movement.
+        carriage: its moments.
+        workshop: threads; None for this one.
+    """
+    table = fit_table(gather_evidence(corpus, carriage, WINDOWS, workshop), PRIOR.table)
+    lasts = LASTS[int(np.argmin(errors))] if (errors := errors_of_lasting(corpus, 2 * WINDOWS)).any() else PRIOR.lasts[0]
+    return Trust(table, np.array([lasts]), spread_of(corpus, carriage))
+
+
+def gather_evidence(
+    corpus: Corpus, carriage: Carriage, count: int, workshop: Workshop | None = None
+) -> list[Squares]:
+    """Return how far walks are right in windows of each family of clips, when they know the other families alone.
+
+    Args:
+        corpus: the movement.
+        carriage: its moments.
+        count: windows of each length.
+        workshop: threads; None for this one.
+    """
+    pieces, spread = _pieces(corpus), spread_of(corpus, carriage)
+    windows = [window for seconds in LENGTHS for window in _windows(corpus, pieces, seconds, count)]
+    families = sorted({window.piece.family for window in windows})
+    if len({piece.family for piece in pieces}) < 2:
+        return []
+
+    def learn(family: tuple[str, str]) -> Squares:
+        others = of_pieces(corpus, carriage, [piece for piece in pieces if piece.family != family])
+        own = (window for window in windows if window.piece.family == family)
+        return Squares.summed(_squares(corpus, carriage, others, spread, window) for window in own)
+
+    return list((workshop or Workshop()).map(learn, families))
+
+
+def spread_of(corpus: Corpus, carriage: Carriage) -> Floats:
+    """Return the distance between two random postures by part of the body [P], radians a joint, root mean square."""
+    one, other = np.random.default_rng(0).integers(len(corpus), size=(2, PAIRS))
+    turned = rot.angle(carriage.orientations[one], carriage.orientations[other]) ** 2
+    return np.array([max(float(np.sqrt(turned[:, part].mean())), NO_WAY) for part in parts_of(corpus.skeleton)])
+
+
+def of_pieces(corpus: Corpus, carriage: Carriage, pieces: Sequence[_Piece]) -> Carriage:
+    """Return the carriage of pieces of clips alone, as far as walks need it; pieces are in the corpus's order."""
+    starts, firsts, count = corpus.columns.starts, corpus.moves.firsts, len(corpus.columns.weights)
+    postures = np.concatenate([np.arange(piece.start, piece.stop) for piece in pieces])
+    moves = np.concatenate(
+        [
+            np.arange(firsts[number] + piece.start - starts[piece.clip], firsts[number] + piece.stop - 1 - starts[piece.clip])
+            for round_ in (0, count)
+            for piece in pieces
+            if firsts[(number := round_ + piece.clip) + 1] > firsts[number]
+        ]
+    )
+    kept, steps = np.concatenate([postures, len(corpus) + moves]), np.concatenate([moves, len(carriage.turn) + moves])
+    shares, begins = carriage.shares[steps], np.searchsorted(kept, carriage.begins[steps])
+    return replace(
+        carriage,
+        orientations=np.ascontiguousarray(carriage.orientations[kept]),
+        weights=carriage.weights[kept],
+        begins=begins,
+        ends=np.searchsorted(kept, carriage.ends[steps]),
+        shares=shares / np.bincount(begins, shares, len(kept))[begins],  # a piece may end where its clip goes on
+        clusters=np.ascontiguousarray(carriage.clusters[kept]),
+        turn=carriage.turn[moves],
+        travel=carriage.travel[moves],
+        trees=None,
+    )
+
+
+def _family(corpus: str, name: str) -> tuple[str, str]:
+    """Return what names a clip's take: mirrored copies have its name, and parts and namesakes a number after it."""
+    return corpus, re.sub(r"(\.\d+| \(\d+\))+$", "", name)
+
+
+def _pieces(corpus: Corpus) -> list[_Piece]:
+    """Return pieces of clips that stand for a corpus, with MOST postures together at most, about."""
+    starts = corpus.columns.starts
+    numbers = np.arange(len(starts) - 1)
+    if len(corpus) > MOST:
+        share = max(MOST / len(corpus), PIECES / len(numbers))
+        numbers = numbers[np.unique((np.arange(0.0, 1.0, 1.0 / max(share * len(numbers), 1.0)) * len(numbers)).astype(int))]
+    longest = max(MOST // PIECES, MOST // len(numbers)) if len(corpus) > MOST else len(corpus)
+    out = []
+    for number in numbers.tolist():
+        clip = corpus.clips[number]
+        out.append(_Piece(number, clip.start, min(clip.stop, clip.start + longest), _family(clip.corpus, clip.name)))
+    return out
+
+
+def _windows(corpus: Corpus, pieces: Sequence[_Piece], seconds: float, count: int) -> list[_Window]:
+    """Return so many windows of so many seconds, about, evenly spread over pieces; of two moves at least."""
+    found: list[tuple[_Piece, Ints, Ints]] = []
+    for piece in pieces:
+        times = corpus.times[piece.start : piece.stop]
+        first = np.arange(len(times))
+        last = np.maximum(np.searchsorted(times, times + seconds - 1e-6), first + 2)
+        fits = last < len(times)
+        found.append((piece, piece.start + first[fits], piece.start + last[fits]))
+    total = sum(len(first) for _, first, _ in found)
+    chosen = np.unique(((np.arange(count) + 0.5) * total / count).astype(int)) if total else np.zeros(0, int)
+    out, before = [], 0
+    for piece, first, last in found:
+        here = chosen[(chosen >= before) & (chosen < before + len(first))] - before
+        out += [_Window(piece, int(first[k]), int(last[k])) for k in here]
+        before += len(first)
+    return out
+
+
+def _squares(corpus: Corpus, carriage: Carriage, others: Carriage, spread: Floats, window: _Window) -> Squares:
+    """Return how far walks through other clips' moments go along with the true movement in a window.
+
+    Departures are those of the joints' global rotations at the postures between. They are taken relative to the true
+    departure of the window, so that quiet windows count as much as wild ones.
+    """
+    skeleton, here = corpus.skeleton, slice(window.first, window.last + 1)
+    true, times = carriage.orientations[here, : len(skeleton)], corpus.times[here]
+    half_steps = np.interp(np.arange(2 * len(times) - 1), np.arange(0, 2 * len(times), 2), times)
+    size = skeleton.height or 1.0
+    ends = tuple(Stop(carriage.orientations[end], corpus.root[end] / size) for end in (window.first, window.last))
+    walk = walk_between(parts_of(skeleton), others, None, (ends[0], ends[1]), half_steps, None)
+    minimal = walk.minimal[2:-2:2]
+    made = rot.mul(minimal, rot.exp(walk.departs[2:-2:2]))
+    plain, made, true = (skeleton.global_rotations(one) for one in (minimal, made, true[1:-1]))
+    departs, truly = rot.log(rot.inv_mul(plain, made)), rot.log(rot.inv_mul(plain, true))
+    of_joints = _of_joints(walk, spread)
+    inner = of_joints.T @ (np.sum(departs**2, axis=(0, 2))[:, None] * of_joints)
+    along, whole = of_joints.T @ np.sum(departs * truly, axis=(0, 2)), float(np.sum(truly**2))
+    weight = 1.0 / max(whole, NO_WAY**2)
+    return Squares(weight * inner, weight * along, weight * whole)
+
+
+def _of_joints(walk: Walk, spread: Floats) -> Floats:
+    """Return how much each entry of the table counts in the share of each joint [J, 5]."""
+    of_parts = counts(walk.nearest.mean(axis=1), walk.ways, spread)
+    return np.asarray(np.einsum("k,jkc->jc", np.array(SIZES), of_parts[walk.members]))
+
+
+def errors_of_lasting(corpus: Corpus, count: int) -> Floats:
+    """Return how far minimal movements are from the true ones by how long velocities are felt, those of LASTS [n]: sums
+    over windows of mean distances, radians; 0 if there are no windows.
+
+    Args:
+        corpus: the movement.
+        count: windows of each length.
+    """
+    pieces, out = _pieces(corpus), np.zeros(len(LASTS))
+    for window in (window for seconds in BRIEF for window in _windows(corpus, pieces, seconds, count)):
+        clip = corpus.clips[window.piece.clip]
+        if clip.start < window.first and window.last < clip.stop - 1:
+            out += _errors_in(corpus, clip, window)
+    return out
+
+
+def _errors_in(corpus: Corpus, clip: Clip, window: _Window) -> Floats:
+    """Return the distances of minimal movements from a clip's recording in a window [n], means over its frames."""
+    skeleton, frames = corpus.skeleton, corpus.detail.shape[1] + 1  # a move
+    first, last = ((end - clip.start) * frames for end in (window.first, window.last))
+    shown = corpus.recording(clip, first - frames, last + frames + 1)
+    before, motion, after = shown.slice(0, frames + 1), shown.slice(frames, -frames), shown.slice(-frames - 1, len(shown))
+    moving = (motion.posture(0), Velocity.at_end(before)), (motion.posture(-1), Velocity.at_start(after))
+    rates = [rates.joints for one in moving if (rates := stop_at(corpus, *one).rates) is not None]
+    true, times = corpus.to_chains(motion.rotations)[:, : len(skeleton)], motion.times
+    straight, even = minimal_movement(true[[0, -1]], times, None, None), rot.log(rot.inv_mul(true[0], true[-1]))
+    truly = rot.log(rot.inv_mul(straight, true))
+    out = np.empty(len(LASTS))
+    for k, lasts in enumerate(LASTS):
+        departs = departure(times, *(rate - even / (times[-1] - times[0]) for rate in rates), lasts=lasts)
+        squares = np.sum((truly - departs) ** 2, axis=-1)
+        out[k] = np.sqrt(squares @ _carried(skeleton)).mean()
+    return out
+
+
+def _carried(skeleton: Skeleton) -> Floats:
+    """Return how many joints each joint turns with it [J]: as often its error is in the global rotations."""
+    out = np.ones(len(skeleton))
+    for joint in range(len(skeleton) - 1, 0, -1):
+        out[skeleton.parents[joint]] += out[joint]
+    return out
