@@ -1,7 +1,8 @@
 """python -m experiments.trust.prior [FOLDER]
 
-Prints what dancers of the folder (../shared/data) show of trust together, each counting the same: the prior of
-`motionmind.learned.trust`. Of a phrase that was danced more than once, one recording is taken. The recordings are those of mocap.cs.cmu.edu, which are free for all uses.
+Print what dancers of the folder (../shared/data) show of trust together, each counting the same: the prior of
+`motionmind.learned.trust`. Of a phrase that was danced more than once, one recording is taken. The recordings are those
+of mocap.cs.cmu.edu, which are free for all uses.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from motionmind.learned.carriage import learn_carriage
 from motionmind.learned.trust import RATIOS, Squares
 from motionmind.walks.evidence import LASTS, errors_of_lasting, gather_evidence
 
-DANCERS = ("cmu-05", "cmu-16", "cmu-29", "cmu-135")  # jazz, runs and leaps, tai chi, karate
+DANCERS = ("cmu-05", "cmu-16", "cmu-29", "cmu-135")  # dance, runs and leaps, slow gestures, karate
 WINDOWS = 120  # of each length
 STRENGTH = 0.01  # of nothing at all, for entries that no window tells of
 

@@ -25,10 +25,10 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
 from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.pace import over_seconds, way_between
+from motionmind.learned.trust import NO_WAY
 from motionmind.realise.detour import detour
 from motionmind.realise.timeline import usual
 from motionmind.tween.pacing import usual_times
-from motionmind.learned.trust import NO_WAY
 from motionmind.walks.expectation import expect
 from motionmind.walks.passages import Place, dance
 from motionmind.walks.stops import Stop, stop_at

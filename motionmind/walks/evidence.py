@@ -70,13 +70,13 @@ def learn_trust(corpus: Corpus, carriage: Carriage, workshop: Workshop | None = 
         workshop: threads; None for this one.
     """
     table = fit_table(gather_evidence(corpus, carriage, WINDOWS, workshop), PRIOR.table)
-    lasts = LASTS[int(np.argmin(errors))] if (errors := errors_of_lasting(corpus, 2 * WINDOWS)).any() else PRIOR.lasts[0]
+    lasts = (
+        LASTS[int(np.argmin(errors))] if (errors := errors_of_lasting(corpus, 2 * WINDOWS)).any() else PRIOR.lasts[0]
+    )
     return Trust(table, np.array([lasts]), spread_of(corpus, carriage))
 
 
-def gather_evidence(
-    corpus: Corpus, carriage: Carriage, count: int, workshop: Workshop | None = None
-) -> list[Squares]:
+def gather_evidence(corpus: Corpus, carriage: Carriage, count: int, workshop: Workshop | None = None) -> list[Squares]:
     """Return how far walks are right in windows of each family of clips, when they know the other families alone.
 
     Args:
@@ -112,7 +112,9 @@ def of_pieces(corpus: Corpus, carriage: Carriage, pieces: Sequence[_Piece]) -> C
     postures = np.concatenate([np.arange(piece.start, piece.stop) for piece in pieces])
     moves = np.concatenate(
         [
-            np.arange(firsts[number] + piece.start - starts[piece.clip], firsts[number] + piece.stop - 1 - starts[piece.clip])
+            np.arange(
+                firsts[number] + piece.start - starts[piece.clip], firsts[number] + piece.stop - 1 - starts[piece.clip]
+            )
             for round_ in (0, count)
             for piece in pieces
             if firsts[(number := round_ + piece.clip) + 1] > firsts[number]
@@ -145,7 +147,9 @@ def _pieces(corpus: Corpus) -> list[_Piece]:
     numbers = np.arange(len(starts) - 1)
     if len(corpus) > MOST:
         share = max(MOST / len(corpus), PIECES / len(numbers))
-        numbers = numbers[np.unique((np.arange(0.0, 1.0, 1.0 / max(share * len(numbers), 1.0)) * len(numbers)).astype(int))]
+        numbers = numbers[
+            np.unique((np.arange(0.0, 1.0, 1.0 / max(share * len(numbers), 1.0)) * len(numbers)).astype(int))
+        ]
     longest = max(MOST // PIECES, MOST // len(numbers)) if len(corpus) > MOST else len(corpus)
     out = []
     for number in numbers.tolist():
@@ -223,17 +227,18 @@ def _errors_in(corpus: Corpus, clip: Clip, window: _Window) -> Floats:
     skeleton, frames = corpus.skeleton, corpus.detail.shape[1] + 1  # a move
     first, last = ((end - clip.start) * frames for end in (window.first, window.last))
     shown = corpus.recording(clip, first - frames, last + frames + 1)
-    before, motion, after = shown.slice(0, frames + 1), shown.slice(frames, -frames), shown.slice(-frames - 1, len(shown))
-    moving = (motion.posture(0), Velocity.at_end(before)), (motion.posture(-1), Velocity.at_start(after))
-    rates = [rates.joints for one in moving if (rates := stop_at(corpus, *one).rates) is not None]
+    motion, after = shown.slice(frames, len(shown) - frames), shown.slice(len(shown) - frames - 1, len(shown))
+    leaves = stop_at(corpus, motion.posture(0), Velocity.at_end(shown.slice(0, frames + 1))).rates
+    arrives = stop_at(corpus, motion.posture(-1), Velocity.at_start(after)).rates
+    assert leaves is not None
+    assert arrives is not None
     true, times = corpus.to_chains(motion.rotations)[:, : len(skeleton)], motion.times
-    straight, even = minimal_movement(true[[0, -1]], times, None, None), rot.log(rot.inv_mul(true[0], true[-1]))
-    truly = rot.log(rot.inv_mul(straight, true))
+    truly = rot.log(rot.inv_mul(minimal_movement(true[[0, -1]], times, None, None), true))
+    even = rot.log(rot.inv_mul(true[0], true[-1])) / (times[-1] - times[0])
     out = np.empty(len(LASTS))
     for k, lasts in enumerate(LASTS):
-        departs = departure(times, *(rate - even / (times[-1] - times[0]) for rate in rates), lasts=lasts)
-        squares = np.sum((truly - departs) ** 2, axis=-1)
-        out[k] = np.sqrt(squares @ _carried(skeleton)).mean()
+        off = truly - departure(times, leaves.joints - even, arrives.joints - even, lasts=lasts)
+        out[k] = np.sqrt(np.sum(off**2, axis=-1) @ _carried(skeleton)).mean()
     return out
 
 

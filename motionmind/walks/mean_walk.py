@@ -82,8 +82,8 @@ def mean_walk(
     Walks of limbs count as much as those of larger parts together. The moments, by which the body travels and stands,
     are those of walks of the whole and of the part that carries it. The mean is taken as a departure from the minimal
     movement between the stops (`motionmind.walks.minimal`), of which that share is kept that the corpus has been found
-    to know (`motionmind.learned.trust`). It comes near the stops but not to them: its offsets there are subtracted along the
-    walk in proportion to time, and those of its velocities as `departure` has it.
+    to know (`motionmind.learned.trust`). It comes near the stops but not to them: its offsets there are subtracted
+    along the walk in proportion to time, and those of its velocities as `departure` has it.
 
     Args:
         skeleton: the body.
@@ -133,7 +133,7 @@ class Walk(NamedTuple):
 
     def trusted(self, trust: Trust) -> Floats:
         """Return the share of its departure that each joint keeps [J], from 0 to 1."""
-        return trust.shares(self.nearest.mean(axis=1), self.ways)[self.members] @ np.array(SIZES)
+        return np.asarray(trust.shares(self.nearest.mean(axis=1), self.ways)[self.members] @ np.array(SIZES))
 
 
 class _PartWalk(NamedTuple):

@@ -59,5 +59,5 @@ def minimal_movement(
     if leaving is None and arriving is None:
         return straight
     even = rot.log(rot.inv_mul(ends[0], ends[1])) / length
-    rates = (None if rate is None else rate - even for rate in (leaving, arriving))
-    return rot.mul(straight, rot.exp(departure(times, *rates, lasts=lasts)))
+    first, last = (None if rate is None else rate - even for rate in (leaving, arriving))
+    return rot.mul(straight, rot.exp(departure(times, first, last, lasts=lasts)))

@@ -26,6 +26,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.learned.carriage import SLIDES, Carriage, learn_carriage
+from motionmind.learned.trust import Trust
 from motionmind.realise.bending import FIRMLY
 from motionmind.realise.realise import LINGERS, realise
 from motionmind.realise.retime import HEADROOM, keep_pace
@@ -318,7 +319,7 @@ def test_detail_lingers_where_walks_are_hardly_trusted(monkeypatch: pytest.Monke
     a, b, carried = clip.posture(12), clip.posture(96), parts_of(human23())[2]
 
     def size(trust: float) -> float:
-        monkeypatch.setattr("motionmind.walks.mean_walk.trust", lambda *_: trust)
+        monkeypatch.setattr(Trust, "shares", lambda _, off, ways: np.full(len(ways), trust))
         found, plain = (realised(one, list(range(2, 17)), a, b) for one in (known, smooth))
         return float(np.median(rot.angle(found.rotations, plain.rotations)[3::6, carried]))
 

@@ -1,4 +1,4 @@
-"""The minimal movement between two postures, and how far walks through a corpus are trusted beyond it."""
+"""The minimal movement between two postures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
-from motionmind.walks.minimal import FAR, LASTS, NO_WAY, SHARPLY, UNLIKE, departure, minimal_movement, trust
+from motionmind.walks.minimal import LASTS, departure, minimal_movement
 
 SOON = 1e-6  # seconds
 
@@ -91,35 +91,3 @@ def test_a_body_that_turns_evenly_already_goes_on_so() -> None:
     even = rot.log(rot.inv_mul(*ends)) / 1.5
     found, straight = minimal_movement(ends, times, even, even), minimal_movement(ends, times, None, None)
     assert rot.angle(found, straight).max() < 1e-7
-
-
-# --- trust ------------------------------------------------------------------------------------------------------------
-
-
-def test_ends_in_the_corpus_are_trusted_and_far_ones_are_not() -> None:
-    """Far in comparison with the way to go, or far altogether."""
-    for way in (0.01, 0.05, 0.3, 2.0):
-        assert trust(np.zeros(2), way) == 1.0
-        assert trust(np.full(2, way / FAR), way) == pytest.approx(0.5 / (1.0 + (way / FAR / UNLIKE) ** SHARPLY))
-        assert trust(np.full(2, 10.0 * way), way) < 1e-3
-        assert trust(np.full(2, min(0.05 * way, 0.05)), way) > 0.999
-        shares = [trust(np.array([0.0, far]), way) for far in np.linspace(0.0, 5.0 * way, 40)]
-        assert np.all(np.diff(shares) < 0.0)
-
-
-def test_far_altogether_is_not_trusted_however_far_there_is_to_go() -> None:
-    assert trust(np.full(2, UNLIKE), 1e6) == pytest.approx(0.5)
-    assert trust(np.full(2, 4.0 * UNLIKE), 1e6) < 0.01
-
-
-def test_where_there_is_no_way_to_go_nothing_is_trusted() -> None:
-    for nearest in (np.zeros(2), np.ones(2)):
-        for way in (0.0, 0.5 * NO_WAY):
-            assert trust(nearest, way) == 0.0
-
-
-@given(st.floats(0.0, np.pi), st.floats(0.0, np.pi), st.floats(0.0, np.pi))
-def test_trust_is_a_share_of_both_ends_alike(a: float, b: float, way: float) -> None:
-    share = trust(np.array([a, b]), way)
-    assert 0.0 <= share <= 1.0
-    assert share == trust(np.array([b, a]), way)
