@@ -1,4 +1,4 @@
-"""python -m experiments.trust.prior [FOLDER]
+"""python experiments/trust/prior.py [FOLDER]
 
 Print what dancers of the folder (../shared/data) show of trust together, each counting the same: the prior of
 `motionmind.learned.trust`. Of a phrase that was danced more than once, one recording is taken. The recordings are those

@@ -133,5 +133,5 @@ def fit_table(families: Sequence[Squares], prior: Floats) -> Floats:
 
 
 # What cmu-05, cmu-16, cmu-29 and cmu-135 (mocap.cs.cmu.edu) show together, each counting the same:
-# python -m experiments.trust.prior
+# python experiments/trust/prior.py
 PRIOR = Trust(np.array([1.0, 1.0, 0.35, 0.13, 0.01]), np.array([0.45]), np.array(np.inf))
