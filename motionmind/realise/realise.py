@@ -171,7 +171,7 @@ def realise(
     danced = _danced(walk, clock, stops, corpus, carriage, liveliness, place, states, tolerances, fixed)
     chains = walk.chains(corpus, clock.frames)
     rotations = corpus.from_chains(danced.move(chains, clock.frames) if danced else chains)
-    rotations = _with_rates(rotations, clock, [*stops], leaving, arriving)
+    rotations = _with_rates(rotations, clock, [*stops], leaving, arriving, float(carriage.trust.lasts[0]))
     # Once so that feet find places to stand at, and once for where they have been put.
     keep_apart = keeper(clock, [*stops], fixed, wished, carriage, a.skeleton, without)
     rotations = _limit(keep_apart(rotations, None), postures, carriage.loose)
@@ -385,9 +385,15 @@ def _danced(
 
 
 def _with_rates(
-    rotations: Floats, clock: Timeline, stops: Sequence[int], leaving: Velocity | None, arriving: Velocity | None
+    rotations: Floats,
+    clock: Timeline,
+    stops: Sequence[int],
+    leaving: Velocity | None,
+    arriving: Velocity | None,
+    lasts: float,
 ) -> Floats:
-    """Return rotations [N, J, 4] that leave their first frame and arrive at their last with the given velocities.
+    """Return rotations [N, J, 4] that leave their first frame and arrive at their last with the given velocities, each
+    of which is felt for so many seconds at most.
 
     They do not change at the moves of the `stops` nor between those on the way.
     """
@@ -398,7 +404,7 @@ def _with_rates(
     if first is None and last is None:
         return rotations
     until = clock.moves[stops[1]], clock.moves[stops[-2]]
-    return rot.mul(rotations, rot.exp(departure(times, first, last, until)))
+    return rot.mul(rotations, rot.exp(departure(times, first, last, until, lasts)))
 
 
 def _limit(rotations: Floats, postures: Mapping[int, Posture], loose: Bools) -> Floats:

@@ -23,9 +23,9 @@ from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline
 from motionmind.learned.carriage import Carriage
+from motionmind.learned.trust import NO_WAY
 from motionmind.walks.expectation import Expectation
 from motionmind.walks.frames import Frames, frames_near, frames_of, squared_distances
-from motionmind.walks.minimal import NO_WAY
 from motionmind.walks.stops import Stop
 
 STRIDE = 3  # frames of a recording from one node of a passage to the next, 0.1 s, as it was danced
