@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from motionmind.walks.detail import GOES_OVER, LIVELIER, MISSES, detail_of, likest_moves, share_of_detail
 
 from motionmind._typing import Floats, Int32s
 from motionmind.body.capsules import legs_depth
@@ -31,7 +32,6 @@ from motionmind.realise.bending import FIRMLY
 from motionmind.realise.realise import LINGERS, realise
 from motionmind.realise.retime import HEADROOM, keep_pace
 from motionmind.realise.timeline import Timeline, durations
-from motionmind.walks.detail import GOES_OVER, LIVELIER, MISSES, detail_of, likest_moves, share_of_detail
 from motionmind.walks.expectation import Expectation
 from motionmind.walks.likelihood import ANYWHERE, STRAIGHT_ON, squared_distances
 from motionmind.walks.marginals import posterior_marginals
