@@ -9,6 +9,7 @@ import signal
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any, TextIO
@@ -20,10 +21,12 @@ from motionmind.errors import MotionMindWarning, enumerated
 
 if TYPE_CHECKING:
     from motionmind.search.solve import Progress
+    from motionmind.tween.certificate import Source
     from motionmind.tween.result import Tween
     from motionmind.tween.what_if import WhatIf
 
 
+_GOES_ON_S = 3.0  # seconds from one place of a passage to the next, at most: a score's postures lie so far apart
 _FEW = 3  # warnings that are printed without --details
 
 
@@ -125,10 +128,23 @@ def _print_details(result: Tween) -> None:
     """Print the search's figures: moves, cost, proof, make-up, and distances from the corpus."""
     lines = [*_search_lines(result), *_distance_lines(result)]
     if result.detail:
-        lines.append(("detail", f"from {', '.join(dict.fromkeys(displayed(source.clip) for source in result.detail))}"))
+        lines.append(("danced", f"like {_passages(result.detail)}"))
     lines.insert(1, ("pace", _tempo(result)))
     for name, line in lines:
         click.echo(f"{name:10}{line}")
+
+
+def _passages(places: Sequence[Source]) -> str:
+    """Format the passages that a movement is danced like: "adagio from 3.2 s, temps-lie from 10.0 s"."""
+    starts = [*places[:1], *(after for before, after in pairwise(places) if _parts(before, after))]
+    return ", ".join(f"{displayed(one.clip)} from {one.seconds:.1f} s" for one in starts)
+
+
+def _parts(before: Source, after: Source) -> bool:
+    """Return whether a place in a corpus is not where a passage goes on from another."""
+    return (before.clip, before.corpus, before.mirrored) != (after.clip, after.corpus, after.mirrored) or not (
+        before.seconds <= after.seconds <= before.seconds + _GOES_ON_S
+    )
 
 
 def _tempo(result: Tween) -> str:
@@ -222,7 +238,8 @@ def print_alternatives(results: Sequence[Tween], files: Sequence[Path], *, with_
 
     for number, result in enumerate(results, start=1):
         differs = ", ".join(f"{share:.0%}" for share in result.differs)
-        click.echo(f"{number:2}  {headline(result)}{f'; differs by {differs}' if differs else ''}")
+        passage = f"; follows {displayed(result.request.passage)}" if result.request.passage else ""
+        click.echo(f"{number:2}  {headline(result)}{passage}{f'; differs by {differs}' if differs else ''}")
         _print_beyond(result, "    ")
     for one in results[0].what_if:
         click.echo(f"without   {format_what_if(one)}")

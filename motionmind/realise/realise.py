@@ -168,7 +168,7 @@ def realise(
         clock, half_steps = stretch(clock, walk.half_steps, longer, fps)
         walk, stance = walk._replace(half_steps=half_steps), stance._replace(half_steps=half_steps)
     quick = None if fastest is None else pace * fastest
-    danced = _danced(walk, clock, stops, corpus, carriage, liveliness, place, states, tolerances, fixed)
+    danced = _danced(walk, clock, stops, corpus, carriage, liveliness, place, states, tolerances, wished, fixed)
     chains = walk.chains(corpus, clock.frames)
     rotations = corpus.from_chains(danced.move(chains, clock.frames) if danced else chains)
     rotations = _with_rates(rotations, clock, [*stops], leaving, arriving, float(carriage.trust.lasts[0]))
@@ -352,9 +352,12 @@ def _danced(
     place: Place | None,
     states: Floats,
     tolerances: Floats,
+    wished: Bools,
     fixed: Bools,
 ) -> Danced | None:
     """Return how a walk is danced; no joint leaves its states' tolerance for that, and `fixed` ones do not move.
+
+    Where a joint is beyond the tolerance already, it may go on as far, unless something is asked of it.
 
     Args:
         walk: the movement at its half steps.
@@ -366,6 +369,7 @@ def _danced(
         place: where the passage begins; None for any.
         states: orientations of the path's states at the moves [T + 1, L, 4].
         tolerances: radians within which a state of each chain stands for an orientation [L].
+        wished: chains of which more is asked than that they go from A to B [L].
         fixed: chains that are not displaced [L].
     """
     passed = {float(clock.moves[move]): stop for move, stop in stops.items()}
@@ -377,7 +381,8 @@ def _danced(
     moved = danced.move(chains, clock.moves)
     before, after = (rot.angle(found[:, :joints], states[:, :joints]) for found in (chains, moved))
     room = np.maximum(most - before, 0.0) / np.maximum(rot.norm(off), 1e-9)
-    share = np.where(after <= np.maximum(most, before), 1.0, np.minimum(room, 1.0))
+    firmly = np.where(wished[:joints], most, np.maximum(most, before))
+    share = np.where(after <= firmly, 1.0, np.minimum(room, 1.0))
     share[:, fixed[:joints]] = 0.0
     share[:, [joint for leg, _ in find_legs(corpus.skeleton)[1] for joint in leg]] *= LEGS_SHARE
     shares = np.stack([np.interp(danced.times, clock.moves, own) for own in share.T], axis=1)

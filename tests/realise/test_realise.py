@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from motionmind.walks.detail import GOES_OVER, LIVELIER, MISSES, detail_of, likest_moves, share_of_detail
 
 from motionmind._typing import Floats, Int32s
 from motionmind.body.capsules import legs_depth
@@ -27,9 +26,8 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.learned.carriage import SLIDES, Carriage, learn_carriage
-from motionmind.learned.trust import Trust
 from motionmind.realise.bending import FIRMLY
-from motionmind.realise.realise import LINGERS, realise
+from motionmind.realise.realise import realise
 from motionmind.realise.retime import HEADROOM, keep_pace
 from motionmind.realise.timeline import Timeline, durations
 from motionmind.walks.expectation import Expectation
@@ -255,110 +253,6 @@ def recorded(seconds: float = 8.0, seed: int = 3) -> Motion:
     )
     rotations = rot.mul(rotation_spline(slow.times, slow.rotations, times), rot.exp(np.swapaxes(tremble, 0, 1)))
     return Motion(slow.skeleton, rotations, natural_spline(slow.times, slow.root, times), times, "trembling")
-
-
-@pytest.mark.parametrize("more", [None, 0.0, 0.15, 0.3, 0.55, 1.0])
-def test_the_likest_moves_are_those_of_the_best_sequence_of_all(more: float | None) -> None:
-    """Of another movement, or of one that goes over from clip to clip, and exaggerates so much that this pays."""
-    corpus = gather("walks", [walk(5), walk(4, seed=1)], reverse=1.0)
-    moves, shown = corpus.moves, corpus.to_chains(corpus.rotations)
-    chains = corpus.to_chains(walk(4, seed=2).rotations)
-    if more is not None:
-        shares = np.array([-more, -more, 1.0 + more, 1.0 + more])[:, None]
-        chains = rot.slerp(shown[1:5], shown[5:9], shares)
-    far = np.array([[np.mean(4.0 - 4.0 * np.sum(s * p, axis=-1)[:23] ** 2) for s in shown] for p in chains])
-
-    def cost(sequence: tuple[int, ...]) -> float:
-        near = sum(far[t, moves.begins[m]] + far[t + 1, moves.ends[m]] for t, m in enumerate(sequence))
-        return float(near) + 2.0 * GOES_OVER**2 * sum(not straight(*pair) for pair in pairwise(sequence))
-
-    def straight(m: int, n: int) -> bool:
-        return bool(moves.ends[m] == moves.begins[n] and moves.begins[m] != moves.ends[n])
-
-    found = likest_moves(moves, shown[:, :23], chains[:, :23])
-    assert cost(tuple(found)) == pytest.approx(min(map(cost, product(range(len(moves.begins)), repeat=3))), abs=1e-9)
-
-
-def test_a_movement_of_the_corpus_has_its_own_detail_again() -> None:
-    clip = recorded()
-    corpus = gather("trembling", [clip], rate=5.0)
-    rows = np.arange(6, 25)
-    chains = corpus.to_chains(corpus.rotations)[:, :23]
-    moves = likest_moves(corpus.moves, chains, chains[rows])
-    np.testing.assert_array_equal(corpus.begins[moves], rows[:-1])
-    times = np.arange(6 * len(rows) - 5) / 30.0
-    spline = rotation_spline(corpus.times, corpus.rotations, times + corpus.times[6])
-    again = rot.mul(spline, rot.exp(detail_of(corpus, moves)))
-    assert rot.angle(again, clip.rotations[36 : 36 + len(times)]).max() < 2e-4  # as fine as half a float
-
-
-def test_detail_is_backwards_in_moves_that_are() -> None:
-    corpus = gather("trembling", [recorded(2.0)], rate=5.0, reverse=0.0)
-    forward = np.arange(len(corpus) - 1)
-    backward = forward[::-1] + len(forward)
-    np.testing.assert_array_equal(detail_of(corpus, backward), detail_of(corpus, forward)[::-1])
-
-
-def test_a_tween_has_detail_but_at_its_moves_and_ends() -> None:
-    clip = recorded()
-    known = learned(clip, rate=5.0)
-    smooth = replace(known, corpus=replace(known.corpus, detail=known.corpus.detail[:, :0]))
-    a, b = clip.posture(12), clip.posture(96)
-    rows = list(range(2, 17))
-    found, plain = (realised(one, rows, a, b) for one in (known, smooth))
-    carried = parts_of(human23())[2]  # legs also do what feet need
-    apart = rot.angle(found.rotations, plain.rotations)[:, carried]
-    assert apart[::6].max() < 1e-6
-    assert np.median(apart[3::6]) > 0.01
-
-
-def test_detail_lingers_where_walks_are_hardly_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
-    clip = recorded()
-    known = learned(clip, rate=5.0)
-    smooth = replace(known, corpus=replace(known.corpus, detail=known.corpus.detail[:, :0]))
-    a, b, carried = clip.posture(12), clip.posture(96), parts_of(human23())[2]
-
-    def size(trust: float) -> float:
-        monkeypatch.setattr(Trust, "shares", lambda _, off, ways: np.full(len(ways), trust))
-        found, plain = (realised(one, list(range(2, 17)), a, b) for one in (known, smooth))
-        return float(np.median(rot.angle(found.rotations, plain.rotations)[3::6, carried]))
-
-    assert size(0.0) < 1e-6
-    assert size(0.01) == pytest.approx(0.01**LINGERS * size(1.0), rel=0.5)
-    assert size(0.01) > 0.3 * size(1.0)
-
-
-@pytest.mark.parametrize("slower", [0.5, 1.0, LIVELIER, 4.0, 100.0])
-def test_a_movement_gets_detail_in_proportion_to_its_speed(slower: float) -> None:
-    corpus = gather("walks", [walk(8), walk(8, seed=1)], reverse=1.0)
-    moves, shown = corpus.moves, corpus.to_chains(corpus.rotations)[:, :23]
-    copied = np.flatnonzero((moves.begins < 8) & (moves.ends > moves.begins))[:6]
-    poses = shown[[*moves.begins[copied], moves.ends[copied[-1]]]]
-    legs, others = share_of_detail(moves, shown, copied, poses, slower * moves.seconds[copied])
-    np.testing.assert_allclose(legs, min(1.0, LIVELIER / slower), rtol=1e-12)
-    np.testing.assert_allclose(others / legs, 1.0 + MISSES * (1.0 - min(1.0, 1.0 / slower)), rtol=1e-12)
-
-
-def test_rest_gets_no_detail_of_movement() -> None:
-    corpus = gather("walk", [walk(4)], reverse=0.0)
-    moves, shown = corpus.moves, corpus.to_chains(corpus.rotations)[:, :23]
-    share = share_of_detail(moves, shown, np.arange(3), shown[[1, 1, 1, 1]], moves.seconds[:3])
-    np.testing.assert_allclose(share, 0.0, atol=1e-6)
-
-
-def test_a_quiet_tween_trembles_less_than_a_lively_one() -> None:
-    clip = recorded()
-    known = learned(clip, rate=5.0)
-    smooth = replace(known, corpus=replace(known.corpus, detail=known.corpus.detail[:, :0]))
-    a, b, carried = clip.posture(12), clip.posture(96), parts_of(human23())[2]
-
-    def size(pace: float) -> float:
-        found, plain = (realised(one, list(range(2, 17)), a, b, pace=pace) for one in (known, smooth))
-        apart = rot.angle(found.rotations, plain.rotations)[:, carried]
-        return float(np.sqrt(np.mean(apart**2)))
-
-    assert size(0.75) == pytest.approx(size(1.0), rel=0.1)
-    assert size(0.125) == pytest.approx(0.125 * LIVELIER * size(1.0), rel=0.3)
 
 
 # --- the whole --------------------------------------------------------------------------------------------------------

@@ -32,7 +32,7 @@ def test_what_exceeds_the_corpus_by_little_gets_the_digits_that_show_it(value: f
 
 @pytest.fixture(scope="module")
 def tween() -> Tween:
-    return Engine.load("ballet").tween(find_posture("ballet/tendu"), find_posture("ballet/fifth"))
+    return Engine.load("ballet").tween(find_posture("ballet/arabesque"), find_posture("ballet/fifth"))
 
 
 def test_it_says_length_making_proof_and_feet(tween: Tween) -> None:
@@ -77,8 +77,8 @@ def test_feet_that_do_not_stay_are_not_said_to(tween: Tween) -> None:
     far = np.linspace(0.0, 1.0, len(tween.motion))[:, None]
     carried = replace(tween, motion=replace(tween.motion, root=tween.motion.root + far * [1.0, 0.0, 0.0]))
     assert "stay" not in headline(carried)
-    still = replace(tween.motion, rotations=np.tile(tween.motion.rotations[:1], (len(tween.motion), 1, 1)))
-    still = replace(still, root=np.tile(tween.motion.root[:1], (len(tween.motion), 1)))
+    still = replace(tween.motion, rotations=np.tile(tween.motion.rotations[-1:], (len(tween.motion), 1, 1)))
+    still = replace(still, root=np.tile(tween.motion.root[-1:], (len(tween.motion), 1)))
     assert headline(replace(tween, motion=still)).endswith("; feet stay in place")
 
 

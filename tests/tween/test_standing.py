@@ -70,7 +70,7 @@ def test_a_foot_that_stands_in_a_in_b_and_between_stays_where_it_stands(name: st
     slides, rises = departures_of_standing_feet(engine_of(name), gap, 0.015)
     assert len(slides) > 10
     assert np.mean(slides) < 0.008  # it is 1.5 and 3.3 cm where nothing holds them
-    assert np.max(slides) < 0.02
+    assert np.max(slides) < 0.025
     assert np.max(rises) < 0.03
 
 

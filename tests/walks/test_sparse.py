@@ -6,7 +6,6 @@ import gc
 import weakref
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -21,8 +20,7 @@ from motionmind.learned.carriage import Carriage, learn_carriage
 from motionmind.learned.nearest import find_near
 from motionmind.learned.neighbours import build_neighbours
 from motionmind.tween.engine import Engine
-from motionmind.walks import detail, mean_walk, sparse
-from motionmind.walks.detail import likest_moves, moves_near
+from motionmind.walks import mean_walk, sparse
 from motionmind.walks.expectation import Expectation, expect
 from motionmind.walks.steps import follow, steps_at
 from motionmind.walks.stops import moments_rates, stop_at
@@ -225,42 +223,6 @@ def cost(engine: Engine, moves: Ints, poses: Floats) -> float:
     shown, corpus = engine.carriage.orientations[: len(engine.corpus), : poses.shape[1]], engine.corpus.moves
     ends = (shown[corpus.begins[moves]], poses[:-1]), (shown[corpus.ends[moves]], poses[1:])
     return float(sum(np.sum(4.0 * np.sin(0.5 * rot.angle(*pair)) ** 2) for pair in ends))
-
-
-def test_fine_detail_is_found_among_few_moves(engine: Engine, carriage: Carriage) -> None:
-    moves, shown = engine.corpus.moves, engine.carriage.orientations[: len(engine.corpus)]
-    poses = np.asarray(shown[5:12, : len(engine.corpus.skeleton)])
-    assert moves_near(moves, engine.carriage, poses) is None
-    among = moves_near(moves, carriage, poses)
-    assert among is not None
-    found, every = likest_moves(moves, shown, poses, among), likest_moves(moves, shown, poses)
-    np.testing.assert_array_equal(found, every)
-    np.testing.assert_array_equal(likest_moves(moves, shown, poses, np.arange(len(moves.begins))), every)
-    few = likest_moves(moves, shown, poses, among[::3])
-    assert np.isin(few, among[::3]).all()
-    assert cost(engine, few, poses) >= cost(engine, every, poses)
-
-
-def test_fine_detail_is_looked_up_all_along_a_path(
-    engine: Engine, carriage: Carriage, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name in ("NEAREST", "BESIDE"):
-        monkeypatch.setattr(detail, name, 1)
-    path = np.asarray(carriage.orientations[11:15, : len(engine.corpus.skeleton)])  # postures that come but once
-    among = moves_near(engine.corpus.moves, carriage, path)
-    np.testing.assert_array_equal(engine.corpus.moves.begins[among], np.arange(10, 16))
-
-
-def test_one_loop_finds_the_detail_of_what_was_learned_loaded_and_made_just_now(engine: Engine) -> None:
-    """What is compiled ahead would else be compiled again in a tween."""
-    moves, loop = engine.corpus.moves, cast(Any, detail._squared_distances)
-    shown = engine.corpus.rotations.copy()
-    shown.setflags(write=False)
-    likest_moves(moves, shown, shown[5:12])
-    known = len(loop.signatures)
-    likest_moves(moves, shown, shown[5:12].copy())
-    likest_moves(moves, shown.copy(), shown[5:12], np.arange(len(moves)))
-    assert len(loop.signatures) == known
 
 
 def test_a_tween_of_a_corpus_with_trees_is_near_that_without(engine: Engine, carriage: Carriage) -> None:
