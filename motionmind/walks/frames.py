@@ -18,7 +18,7 @@ from motionmind.jit import jit, read_only
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import postures_near
 
-NEAREST = 16  # postures of a large corpus near each of a movement's around which recordings are looked at
+NEAREST = 8  # postures of a large corpus near each of a movement's around which recordings are looked at
 BESIDE = 8  # postures before and after these, at least
 LEAVES = 32  # of the tree over a large corpus that are searched for them
 KNOTS = 4  # postures beyond a stretch that its spline is made through, too: farther ones change it by a hundredth
