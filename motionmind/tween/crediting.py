@@ -1,4 +1,4 @@
-"""Credits of a tween, from the places in the corpus that its moves and its fine detail were found at."""
+"""Credits of a tween, from the places in the corpus that its moves and its passage were found at."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ def credit_tween(
 ) -> tuple[Credit, ...]:
     """Credit the clips that a tween is made of, by the time that each joint spends in moves that they attest.
 
-    The fine detail counts as one more joint. The time of moves that no clip attests is the engine's.
+    The passage that the tween is danced like counts as one more joint. The time of moves that no clip attests is the engine's.
 
     Args:
         corpus: what was searched.
         sources: a place that attests each joint's move, or None [T][L].
-        detail: where the detail was recorded, for even parts of the tween's time.
+        detail: places of the passage, for even parts of the tween's time.
         times: of the moves [T + 1], seconds.
 
     Returns:

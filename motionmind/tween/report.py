@@ -70,7 +70,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         followed: whether the motion is within the tolerance of each joint's state at each move [T + 1][L].
         sources: a place in the corpus that attests each move of each joint; null where none does, or the motion is not
             within the tolerance of both of its states [T][L].
-        detail: where the fine detail was recorded.
+        detail: places in the corpus of the passage that the motion is danced like, one for each tenth of a second.
         left_out: share of the corpus's walks that begin or end in postures for which others stand, about; 0 of a small
             corpus.
         shown: what the motion shows a viewer, beside what the corpus shows at most: "balance", "bounce", "flight",
