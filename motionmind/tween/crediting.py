@@ -18,7 +18,8 @@ def credit_tween(
 ) -> tuple[Credit, ...]:
     """Credit the clips that a tween is made of, by the time that each joint spends in moves that they attest.
 
-    The passage that the tween is danced like counts as one more joint. The time of moves that no clip attests is the engine's.
+    The passage that the tween is danced like counts as one more joint. The time of moves that no clip attests is the
+    engine's.
 
     Args:
         corpus: what was searched.

@@ -48,8 +48,8 @@ class Tween:
         via_degrees: angle between the orientations of the postures to pass through and their states [K, L].
         sources: for each move and chain, a place in the corpus that attests it; None where none does, and where the
             motion is not within the tolerance of the states that the move joins [moves][L].
-        detail: places in the corpus of the passage that the motion is danced like, one for each tenth of a second; empty
-            where it is danced like none.
+        detail: places in the corpus of the passage that the motion is danced like, one for each tenth of a second;
+            empty where it is danced like none.
         left_out: share of the corpus's walks that begin or end in postures for which others stand, about, in the part
             of the body where it is greatest; 0 of a small corpus, of which every posture counts for itself.
         expansions: nodes that A* expanded.
