@@ -199,7 +199,6 @@ class TweenRequest:
             "bridge_price",
             "guide",
             "fps",
-            "liveliness",
         ):
             check_real(name.rstrip("_"), getattr(self, name))
         check_real("liveliness", self.liveliness)
