@@ -65,7 +65,7 @@ def _likeliest(recorded: Frames, ends: tuple[Stop, Stop], poses: Floats, steps: 
         if len(found) == LIKELIEST or not np.isfinite(total[end]):
             break
         begin = int(begins[end])
-        if all(min(end, other) - max(begin, one) <= 0.5 * (end - begin) for one, other in found):
+        if all(min(end, other) - max(begin, one) <= 0.5 * min(end - begin, other - one) for one, other in found):
             found.append((begin, end))
     return found
 

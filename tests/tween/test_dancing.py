@@ -1,0 +1,234 @@
+"""Passages by their names; movements that follow them from A to B; what dancing leaves as it was asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+
+from motionmind._typing import Floats
+from motionmind.body.human import human23
+from motionmind.body.motion import Motion, Posture
+from motionmind.bundled import bundled
+from motionmind.corpus.corpus import Corpus
+from motionmind.corpus.gather import gather
+from motionmind.discretize import Codebook
+from motionmind.errors import MotionMindError
+from motionmind.formats import read_posture
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.splines import rotation_spline
+from motionmind.realise import realise
+from motionmind.realise.realise import DANCED_WITHIN
+from motionmind.search.bounding import PROVEN
+from motionmind.tween.engine import Engine
+from motionmind.tween.modes import COMPARED, Modes, find_place
+from motionmind.tween.result import Tween
+from motionmind.walks.passages import Danced, Place
+
+POSTURES = bundled("corpora") / "ballet" / "postures"
+
+
+@pytest.fixture(scope="module")
+def ballet() -> Engine:
+    return Engine.load("ballet")
+
+
+@pytest.fixture(scope="module")
+def ends() -> tuple[Posture, Posture]:
+    return read_posture(POSTURES / "arabesque.json"), read_posture(POSTURES / "fifth.json")
+
+
+def dance(name: str, count: int, seed: int = 0, begin: float = 0.0) -> Motion:
+    rng = np.random.default_rng(seed)
+    rotations = rot.exp(np.cumsum(rng.normal(0.0, 0.1, (count, 23, 3)), axis=0))
+    return Motion(human23(), rotations, np.tile([0.0, 0.9, 0.0], (count, 1)), begin + 0.2 * np.arange(count), name)
+
+
+def posture(corpus: Corpus, row: int) -> Posture:
+    return Posture(corpus.skeleton, corpus.rotations[row], corpus.root[row])
+
+
+# --- names ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def corpus() -> Corpus:
+    """Clips with mirror images, one with an odd name, some taken from another corpus."""
+    other = gather("other", [dance("solo", 4, 2)])
+    clips = [dance("solo", 5, 0, 1.0), dance("a@2s", 9, 1)]
+    return gather("own", clips, mirror=True, mix=[(other, 1.0)])
+
+
+def test_names_of_places_lead_back_to_them(corpus: Corpus) -> None:
+    labels = [clip.label for clip in corpus.clips]
+    assert len(set(labels)) == len(labels) >= 5
+    assert any(label.endswith("(mirrored)") for label in labels)
+    for number, clip in enumerate(corpus.clips):
+        times = corpus.times[clip.start : clip.stop]
+        for seconds in (times[0], times[1] + 0.05, times[-1]):
+            for words in (f"{clip.label}@{seconds:.3f}s", f"{clip.label}@{seconds:.3f}"):
+                place = find_place(corpus, words)
+                assert place.clip == number
+                assert place.seconds == pytest.approx(float(seconds), abs=1e-3)
+    assert find_place(corpus, "a@2s@.5") == Place(labels.index("a@2s"), 0.5)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("solo", "give a clip and a time in it, such as adagio@3.2s"),
+        ("solo@", "give a clip and a time in it"),
+        ("@1.2s", "give a clip and a time in it"),
+        ("solo@-1s", "give a clip and a time in it"),
+        ("solo@1e3s", "give a clip and a time in it"),
+        ("solo@\u0661s", "give a clip and a time in it"),
+        ("sollo@1.2s", "own has no such clip; did you mean solo?"),
+        ("zzz@1.2s", "own has no such clip$"),
+        ("solo@0.9s", r"the clip lasts from 1\.00 s to 1\.80 s of its recording"),
+        ("solo@1.81s", r"the clip lasts from 1\.00 s to 1\.80 s of its recording"),
+        ("\x1b[31m\n@1s", "own has no such clip"),
+    ],
+)
+def test_what_is_no_place_is_refused_in_one_line(corpus: Corpus, name: str, words: str) -> None:
+    with pytest.raises(MotionMindError, match=words) as fault:
+        find_place(corpus, name)
+    message = str(fault.value)
+    assert message.isprintable()
+    assert message.startswith("passage ")
+
+
+def test_modes_yield_names_of_places(ballet: Engine, ends: tuple[Posture, Posture]) -> None:
+    first = ballet.tween(*ends).motion
+    modes = Modes(ballet, first, False, False)
+    names = list(modes)
+    assert len(names) == len(set(names)) > 4
+    for name in names:
+        find_place(ballet.corpus, name)
+    (known,) = modes._known
+    assert len(known) == COMPARED
+    assert rot.angle(known[[0, -1]], first.rotations[[0, -1]]).max() < 1e-7
+
+
+# --- alternatives -----------------------------------------------------------------------------------------------------
+
+
+def rows_of(tween: Tween, count: int = 61) -> Floats:
+    """A motion's rotations at even times."""
+    motion = tween.motion
+    return rotation_spline(motion.times, motion.rotations, np.linspace(motion.times[0], motion.times[-1], count))
+
+
+def check(found: Sequence[Tween]) -> None:
+    """Check that movements follow passages of their own, differ, and are proven to be the best that do."""
+    names = [tween.request.passage for tween in found]
+    assert names[0] is None
+    assert len(set(names)) == len(names)
+    assert len({tween.moves for tween in found}) == 1
+    for number, tween in enumerate(found):
+        assert len(tween.differs) == number
+        assert min(tween.differs, default=1.0) >= 0.2 - 1e-9
+        assert tween.lower_bound <= tween.cost + PROVEN
+
+
+def check_again(engine: Engine, ends: tuple[Posture, Posture], found: Sequence[Tween], number: int) -> None:
+    """Check that a movement is found again by its passage and what it is unlike."""
+    asked: dict[str, Any] = {"passage": found[number].request.passage, "unlike": found[:number]}
+    again = engine.tween(*ends, **asked)
+    np.testing.assert_array_equal(again.path, found[number].path)
+    np.testing.assert_array_equal(again.motion.rotations, found[number].motion.rotations)
+    np.testing.assert_array_equal(again.motion.root, found[number].motion.root)
+
+
+def test_alternatives_of_ballet_follow_other_passages(ballet: Engine, ends: tuple[Posture, Posture]) -> None:
+    found = list(ballet.alternatives(*ends, 4))
+    check(found)
+    check_again(ballet, ends, found, 2)
+    shown = [rows_of(tween) for tween in found]
+    off = [np.degrees(rot.angle(one, other).mean()) for one, other in combinations(shown, 2)]
+    assert min(off) >= 5.0
+    for tween in found[1:]:
+        assert tween.request.passage is not None
+        place = find_place(ballet.corpus, tween.request.passage)
+        assert {source.clip for source in tween.detail} == {ballet.corpus.clips[place.clip].name}
+
+
+def test_alternatives_of_recorded_dance_follow_other_passages(cmu05: Engine) -> None:
+    ends = posture(cmu05.corpus, 40), posture(cmu05.corpus, 300)
+    found = list(cmu05.alternatives(*ends, 4))
+    check(found)
+    check_again(cmu05, ends, found, 3)
+
+
+@pytest.mark.parametrize("count", [2, 3, 12])
+def test_alternatives_of_a_single_short_clip_are_variants_or_refused(count: int) -> None:
+    engine = Engine.fit([dance("alone", count)], discretization=Codebook(15.0))
+    ends = posture(engine.corpus, 0), posture(engine.corpus, count - 1)
+    found = []
+    try:
+        for tween in engine.alternatives(*ends, 3, differ=0.05):
+            found.append(tween)
+    except MotionMindError:
+        assert count < 12
+    assert found
+    for tween in found:
+        assert rot.angle(tween.motion.rotations[-1], ends[1].rotations).max() < 1e-7
+
+
+# --- what dancing leaves as it is -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("liveliness", [0.0, 0.3, 1.0])
+def test_ends_are_exact_however_lively(cmu05: Engine, liveliness: float) -> None:
+    ends = posture(cmu05.corpus, 40), posture(cmu05.corpus, 300)
+    motion = cmu05.tween(*ends, liveliness=liveliness).motion
+    for end, frame in zip(ends, (0, -1), strict=True):
+        assert rot.angle(end.rotations, motion.rotations[frame]).max() < 1e-7
+    np.testing.assert_allclose(motion.root[0], ends[0].root, atol=1e-9)
+
+
+@pytest.mark.parametrize("asked", [{"pin": {"left_elbow": "A", "right_elbow": "A"}}, {"hold": ["left_elbow"]}])
+def test_pinned_and_held_joints_stay_however_lively(cmu05: Engine, asked: dict[str, Any]) -> None:
+    ends = posture(cmu05.corpus, 40), posture(cmu05.corpus, 300)
+    tween = cmu05.tween(*ends, liveliness=1.0, **asked)
+    free = cmu05.tween(*ends, liveliness=1.0)
+    for joint in asked.get("pin", asked.get("hold")):
+        chain = tween.joints.index(joint)
+        # B is where it is, and the movement comes there in the end.
+        assert tween.followed[:-2, chain].all()
+        assert (
+            tween.path_degrees[:-2, chain].mean()
+            < cmu05.space.distance(cmu05.corpus.to_chains(rows_of(free)), np.tile(tween.path[0], (61, 1)))[
+                :, chain
+            ].mean()
+        )
+
+
+def test_no_joint_leaves_its_states_to_dance(
+    cmu05: Engine, ballet: Engine, ends: tuple[Posture, Posture], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[tuple[tuple[Any, ...], Danced]] = []
+    danced_as = realise._danced
+
+    def spy(*arguments: Any) -> Danced | None:
+        found = danced_as(*arguments)
+        assert found is not None
+        calls.append((arguments, found))
+        return found
+
+    monkeypatch.setattr(realise, "_danced", spy)
+    ballet.tween(*ends, liveliness=1.0, pin={"left_elbow": "A"})
+    cmu05.tween(posture(cmu05.corpus, 40), posture(cmu05.corpus, 300), liveliness=1.0)
+    assert len(calls) == 2
+    for (walk, clock, _, corpus, _, _, _, states, tolerances, fixed), danced in calls:
+        chains = walk.chains(corpus, clock.moves)
+        moved = danced.move(chains, clock.moves)
+        joints = danced.off.shape[1]
+        before, after = (rot.angle(found[:, :joints], states[:, :joints]) for found in (chains, moved))
+        # Shares are of the moves, and displacements of times between them.
+        assert np.all(after <= np.maximum(before, (DANCED_WITHIN + 0.1) * tolerances[:joints]) + 1e-6)
+        np.testing.assert_array_equal(danced.off[:, fixed[:joints]], 0.0)
+        assert rot.norm(danced.off).max() > np.radians(5.0)
+    assert calls[0][0][-1].any()
