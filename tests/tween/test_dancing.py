@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import combinations
 from typing import Any
 
@@ -16,12 +17,11 @@ from motionmind.bundled import bundled
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
 from motionmind.discretize import Codebook
-from motionmind.errors import MotionMindError
+from motionmind.errors import MotionMindError, NoPathError
 from motionmind.formats import read_posture
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
 from motionmind.realise import realise
-from motionmind.realise.realise import DANCED_WITHIN
 from motionmind.search.bounding import PROVEN
 from motionmind.tween.engine import Engine
 from motionmind.tween.modes import COMPARED, Modes, find_place
@@ -162,17 +162,15 @@ def test_alternatives_of_recorded_dance_follow_other_passages(cmu05: Engine) -> 
     check_again(cmu05, ends, found, 3)
 
 
-@pytest.mark.parametrize("count", [2, 3, 12])
+@pytest.mark.parametrize("count", [2, 3, 8])
 def test_alternatives_of_a_single_short_clip_are_variants_or_refused(count: int) -> None:
     engine = Engine.fit([dance("alone", count)], discretization=Codebook(15.0))
     ends = posture(engine.corpus, 0), posture(engine.corpus, count - 1)
-    found = []
-    try:
-        for tween in engine.alternatives(*ends, 3, differ=0.05):
-            found.append(tween)
-    except MotionMindError:
-        assert count < 12
-    assert found
+    several = engine.alternatives(*ends, 3, differ=0.05)
+    found = [next(several)]
+    with suppress(NoPathError):
+        found.extend(several)
+    assert len(found) == 3 or count < 8
     for tween in found:
         assert rot.angle(tween.motion.rotations[-1], ends[1].rotations).max() < 1e-7
 
@@ -189,21 +187,25 @@ def test_ends_are_exact_however_lively(cmu05: Engine, liveliness: float) -> None
     np.testing.assert_allclose(motion.root[0], ends[0].root, atol=1e-9)
 
 
-@pytest.mark.parametrize("asked", [{"pin": {"left_elbow": "A", "right_elbow": "A"}}, {"hold": ["left_elbow"]}])
-def test_pinned_and_held_joints_stay_however_lively(cmu05: Engine, asked: dict[str, Any]) -> None:
+@pytest.mark.parametrize("joint", ["left_elbow", "left_wrist"])
+def test_a_pinned_joint_stays_however_lively(ballet: Engine, ends: tuple[Posture, Posture], joint: str) -> None:
+    free, pinned = (ballet.tween(*ends, liveliness=1.0, pin=pin) for pin in ({}, {joint: "A"}))
+    chain = pinned.joints.index(joint)
+    assert set(pinned.path[:-1, chain]) == {free.path[0, chain]}
+    assert pinned.followed[:-1, chain].all()
+
+
+def test_a_held_joint_stays_however_lively(cmu05: Engine) -> None:
     ends = posture(cmu05.corpus, 40), posture(cmu05.corpus, 300)
-    tween = cmu05.tween(*ends, liveliness=1.0, **asked)
     free = cmu05.tween(*ends, liveliness=1.0)
-    for joint in asked.get("pin", asked.get("hold")):
-        chain = tween.joints.index(joint)
-        # B is where it is, and the movement comes there in the end.
-        assert tween.followed[:-2, chain].all()
-        assert (
-            tween.path_degrees[:-2, chain].mean()
-            < cmu05.space.distance(cmu05.corpus.to_chains(rows_of(free)), np.tile(tween.path[0], (61, 1)))[
-                :, chain
-            ].mean()
-        )
+    away = rot.angle(free.motion.rotations, free.motion.rotations[0]).max(axis=0)
+    away[(free.path[0] != free.path[-1])[: len(away)]] = 0.0
+    joint = free.joints[int(away.argmax())]
+    assert away.max() > np.radians(5.0)
+    held = cmu05.tween(*ends, liveliness=1.0, hold=[joint])
+    chain = held.joints.index(joint)
+    assert set(held.path[:, chain]) == {held.path[0, chain]}
+    assert held.followed[:, chain].all()
 
 
 def test_no_joint_leaves_its_states_to_dance(
@@ -227,8 +229,10 @@ def test_no_joint_leaves_its_states_to_dance(
         moved = danced.move(chains, clock.moves)
         joints = danced.off.shape[1]
         before, after = (rot.angle(found[:, :joints], states[:, :joints]) for found in (chains, moved))
-        # Shares are of the moves, and displacements of times between them.
-        assert np.all(after <= np.maximum(before, (DANCED_WITHIN + 0.1) * tolerances[:joints]) + 1e-6)
+        within = tolerances[:joints] + 1e-6
+        assert np.all((after <= within) | (before > within))
+        # Who is outside goes hardly farther: moves fall between the times of the displacements.
+        assert np.all((after <= within) | (after <= before + np.radians(0.5)))
         np.testing.assert_array_equal(danced.off[:, fixed[:joints]], 0.0)
         assert rot.norm(danced.off).max() > np.radians(5.0)
     assert calls[0][0][-1].any()
