@@ -331,12 +331,13 @@ def test_the_liveliest_moves_nearly_as_the_passage_does(
     assert departs(danced.move(chains, danced.times)) < 0.25 * departs(chains)
 
 
-def test_who_ends_as_they_began_holds_still_unless_more_is_known(cmu05: Engine) -> None:
-    expected, stops = walk(cmu05, {0: 40, 8: 40})
-    call = partial(dance, cmu05.corpus, cmu05.carriage, expected)
+def test_who_ends_as_they_began_holds_still_unless_more_is_known() -> None:
+    ballet = Engine.load("ballet")
+    expected, stops = walk(ballet, {0: 40, 8: 40})
+    call = partial(dance, ballet.corpus, ballet.carriage, expected)
     assert call(stops, 1.0) is None
     assert call(stops, 1.0, Place(5, 1.0)) is not None
-    middle = stop_at(cmu05.corpus, posture(cmu05, 300))
+    middle = stop_at(ballet.corpus, posture(ballet, 300))
     assert call({0.0: stops[0.0], 0.8: middle, SECONDS: stops[SECONDS]}, 1.0) is not None
     moving = Rates(np.full((23, 3), 0.5), np.zeros(()), np.zeros(3))
     assert call({0.0: stops[0.0]._replace(rates=moving), SECONDS: stops[SECONDS]}, 1.0) is not None
