@@ -44,7 +44,9 @@ def ends() -> tuple[Posture, Posture]:
 def dance(name: str, count: int, seed: int = 0, begin: float = 0.0) -> Motion:
     rng = np.random.default_rng(seed)
     rotations = rot.exp(np.cumsum(rng.normal(0.0, 0.1, (count, 23, 3)), axis=0))
-    return Motion(human23(), rotations, np.tile([0.0, 0.9, 0.0], (count, 1)), begin + 0.2 * np.arange(count), name)
+    return Motion(
+        human23(), rotations, np.tile([0.0, 0.9, 0.0], (count, 1)), begin + 0.2 * np.arange(float(count)), name
+    )
 
 
 def posture(corpus: Corpus, row: int) -> Posture:

@@ -40,7 +40,7 @@ def turning(counts: tuple[int, ...]) -> Corpus:
     """Clips of so many keyframes, 0.2 s apart; every joint but the root turns at one velocity."""
     clips = []
     for number, count in enumerate(counts):
-        times = 0.2 * np.arange(count)
+        times = 0.2 * np.arange(float(count))
         turned = times[:, None, None] * np.tile(SPEED, (23, 1))
         turned[:, 0] = 0.0
         clips.append(clip(rot.exp(turned), times, f"clip {number}"))

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from motionmind._typing import Floats
+from motionmind.body.contact import RATE
+from motionmind.body.motion import Posture
 from motionmind.geometry import rotations as rot
 from motionmind.tween.engine import Engine
 from motionmind.walks.frames import Frames, all_frames
 from motionmind.walks.modes import LIKELIEST, _from_start_to_end, _held_to_ends, _likeliest, find_modes
-from motionmind.walks.passages import RATE, STRIDE, WARP_COST, WARPS, Place, distances
+from motionmind.walks.passages import STRIDE, WARP_COST, WARPS, Place, distances
 from motionmind.walks.stops import Stop, stop_at
 
 COUNT = 11
@@ -24,11 +26,8 @@ def ballet() -> Engine:
 
 
 def ends(engine: Engine, a: int, b: int) -> tuple[Stop, Stop]:
-    motion = engine.corpus.motion(engine.corpus.clips[0])
-    one, other = (
-        type(motion.posture(0))(motion.skeleton, engine.corpus.rotations[row], engine.corpus.root[row])
-        for row in (a, b)
-    )
+    corpus = engine.corpus
+    one, other = (Posture(corpus.skeleton, corpus.rotations[row], corpus.root[row]) for row in (a, b))
     return stop_at(engine.corpus, one), stop_at(engine.corpus, other)
 
 

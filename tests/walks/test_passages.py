@@ -75,7 +75,8 @@ def costs_of(recorded: Frames, shown: Ints, apart: Floats, given: Ints) -> Float
         if recorded.stretches[one] == recorded.stretches[other] and other - one in WARPS:
             leads[one, other] = min(WARP_COST * abs(other - one - STRIDE), CHANGE_COST)
     weights = np.where(np.isin(nodes, given), ENDS_WEIGHT, WAY_WEIGHT)
-    return (weights * apart[nodes, shown]).sum(axis=1) + leads[shown[:, :-1], shown[:, 1:]].sum(axis=1)
+    own: Floats = (weights * apart[nodes, shown]).sum(axis=1)
+    return own + leads[shown[:, :-1], shown[:, 1:]].sum(axis=1)
 
 
 # --- the passage of least cost ----------------------------------------------------------------------------------------
@@ -85,7 +86,7 @@ def costs_of(recorded: Frames, shown: Ints, apart: Floats, given: Ints) -> Float
 def test_no_passage_costs_less(seed: int) -> None:
     rng = np.random.default_rng(seed)
     recorded = frames(rot.exp(rng.normal(0.0, 0.2, (10, 2, 3))), (6, 4), rng.normal(0.0, 1.0, (10, 2, 3)))
-    poses, times = rot.exp(rng.normal(0.0, 0.2, (4, 2, 3))), 0.1 * np.arange(4)
+    poses, times = rot.exp(rng.normal(0.0, 0.2, (4, 2, 3))), 0.1 * np.arange(4.0)
     ends = stop(poses[0], rng.normal(0.0, 1.0, (2, 3))), stop(poses[-1])
     given = np.array([0, 3] if seed % 2 else [0, 1, 3])
     found = find_passage(recorded, poses, times, ends, given)
@@ -116,7 +117,9 @@ def test_a_piece_of_a_recording_is_found_again(cmu05: Engine, number: int) -> No
     own = np.flatnonzero(recorded.stretches == number)
     nodes = own[7:52:STRIDE]
     poses = recorded.chains[nodes, :-1]
-    found = find_passage(recorded, poses, 0.1 * np.arange(len(nodes)), at_rest(poses), np.array([0, len(nodes) - 1]))
+    found = find_passage(
+        recorded, poses, 0.1 * np.arange(float(len(nodes))), at_rest(poses), np.array([0, len(nodes) - 1])
+    )
     np.testing.assert_array_equal(found.frames, nodes)
     assert found.starts.tolist() == [0]
     np.testing.assert_array_equal(found.postures, recorded.postures[nodes])
@@ -129,7 +132,7 @@ def test_what_is_danced_faster_or_slower_is_found_too(cmu05: Engine, faster: flo
         own = np.flatnonzero(recorded.stretches == number)
         nodes = own[0] + np.round(10 + STRIDE * faster * np.arange(11)).astype(np.int64)
         poses = recorded.chains[nodes, :-1]
-        found = find_passage(recorded, poses, 0.1 * np.arange(11), at_rest(poses), np.array([0, 10]))
+        found = find_passage(recorded, poses, 0.1 * np.arange(11.0), at_rest(poses), np.array([0, 10]))
         assert np.all(recorded.stretches[found.frames] == number)
         assert np.abs(found.frames - nodes).max() <= 8
         apart = distances(recorded, poses, at_rest(poses))[[0, -1], found.frames[[0, -1]]]
@@ -140,7 +143,7 @@ def test_what_is_danced_faster_or_slower_is_found_too(cmu05: Engine, faster: flo
 def test_a_tempo_up_to_a_third_off_is_followed_through_what_is_given(warp: int) -> None:
     recorded, nodes = random_recording((60, 60)), 65 + warp * np.arange(8)
     poses = recorded.chains[nodes]
-    found = find_passage(recorded, poses, 0.1 * np.arange(8), at_rest(poses), np.arange(8))
+    found = find_passage(recorded, poses, 0.1 * np.arange(8.0), at_rest(poses), np.arange(8))
     np.testing.assert_array_equal(found.frames[1:-1], nodes[1:-1])
     np.testing.assert_allclose(found.frames, nodes, atol=1)  # a frame off at an end may cost less than a warp
     assert found.starts.tolist() == [0]
@@ -154,7 +157,7 @@ def test_another_stretch_is_taken_where_it_saves_more_than_a_change(share: float
     chains[30:] = turned
     poses = np.tile(rot.IDENTITY, (6, 2, 1))
     poses[-1] = turned
-    found = find_passage(frames(chains, (30, 30)), poses, 0.1 * np.arange(6), at_rest(poses), np.array([0, 5]))
+    found = find_passage(frames(chains, (30, 30)), poses, 0.1 * np.arange(6.0), at_rest(poses), np.array([0, 5]))
     assert np.all(found.frames[:-1] < 30)
     assert (found.frames[-1] >= 30) == changes
     assert len(found.starts) == 1 + changes
@@ -165,7 +168,7 @@ def test_another_stretch_is_taken_where_it_saves_more_than_a_change(share: float
 
 def test_a_passage_at_its_own_tempo_has_the_velocities_of_the_recording() -> None:
     recorded, nodes = random_recording((60,)), 5 + STRIDE * np.arange(11)
-    passage = Passage(0.1 * np.arange(11), nodes, recorded, np.array([0]))
+    passage = Passage(0.1 * np.arange(11.0), nodes, recorded, np.array([0]))
     found = velocities(passage, np.arange(31) / RATE)
     np.testing.assert_allclose(found, recorded.rates[5:35], atol=1e-9)
 
@@ -173,7 +176,7 @@ def test_a_passage_at_its_own_tempo_has_the_velocities_of_the_recording() -> Non
 @pytest.mark.parametrize("warp", WARPS)
 def test_a_passage_at_another_tempo_has_them_in_proportion(warp: int) -> None:
     recorded, nodes = random_recording((90,)), 5 + warp * np.arange(11)
-    passage = Passage(0.1 * np.arange(11), nodes, recorded, np.array([0]))
+    passage = Passage(0.1 * np.arange(11.0), nodes, recorded, np.array([0]))
     times = np.arange(warp * 10 + 1) / (10.0 * warp)
     found = velocities(passage, times)
     np.testing.assert_allclose(found, warp / STRIDE * recorded.rates[5 : 5 + 10 * warp], atol=1e-9)
@@ -182,7 +185,7 @@ def test_a_passage_at_another_tempo_has_them_in_proportion(warp: int) -> None:
 def test_where_stretches_change_velocities_are_blended() -> None:
     recorded = random_recording((90, 90))
     nodes = np.concatenate([10 + STRIDE * np.arange(6), 110 + STRIDE * np.arange(5)])
-    passage = Passage(0.1 * np.arange(11), nodes, recorded, np.array([0, 6]))
+    passage = Passage(0.1 * np.arange(11.0), nodes, recorded, np.array([0, 6]))
     times = np.arange(31) / RATE
     found, middles, change = velocities(passage, times), times[:-1] + 0.5 / RATE, 0.55
     before, after = recorded.rates[10:40], recorded.rates[110 - 18 : 110 + 12]
