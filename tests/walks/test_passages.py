@@ -75,8 +75,8 @@ def costs_of(recorded: Frames, shown: Ints, apart: Floats, given: Ints) -> Float
         if recorded.stretches[one] == recorded.stretches[other] and other - one in WARPS:
             leads[one, other] = min(WARP_COST * abs(other - one - STRIDE), CHANGE_COST)
     weights = np.where(np.isin(nodes, given), ENDS_WEIGHT, WAY_WEIGHT)
-    own: Floats = (weights * apart[nodes, shown]).sum(axis=1)
-    return own + leads[shown[:, :-1], shown[:, 1:]].sum(axis=1)
+    costs: Floats = (weights * apart[nodes, shown]).sum(axis=1) + leads[shown[:, :-1], shown[:, 1:]].sum(axis=1)
+    return costs
 
 
 # --- the passage of least cost ----------------------------------------------------------------------------------------
