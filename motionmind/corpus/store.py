@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FORMAT, BUILT = "motionmind-corpus", "motionmind-built-corpus"
-VERSIONS = {FORMAT: (1,), BUILT: (1, 2, 3, 4, 5, 6, 7, 8, 9)}  # that can be read; the last is written
+VERSIONS = {FORMAT: (1,), BUILT: (1, 2, 3, 4, 5, 6, 7, 8, 9, 10)}  # that can be read; the last is written
 _CLIPS = 9  # the first that keeps what each clip shows of its pace, and the code that learned
 _FEET = 8  # the first that keeps how fast feet are near the floor
 _COMPLETE = 6  # the first that keeps all that is learned, and the last whose manifest lists clips and faults

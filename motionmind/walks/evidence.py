@@ -64,16 +64,20 @@ class _Window(NamedTuple):
 def learn_trust(corpus: Corpus, carriage: Carriage, workshop: Workshop | None = None) -> Trust:
     """Learn how far the walks through a corpus are to be trusted, and how long velocities are felt.
 
+    A corpus of one clip, or one family, has nothing to leave out: it takes the prior.
+
     Args:
         corpus: the movement.
         carriage: its moments.
         workshop: threads; None for this one.
     """
-    table = fit_table(gather_evidence(corpus, carriage, WINDOWS, workshop), PRIOR.table)
-    lasts = (
-        LASTS[int(np.argmin(errors))] if (errors := errors_of_lasting(corpus, 2 * WINDOWS)).any() else PRIOR.lasts[0]
-    )
-    return Trust(table, np.array([lasts]), spread_of(corpus, carriage))
+    spread = spread_of(corpus, carriage)
+    evidence = gather_evidence(corpus, carriage, WINDOWS, workshop) if len(corpus.clips) > 1 else []
+    if len(evidence) < 2:
+        return replace(PRIOR, spread=spread)
+    errors = errors_of_lasting(corpus, 2 * WINDOWS)
+    lasts = LASTS[int(np.argmin(errors))] if errors.any() else PRIOR.lasts[0]
+    return Trust(fit_table(evidence, PRIOR.table), np.array([lasts]), spread)
 
 
 def gather_evidence(corpus: Corpus, carriage: Carriage, count: int, workshop: Workshop | None = None) -> list[Squares]:

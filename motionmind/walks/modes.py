@@ -87,6 +87,8 @@ def _from_start_to_end(stretches: Ints, costs: Floats, steps: int) -> tuple[Floa
             better = on < best[starts + warp]
             best[starts[better] + warp], before[starts[better] + warp] = on[better], begins[starts[better]]
         total, begins = best, before
+        if np.isinf(total.min()):  # no stretch is as long
+            break
     return total, begins
 
 

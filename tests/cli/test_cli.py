@@ -59,6 +59,7 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
         "A",
         "B",
         "motion",
+        "danced",
         "written",
     ]
     assert f" {report['moves']}, in " in table["moves"]

@@ -121,7 +121,7 @@ def test_an_array_that_is_missing_or_another_is_named(tmp_path: Path, name: str,
     ("text", "words"),
     [
         ('{"format": "motionmind-corpus", "version": 2}', "version 2; version 1 can be read"),
-        ('{"format": "motionmind-built-corpus", "version": 10}', "version 10; version 9 can be read"),
+        ('{"format": "motionmind-built-corpus", "version": 11}', "version 11; version 10 can be read"),
         ('{"format": "motionmind-built-corpus", "version": 3, "folder": 3}', "there is no folder 3 beside it"),
         ('{"format": "motionmind-motion", "version": 1}', "is 'motionmind-motion' version 1"),
         ("{}", "is None version None"),

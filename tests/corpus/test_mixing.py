@@ -101,7 +101,7 @@ def test_the_movement_of_a_mix_goes_the_way_of_the_corpus_that_weighs_more(home:
     for weight in (0.01, 0.2, 1.0, 5.0, 100.0):
         engine = home.mix("mixed", [walk("right", pole, aside)], {"other": weight})
         a, b = (walk("ends", [0, 2], [0, 0]).posture(end) for end in (0, 1))
-        tween = engine.tween(a, b, moves=2)
+        tween = engine.tween(a, b, moves=2, liveliness=0.0)
         middle = tween.motion.at(tween.motion.insertions[0].times).rotations[1, 1]
         leans.append(math.degrees(float(rot.log(middle)[2])) / STEP)
     assert np.all(np.diff(leans) < -1e-4)
@@ -117,15 +117,15 @@ def test_on_the_way_too_a_movement_hardly_shows_what_weighs_a_hundredth(home: Ho
 
     def leans(engine: Engine) -> Floats:
         a, b = (walk("ends", [0, 8], [0, 0]).posture(end) for end in (0, 1))
-        tween = engine.tween(a, b, moves=8)
+        tween = engine.tween(a, b, moves=8, liveliness=0.0)
         return np.degrees(rot.log(tween.motion.at(tween.motion.insertions[0].times).rotations[4:8, 1])[:, 2])
 
     alone = leans(learned([clip]))
     assert np.all(alone > 5.0)
     shares = np.array([leans(home.mix("mixed", [clip], {"other": w})) / alone for w in (0.01, 0.2, 1.0, 5.0, 100.0)])
     assert np.all(np.diff(shares.mean(axis=1)) < 0.0)
-    assert shares[0].min() > 0.95
-    assert shares[-1].max() < -0.95
+    assert shares[0].min() > 0.85  # alone, a clip is trusted by the prior; a mix by what its clips tell of each other
+    assert shares[-1].max() < -0.85
     assert 0.4 < shares[1].mean() < 0.95
 
 

@@ -135,7 +135,9 @@ def test_shares_are_the_time_of_the_joints_moves() -> None:
     for row, lasts in zip(report["sources"], seconds, strict=True):
         for source in row:
             spent[f"{source['corpus']}: {source['clip']}" if source else ": "] += lasts
-    whole = seconds.sum() * len(report["joints"])
+    for source in report["detail"]:  # the passage counts as one more joint
+        spent[f"{source['corpus']}: {source['clip']}"] += seconds.sum() / len(report["detail"])
+    whole = seconds.sum() * (len(report["joints"]) + 1)
     found = shares(tween().credits)
     assert found == pytest.approx({name: lasts / whole for name, lasts in spent.items()})
     assert math.isclose(sum(found.values()), 1.0)
