@@ -274,8 +274,28 @@ def dance(
     passage = find_passage(recorded, poses, nodes, (first, last), given)
     times, rows = _grid(passed)
     rates, base = velocities(passage, times)[:, :joints], walk.chains(corpus, times)[:, :joints]
-    off = displacements(base, times, rates, rows, cutoff_of(liveliness, length))
-    return Danced(passage, times, off)
+    off = displacements(base, times, rates, rows[[0, -1]], cutoff_of(liveliness, length))
+    return Danced(passage, times, _kept_from(off, times, rows))
+
+
+def _kept_from(off: Floats, times: Floats, rows: Ints) -> Floats:
+    """Return displacements [n + 1, J, 3] that are 0 at some rows, less smooth bumps that end at the next ones.
+
+    A displacement that was held at 0 there would turn back at once: the movement would falter where it passes.
+
+    Args:
+        off: displacements, 0 at the first row and the last.
+        times: of the displacements [n + 1], seconds.
+        rows: rising, the first and the last among them.
+    """
+    out = off.copy()
+    for before, row, after in zip(rows[:-2], rows[1:-1], rows[2:], strict=True):
+        away = (times - times[row]) / np.where(
+            times < times[row], times[before] - times[row], times[after] - times[row]
+        )
+        share = np.where(away < 1.0, (1.0 - away) ** 2 * (1.0 + 2.0 * away), 0.0)
+        out -= share[:, None, None] * off[row]
+    return out
 
 
 def _grid(passed: Floats) -> tuple[Floats, Ints]:

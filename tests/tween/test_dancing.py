@@ -226,7 +226,7 @@ def test_no_joint_leaves_its_states_to_dance(
     ballet.tween(*ends, liveliness=1.0, pin={"left_elbow": "A"})
     ballet.tween(*ends[::-1], liveliness=1.0)
     assert len(calls) == 2
-    for (walk, clock, _, corpus, _, _, _, states, tolerances, fixed), danced in calls:
+    for (walk, clock, _, corpus, _, _, _, states, tolerances, _, fixed), danced in calls:
         chains = walk.chains(corpus, clock.moves)
         moved = danced.move(chains, clock.moves)
         joints = danced.off.shape[1]
