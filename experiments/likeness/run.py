@@ -33,7 +33,8 @@ __all__ = ["chart", "jobs", "tell", "work"]
 
 DANCERS = ("cmu-05", "indian", "cmu-16", "cmu-135", "bandai", "cmu-29")
 WINDOWS = 24  # of a family and a length, at most
-ENGINES: dict[str, dict[str, Any]] = {"motionmind": {}}  # options of `Engine.tween`, by what the result is called
+# Options of `Engine.tween`, by what the result is called.
+ENGINES: dict[str, dict[str, Any]] = {"motionmind": {}, "liveliness 0": {"liveliness": 0.0}}
 
 
 def jobs(setting: Setting) -> list[dict[str, Any]]:

@@ -35,6 +35,7 @@ WINDOWS = 12  # of each length, evenly spread over the clips
 MOST = 2_000  # postures of the corpus that are learned from: each window takes time in proportion
 PIECES = 8  # of so many clips at least
 PAIRS = 1_000  # of random postures
+FEWEST = 3  # families of clips: of two, each alone decides about the other
 LASTS = (0.3, 0.45, 0.6)  # seconds for which a velocity may be felt; with 1.0 a take of cmu-29 lost 23 points
 
 
@@ -64,7 +65,7 @@ class _Window(NamedTuple):
 def learn_trust(corpus: Corpus, carriage: Carriage, workshop: Workshop | None = None) -> Trust:
     """Learn how far the walks through a corpus are to be trusted, and how long velocities are felt.
 
-    A corpus of one clip, or one family, has nothing to leave out: it takes the prior.
+    A corpus of fewer families of clips than FEWEST tells too little: it takes the prior.
 
     Args:
         corpus: the movement.
@@ -72,8 +73,8 @@ def learn_trust(corpus: Corpus, carriage: Carriage, workshop: Workshop | None = 
         workshop: threads; None for this one.
     """
     spread = spread_of(corpus, carriage)
-    evidence = gather_evidence(corpus, carriage, WINDOWS, workshop) if len(corpus.clips) > 1 else []
-    if len(evidence) < 2:
+    evidence = gather_evidence(corpus, carriage, WINDOWS, workshop) if len(corpus.clips) >= FEWEST else []
+    if len(evidence) < FEWEST:
         return replace(PRIOR, spread=spread)
     errors = errors_of_lasting(corpus, 2 * WINDOWS)
     lasts = LASTS[int(np.argmin(errors))] if errors.any() else PRIOR.lasts[0]
@@ -89,7 +90,7 @@ def gather_evidence(corpus: Corpus, carriage: Carriage, count: int, workshop: Wo
         count: windows of each length.
         workshop: threads; None for this one.
     """
-    pieces, spread = _pieces(corpus), spread_of(corpus, carriage)
+    pieces, spread = [piece for piece in _pieces(corpus) if piece.stop - piece.start > 1], spread_of(corpus, carriage)
     windows = [window for seconds in LENGTHS for window in _windows(corpus, pieces, seconds, count)]
     families = sorted({window.piece.family for window in windows})
     if len({piece.family for piece in pieces}) < 2:

@@ -14,9 +14,9 @@ from motionmind.body.contact import RATE
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
-from motionmind.jit import jit, read_only
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import postures_near
+from motionmind.walks.likelihood import squared_distances
 
 NEAREST = 8  # postures of a large corpus near each of a movement's around which recordings are looked at
 BESIDE = 8  # postures before and after these, at least
@@ -121,22 +121,7 @@ def frames_of(corpus: Corpus, clip: int, begin: float, end: float) -> Frames:
     )
 
 
-def squared_distances(recorded: Frames, poses: Floats) -> Floats:
+def distances_of(recorded: Frames, poses: Floats) -> Floats:
     """Return the squared distances of all frames from some postures [K, J, 4]: means over joints [K, F], radians^2."""
-    shown = np.ascontiguousarray(poses.transpose(1, 2, 0))
-    return np.ascontiguousarray(_sums_of_squares(read_only(recorded.chains), shown).T) / len(shown)
-
-
-@jit
-def _sums_of_squares(orientations: Floats, poses: Floats) -> Floats:
-    """Return the squared distance of all `orientations` [N, L, 4] from each of poses [J, 4, T], summed over the joints
-    [N, T], radians^2."""
-    out = np.zeros((len(orientations), poses.shape[2]))
-    for i in range(len(orientations)):
-        off = out[i]
-        for j in range(len(poses)):
-            x, y, z, w = orientations[i, j]
-            for t in range(len(off)):  # side by side, so that several are measured at once; as `squared_turn`
-                cosine = x * poses[j, 0, t] + y * poses[j, 1, t] + z * poses[j, 2, t] + w * poses[j, 3, t]
-                off[t] += 4.0 * max(1.0 - cosine * cosine, 0.0)
-    return out
+    whole = np.zeros((poses.shape[1], 1), dtype=np.int64)  # the body as its only part
+    return np.asarray(squared_distances(recorded.chains, whole, 1, np.ascontiguousarray(poses))[0])

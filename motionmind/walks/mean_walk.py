@@ -213,7 +213,7 @@ def walk_between(
 
     members, groups = _members(parts, joints)
     ways = [_way(part, ends, float(times[-1] - times[0]), lasts) for part in parts]
-    shown, trees = carriage.orientations, carriage.trees
+    shown, trees = read_only(carriage.orientations), carriage.trees
 
     def off(postures: Floats) -> Floats:
         return squared_distances(shown, members, len(parts), postures)

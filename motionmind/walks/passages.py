@@ -25,7 +25,7 @@ from motionmind.geometry.splines import natural_spline
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.trust import NO_WAY
 from motionmind.walks.expectation import Expectation
-from motionmind.walks.frames import Frames, frames_near, frames_of, squared_distances
+from motionmind.walks.frames import Frames, distances_of, frames_near, frames_of
 from motionmind.walks.stops import Stop
 
 STRIDE = 3  # frames of a recording from one node of a passage to the next, 0.1 s, as it was danced
@@ -135,7 +135,7 @@ def distances(recorded: Frames, poses: Floats, ends: tuple[Stop, Stop]) -> Float
         poses: orientations of the joints [K, J, 4].
         ends: the first and the last of the postures.
     """
-    out = squared_distances(recorded, poses)
+    out = distances_of(recorded, poses)
     for row, stop in zip((0, -1), ends, strict=True):
         if stop.rates is not None:
             off = recorded.rates[:, : poses.shape[1]] - stop.rates.joints
