@@ -400,10 +400,10 @@ def test_costs_are_read_out_of_the_networks_tables(seed: int, monkeypatch: pytes
     """Halve each entry of each table on the way, and every cost of a pair rises by log 2."""
     from pgmpy.factors.discrete import TabularCPD
 
-    before, values = corpus(seed).learned().coordination, TabularCPD.get_values
+    learned, values = grammar(seed), TabularCPD.get_values  # learned before: it is kept for other tests
+    before, starts = learned.coordination, learned.transitions.starts
     monkeypatch.setattr(TabularCPD, "get_values", lambda cpd: 0.5 * values(cpd))
     after, body = corpus(seed).learned().coordination, corpus(seed)
-    starts = grammar(seed).transitions.starts
     for chain in np.flatnonzero(before.parents >= 0):
         seen = set(zip(body.states[:, body.parents[chain]].tolist(), body.states[:, chain].tolist(), strict=True))
         for p, c in product(range(body.sizes[body.parents[chain]]), range(body.sizes[chain])):
