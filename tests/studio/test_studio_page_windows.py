@@ -69,7 +69,8 @@ def test_another_window_sees_an_edit_and_takes_back_its_own_alone(
     mine.cookie = studio_server.cookie
     mine.insert("b1", "ballet/adagio", 0, 20)
     for page in (studio_page, other):
-        expect(page.get_by_test_id("block-b1")).to_be_visible()
+        page.bring_to_front()  # a browser may rest from drawing windows that nobody sees
+        expect(page.get_by_test_id("block-b1")).to_be_visible(timeout=30_000)
     expect(other.get_by_test_id("undo")).to_be_disabled()
     studio_page.get_by_test_id("undo").click()
     for page in (studio_page, other):
