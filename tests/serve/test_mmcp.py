@@ -74,7 +74,7 @@ def test_movement_goes_on_through_a_pose(url: str) -> None:
     assert np.linalg.norm(velocity[2] - velocity[1]) < 0.25
     turned = rot.from_matrix(rotations_of(sample, human23().names)[48:53].astype(np.float64))
     turning = 30.0 * rot.log(rot.inv_mul(turned[:-1], turned[1:]))
-    assert np.linalg.norm(turning[2] - turning[1], axis=-1).max() < 3.0
+    assert np.linalg.norm(turning[2] - turning[1], axis=-1).max() < 2.5
 
 
 def test_the_same_request_has_the_same_answer(url: str) -> None:
