@@ -46,7 +46,7 @@ CLASSIFIERS: dict[str, Callable[[], Any]] = {"linear": linear, "boosted": booste
 
 
 def folds_of(families: Sequence[str]) -> dict[str, int]:
-    """Return the fold of each family, of which one stands here for each piece.
+    """Return the fold of each family, given the family of each piece.
 
     Families are taken the largest first, each into the fold that has fewest pieces.
     """

@@ -28,7 +28,7 @@ class Filled:
 
     Attributes:
         found: whether it fills each case [C].
-        rotations: local rotations of those that it fills, [T, J, 4] each, in single precision.
+        rotations: local rotations of the filled cases, [T, J, 4] each, in single precision.
         root: positions of the root, [T, 3] each, metres, in single precision.
         followed: share of joint-moves within tolerance of the path [C], NaN without a path.
         spent: time that each case took [C], seconds.
@@ -92,7 +92,7 @@ class Filled:
 
 
 def fill(method: Method, lesson: Lesson, windows: Sequence[Window], cases: Sequence[Case], wanted: Bools) -> Filled:
-    """Fill the cases of one family by a method, those that are wanted [C].
+    """Fill the wanted cases of one family by a method [C].
 
     Cases that the method does not serve or finds no path through stay open.
     """

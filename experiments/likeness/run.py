@@ -80,7 +80,7 @@ def methods_of(engines: dict[str, dict[str, Any]]) -> dict[str, Method]:
 @click.command(help=__doc__)
 @click.argument("names", nargs=-1, required=True)
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), required=True, help="Folder of all labels.")
-@click.option("--label", help="What to call the engine's results; without it, only those that are there are shown.")
+@click.option("--label", help="Name of the engine's results; without it, show the results that are in the folder.")
 @click.option("--options", default="{}", help="Options of Engine.tween, as JSON.")
 @click.option("--windows", type=click.IntRange(min=1), default=WINDOWS, help="Of a family and a length, at most.")
 @click.option("--families", "most", type=click.IntRange(min=1), help="Only so many families of each dancer.")

@@ -138,7 +138,7 @@ def low_feet(rows: Sequence[Row]) -> float:
 
 
 def mean(rows: Sequence[Row], key: str, weight: str | None = None) -> float:
-    """Return a measure's mean over windows, those that have one, weighted where `weight` names a measure."""
+    """Return a measure's mean over the windows that have it, weighted by `weight` if that names a measure."""
     weights: Floats = np.array([row["windows"] * (row[weight] if weight else 1.0) for row in rows])
     values = np.array([row[key] for row in rows], dtype=float)
     known = np.isfinite(values)
