@@ -296,8 +296,9 @@ def realise() -> None:
     import numpy as np
 
     from motionmind.body.capsules import penetration
+    from motionmind.body.legs import find_legs
     from motionmind.footing.knees import slow_down
-    from motionmind.footing.legs import find_legs, reach
+    from motionmind.footing.legs import reach
     from motionmind.tween.engine import Engine
 
     engine = Engine.load("ballet")

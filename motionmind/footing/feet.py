@@ -10,9 +10,10 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.contact import Posed
+from motionmind.body.legs import find_hinge, find_legs
 from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.footing.knees import SHIFTS, bend_of, distance_of, keep_detail, slow_down, smoothed
-from motionmind.footing.legs import SOFT, find_hinge, find_legs, stretched, usual_hinge, write_bent
+from motionmind.footing.legs import SOFT, stretched, usual_hinge, write_bent
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.single import length, vector
 from motionmind.jit import jit

@@ -14,6 +14,7 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats
 from motionmind.body.contact import pose
+from motionmind.body.legs import find_legs
 from motionmind.body.limbs import limb_of_points
 from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
@@ -21,7 +22,7 @@ from motionmind.body.support import find_bearers, mass_of, size_of
 from motionmind.footing.balance import GRAVITY, balance_rows, is_beyond
 from motionmind.footing.feet import QUICK, Foot, bend_legs, find_free_feet
 from motionmind.footing.least_squares import Rows, difference_rows, joined, position_rows, solve
-from motionmind.footing.legs import SOFT, find_legs
+from motionmind.footing.legs import SOFT
 from motionmind.geometry import rotations as rot
 
 PUSH = 2.0  # metres a second squared by which the hips are accelerated beside the movement

@@ -1,16 +1,12 @@
-"""Legs of two long bones: find them in a body, and bring their ends to a place by inverse kinematics."""
+"""Legs of two long bones: bring their ends to a place by inverse kinematics."""
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
 
 from motionmind._typing import Floats, Ints
-from motionmind.body.anatomy_file import anatomy_of
-from motionmind.body.limbs import limbs_of, stem_of
-from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.single import (
     Rotation,
@@ -35,47 +31,6 @@ _Lengths = TypeVar("_Lengths", Floats, float)
 
 SOFT = 0.02  # of a leg's length: this near to its full length a leg that stands stretches less than it would have to
 HINGE = 0.1  # sine of a knee's bend below which its axis is mostly the one of other frames
-
-
-@remembered
-def find_legs(skeleton: Skeleton) -> tuple[list[int], list[tuple[list[int], int]]]:
-    """Find the legs of a body: limbs of two bones or more that hang from the root, or from the first fork below it.
-
-    Args:
-        skeleton: the body.
-
-    Returns:
-        The legs' numbers in `limbs_of`; and for each leg its joints, outward, and the place among them of its knee, the
-        joint between its two longest neighbouring bones.
-    """
-    numbers, out, above = [], [], stem_of(skeleton)[-1]
-    lengths, ends = rot.norm(skeleton.offsets), rot.norm(skeleton.tips)
-    for number, limb in enumerate(limbs_of(skeleton)):
-        if skeleton.parents[limb[0]] != above or len(limb) < 2:
-            continue
-        bones = [*lengths[limb[1:]].tolist(), float(ends[limb[-1]])]
-        pairs = [min(pair) for pair in pairwise(bones)]
-        if max(pairs) > 0.0:
-            numbers.append(number)
-            out.append((limb, pairs.index(max(pairs)) + 1))
-    return numbers, out
-
-
-def find_hinge(skeleton: Skeleton, knee: int) -> Floats | None:
-    """Return the axis [3] about which a knee bends, in its own frame; None where nothing is known of the body's joints.
-
-    It is that of the angle with the greatest range, in the sense in which the joint goes farther.
-    """
-    anatomy = anatomy_of(skeleton)
-    if anatomy is None:
-        return None
-    name = skeleton.names[knee]
-    joint, described = anatomy.anatomy(name)
-    angle = max(described.angles.values(), key=lambda one: one.range[1] - one.range[0])
-    axis = np.eye(3)[angle.axis] * angle.sign * np.sign(sum(angle.range))
-    # A turn is mirrored as its axis is, and reversed.
-    mirrored = anatomy.paired(joint) and name.startswith("right_")
-    return np.asarray(axis * np.array([1.0, -1.0, -1.0]) if mirrored else axis)
 
 
 @either

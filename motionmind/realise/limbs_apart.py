@@ -20,9 +20,10 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.anatomy import SIDES
 from motionmind.body.capsules import ARM, LEG, Capsules, capsules_of, pair_depths
 from motionmind.body.contact import limb_heights, lowest_height
+from motionmind.body.legs import find_legs
 from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.footing.least_squares import solve_rows
-from motionmind.footing.legs import find_legs, reach
+from motionmind.footing.legs import reach
 from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
 from motionmind.realise.limb_turns import LEAST, Limbs, Placed, is_any_deeper, least_turns, planes_between, turn

@@ -12,6 +12,7 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s
 from motionmind.body.contact import lowest_height
+from motionmind.body.legs import find_legs
 from motionmind.body.limits import within_limits
 from motionmind.body.motion import Insertion, Motion, Posture, Velocity
 from motionmind.body.plausibility import GRAVITY
@@ -22,7 +23,6 @@ from motionmind.footing.carrying import Allowed
 from motionmind.footing.corrections import Correction
 from motionmind.footing.feet import KNEE
 from motionmind.footing.ground import Given, Stance, ends_in_air, floors_at_ends, set_on_floor
-from motionmind.footing.legs import find_legs
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
 from motionmind.grammar.grammar import Grammar

@@ -14,6 +14,7 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats
 from motionmind.body.contact import lowest_height
+from motionmind.body.legs import find_legs
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import size_of, standing_rises
@@ -23,7 +24,6 @@ from motionmind.footing.flight import fall_freely
 from motionmind.footing.ground import SINKS
 from motionmind.footing.knees import cover, smoothed
 from motionmind.footing.leaning import shift_weight
-from motionmind.footing.legs import find_legs
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.limbs_apart import keep_limbs_apart
 from motionmind.realise.timeline import Timeline

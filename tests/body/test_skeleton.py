@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from motionmind._typing import Floats
 from motionmind.body.human import human23
+from motionmind.body.legs import find_legs
 from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.errors import SkeletonError
-from motionmind.footing.legs import find_legs
 from motionmind.geometry import rotations as rot
 
 BODY = human23()

@@ -11,8 +11,8 @@ import pytest
 from motionmind._typing import Bools, Floats
 from motionmind.body.anatomy_file import anatomy_named
 from motionmind.body.contact import foot_slide, limb_heights, lowest_height, skating
-from motionmind.body.human import human23, human44
-from motionmind.body.limbs import limbs_of, parts_of
+from motionmind.body.human import human23
+from motionmind.body.limbs import limbs_of
 from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, find_support
@@ -23,7 +23,7 @@ from motionmind.footing.feet import KNEE
 from motionmind.footing.footfalls import Stance as StandingFoot
 from motionmind.footing.ground import Given, Stance, set_on_floor
 from motionmind.footing.least_squares import difference_rows, position_rows, solve
-from motionmind.footing.legs import find_legs, reach
+from motionmind.footing.legs import reach
 from motionmind.footing.root import stand
 from motionmind.geometry import rotations as rot
 
@@ -591,32 +591,6 @@ def test_few_frames_leave_little_to_do(frames: int) -> None:
 
 
 # --- bodies -----------------------------------------------------------------------------------------------------------
-
-
-def test_legs_are_found_by_their_long_bones() -> None:
-    for skeleton in (human23(), human44()):
-        legs = [
-            ([skeleton.names[joint] for joint in leg], skeleton.names[leg[knee]])
-            for leg, knee in find_legs(skeleton)[1]
-        ]
-        assert [knee for _, knee in legs] == ["left_knee", "right_knee"]
-        assert [leg[0] for leg, _ in legs] == ["left_hip", "right_hip"]
-
-
-def test_legs_hang_where_the_body_forks_first() -> None:
-    """A rig's own root above the pelvis changes nothing; a chain that does not fork is no leg."""
-    body = human23()
-    rig = Skeleton(
-        "rig",
-        ("root", *body.names),
-        (-1, 0, *(p + 1 for p in body.parents[1:])),
-        np.concatenate([[[0.0] * 3], body.offsets]),
-        np.concatenate([[[0.0] * 3], body.tips]),
-    )
-    assert [[joint - 1 for joint in leg] for leg, _ in find_legs(rig)[1]] == [leg for leg, _ in find_legs(body)[1]]
-    assert parts_of(rig)[1].tolist() == [0, *(parts_of(body)[1] + 1)]
-    chain = Skeleton("chain", ("a", "b", "c"), (-1, 0, 1), np.array([[0.0] * 3, [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]))
-    assert find_legs(chain)[1] == []
 
 
 def test_a_body_without_legs_keeps_its_joints() -> None:

@@ -11,10 +11,10 @@ from bundled_clips import ballet_clip
 
 from motionmind._typing import Floats
 from motionmind.body.human import human23
+from motionmind.body.legs import find_legs
 from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError
-from motionmind.footing.legs import find_legs
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.retarget import to_human23
 from motionmind.tween.engine import Engine
