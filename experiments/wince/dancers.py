@@ -15,10 +15,9 @@ from motionmind._typing import Bools, Floats, Ints
 from motionmind.body.capsules import legs_depth
 from motionmind.body.contact import FAR, floor_height, foot_slides, lowest_height
 from motionmind.body.legs import find_legs
-from motionmind.body.plausibility import CALM, GRAVITY
+from motionmind.body.plausibility import CALM, FALLING, GRAVITY
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import find_support, stands_alone
-from motionmind.footing.flight import FALLING
 from motionmind.geometry import rotations as rot
 
 MEASURES = ("root speed", "root acceleration", "slide", "joints", "legs")

@@ -30,6 +30,7 @@ from motionmind.geometry.splines import natural_spline, rotation_spline
 SEEN = ("balance", "bounce", "flight", "crossed_limbs")
 GRAVITY = 9.81  # metres a second squared
 CALM = 2.0  # metres a second squared: level acceleration up to which a body should be in balance
+FALLING = 0.5  # of gravity: a body off the floor that falls faster is in the air, and one that is pushed so is not
 _FALLS = 3  # frames in the air at least, from which an acceleration can be told
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats
 from motionmind.body.contact import LOW, Posed, pose
-from motionmind.body.plausibility import GRAVITY
+from motionmind.body.plausibility import FALLING, GRAVITY
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import mass_of, size_of
 from motionmind.body.tempo import runs_of
@@ -27,7 +27,6 @@ PUSHES = 0.25  # seconds that a push off, or a landing, takes at least
 BENDS = 0.5, 0.2  # seconds before and after a flight in which legs bend for it, and seconds from there to standing
 FALLS = 0.3, 0.5  # metres a second squared off free fall, standard deviation, vertical and level
 RATE = 0.02  # metres a second off a velocity that is given in the air, the same
-FALLING = 0.5  # of gravity: a body off the floor that falls faster is in the air, and one that is pushed so is not
 PAUSES = 0.1  # seconds for which a fall may be slower than that, as where legs are drawn up
 TOUCHES = 0.005  # metres off the height at which legs leave the floor, and come back to it
 
