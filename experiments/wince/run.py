@@ -42,42 +42,47 @@ RECORDINGS = ("cmu-05", "indian", "cmu-16", "cmu-135", "bandai")  # no constant 
 def work(data: str | None, by: str, seed: int, pairs: int, one_leg: int, jumps: int) -> list[Row]:
     """Fill pairs of one corpus: a row a pair and maker. What holds for all of a maker's pairs stands in each."""
     found, danced = engine(data, by), dancers(data, by)
-    asked: list[tuple[str, int, int]] = [
-        *(("far", *pair) for pair in danced.far_pairs(pairs, seed)),
-        *(("one leg", *pair) for pair in danced.one_leg_pairs(one_leg, seed)),
-        *(("jump", *pair) for pair in danced.jumps(jumps, seed)),
-    ]
     rows: list[Row] = []
     bounces: dict[str, list[Floats]] = {maker: [] for maker in MAKERS}
-    for number, (kind, i, k) in enumerate(asked):
-        a, b = danced.ends[i], danced.ends[k]
-        if kind == "one leg":
-            b = on_the_same_spot(a, b)
-        elif kind == "jump":
-            b = nearer(a, b, LEAP)
+    for number, (kind, a, b) in enumerate(pairs_of(danced, seed, pairs, one_leg, jumps)):
         way = float(found.pace.expected(way_between(a, b), (np.ones(()), np.ones(()))))
         try:
             tween = found.tween(a, b, node_budget=BUDGET, fps=float(FPS))
         except NoPathError:
-            rows += [_row(by, kind, number, maker, a, b, way) for maker in MAKERS]
+            rows += [row_of(by, kind, number, maker, a, b, way) for maker in MAKERS]
             continue
         for maker in MAKERS:
             motion = tween.motion if maker == "motionmind" else eased(a, b, len(tween.motion))
             seen = see(motion)
-            rows.append(_row(by, kind, number, maker, a, b, way, motion, seen, danced))
+            rows.append(row_of(by, kind, number, maker, a, b, way, motion, seen, danced))
             if kind == "far":
                 bounces[maker].append(seen.bounce)
-    own = {
-        "own_skates": max(float(np.concatenate([seen.skates for seen in danced.seen]).mean()), 1e-6),
-        "own_swings": float(np.concatenate([seen.swings for seen in danced.seen]).mean()),
-        "own_falls": _share_of_falls([seen.fall for seen in danced.seen]),
-    }
+    own = own_of(danced)
     pooled = {maker: np.concatenate([*values, np.zeros(0)]) for maker, values in bounces.items()}
     bounce = {
         maker: float(np.percentile(values, 99.0)) / danced.bounce if len(values) else float("nan")
         for maker, values in pooled.items()
     }
     return [row | {"bounce": bounce[row["maker"]]} | own for row in rows]
+
+
+def pairs_of(danced: Dancers, seed: int, far: int, one_leg: int, jumps: int) -> list[tuple[str, Posture, Posture]]:
+    """Return the kind and both postures of random pairs of each kind, so many of each."""
+    ends = danced.ends
+    return [
+        *(("far", ends[i], ends[k]) for i, k in danced.far_pairs(far, seed)),
+        *(("one leg", ends[i], on_the_same_spot(ends[i], ends[k])) for i, k in danced.one_leg_pairs(one_leg, seed)),
+        *(("jump", ends[i], nearer(ends[i], ends[k], LEAP)) for i, k in danced.jumps(jumps, seed)),
+    ]
+
+
+def own_of(danced: Dancers) -> Row:
+    """Return how often the dancers skate, move their feet fast, and fall freely in the air."""
+    return {
+        "own_skates": max(float(np.concatenate([seen.skates for seen in danced.seen]).mean()), 1e-6),
+        "own_swings": float(np.concatenate([seen.swings for seen in danced.seen]).mean()),
+        "own_falls": _share_of_falls([seen.fall for seen in danced.seen]),
+    }
 
 
 def eased(a: Posture, b: Posture, frames: int) -> Motion:
@@ -89,7 +94,7 @@ def eased(a: Posture, b: Posture, frames: int) -> Motion:
     return Motion(a.skeleton, rotations, root, np.arange(frames) / FPS)
 
 
-def _row(
+def row_of(
     by: str,
     kind: str,
     number: int,
