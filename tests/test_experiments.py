@@ -51,7 +51,12 @@ def test_every_folder_is_listed_with_its_question_and_command() -> None:
     for folder in folders:
         readme = (ROOT / "experiments" / folder / "README.md").read_text()
         assert f"{folder:16}{readme.splitlines()[0].lstrip('# ')}" in listed
-        assert f"python -m experiments {folder}\n" in listed or f"python experiments/{folder}/" in listed
+        commands = (
+            f"python -m experiments {folder}\n",
+            f"python -m experiments.{folder}.",
+            f"python experiments/{folder}/",
+        )
+        assert any(command in listed for command in commands)
 
 
 @pytest.mark.parametrize("name", ["cliche", "turing"])
@@ -577,6 +582,24 @@ def test_shares_are_of_sums_and_their_interval_is_over_pairs() -> None:
     rng = np.random.default_rng(1)
     drawn = np.array([share(rng.binomial(50, 0.8, 100), np.full(100, 50)) for _ in range(200)])
     assert 0.9 < np.mean((drawn[:, 1] <= 0.8) & (drawn[:, 2] >= 0.8)) <= 1.0
+
+
+# --- synthesis --------------------------------------------------------------------------------------------------------
+
+
+def test_files_are_compared_on_the_pairs_that_all_of_them_made() -> None:
+    from experiments.synthesis.measure import pairs
+    from experiments.synthesis.tables import report
+
+    old = pairs("", "ballet", 3) | {"windows": [], "auc": {}}
+    assert [row["kind"] for row in old["pairs"]] == ["far"] * 3 + ["one leg", "jump"]
+    assert all(row["ms"] > 0.0 and row["low"] > 0.0 for row in old["pairs"])
+    slow = [row | {"ms": row["ms"] + 1000.0} for row in old["pairs"][:-1]]
+    text = report({"old": {"ballet": old}, "new": {"ballet": old | {"pairs": slow}}})
+    table = {line.split(" | ")[0].strip("| "): line.strip("| ").split(" | ")[1:] for line in text.splitlines()[4:]}
+    assert table["ms"][1].endswith(" !")
+    assert [name for name, cells in table.items() if any(cell.endswith("!") for cell in cells)] == ["ms"]
+    assert table["seconds"][0] == table["seconds"][1]
 
 
 # --- A* ---------------------------------------------------------------------------------------------------------------
