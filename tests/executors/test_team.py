@@ -80,18 +80,19 @@ def test_a_job_that_always_ends_its_worker_is_named() -> None:
 
 
 def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
-    """Even if it is killed, and can say nothing."""
+    """Even if it is killed, can say nothing, and they are at work."""
     script = tmp_path / "client.py"
     script.write_text(
-        "import time\nfrom motionmind.executors.opening import open_team\n"
+        "import multiprocessing, time\nfrom motionmind.executors.opening import open_team\n"
         "if __name__ == '__main__':\n    with open_team(2) as team:\n"
-        "        print(list(team.map(abs, range(4))), flush=True)\n        time.sleep(60)\n"
+        "        results = team.map(time.sleep, [0.3, 60, 60])\n        next(results)\n"  # the pool ends with its jobs
+        "        print(*(worker.pid for worker in multiprocessing.active_children()), flush=True)\n"
+        "        time.sleep(60)\n"
     )
     with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE) as client:
         assert client.stdout is not None
-        assert client.stdout.readline()
-        workers = psutil.Process(client.pid).children(recursive=True)
-        assert len(workers) >= 2
+        workers = [psutil.Process(int(number)) for number in client.stdout.readline().split()]
+        assert len(workers) == 2
         client.send_signal(signal.SIGKILL)
     assert psutil.wait_procs(workers, timeout=10)[1] == []
 
