@@ -196,7 +196,8 @@ def by_step(likely: Floats, count: int) -> Floats:
         count: S + 1.
     """
     out = np.ones((count, likely.shape[1]))
-    out[0], out[-1] = likely[0], likely[1]
-    for k in range(2, len(likely)):
-        out[2 * (k - 1)] = likely[k]
+    for k in range(len(likely)):
+        step = 2 * (k - 1) if k > 1 else k * (count - 1)
+        for i in range(likely.shape[1]):  # assigning whole rows compiles for seconds, for an error message
+            out[step, i] = likely[k, i]
     return out

@@ -113,7 +113,8 @@ def _pool(values: Floats, clusters: Int32s, pooled: Floats) -> float:
     for i in range(len(values)):
         pooled[i % 4, clusters[i]] += values[i]
     for k in range(1, 4):
-        pooled[0] += pooled[k]
+        for cluster in range(pooled.shape[1]):  # assigning whole rows compiles for seconds, for an error message
+            pooled[0, cluster] += pooled[k, cluster]
     return float(pooled[0].sum())
 
 

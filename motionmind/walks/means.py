@@ -96,7 +96,9 @@ def add_rotations(
     count, moments = len(about), len(counts)
     near, signed, shown = np.empty((4, count)), np.empty((4, count)), np.empty((4, 4))
     for j in range(len(joints)):
-        near[:] = about[:, j].T
+        for t in range(count):  # assigning the array compiles for seconds, for an error message
+            for c in range(4):
+                near[c, t] = about[t, j, c]
         middle, added_up = about[count // 2, j], sums[j]
         alike = _spread(near, middle)
         for first in range(0, len(weights), 4):
