@@ -161,7 +161,7 @@ def _depths(skeleton: Skeleton, rotations: Floats, capsules: Capsules, pairs: In
     """Return the depths of pairs of capsules [..., P], metres."""
     placed = capsules.place(skeleton.positions_and_tips(rotations, np.zeros(3)))
     count = int(np.prod(shape := rotations.shape[:-2], dtype=np.int64))
-    depths, _ = pair_depths(placed.reshape(count, len(capsules.names), 2, 3), capsules.radii, pairs)
+    depths, _, _ = pair_depths(placed.reshape(count, len(capsules.names), 2, 3), capsules.radii, pairs)
     return np.maximum(depths, 0.0).reshape(*shape, len(pairs))
 
 
@@ -170,11 +170,12 @@ def _sided(side: str, parts: Collection[str]) -> set[str]:
 
 
 @jit
-def pair_depths(ends: Floats, radii: Floats, pairs: Ints) -> tuple[Floats, Floats]:
-    """Return how deep pairs of capsules are in each other [T, P], metres, and in which direction the first lies.
+def pair_depths(ends: Floats, radii: Floats, pairs: Ints) -> tuple[Floats, Floats, Floats]:
+    """Return how deep pairs of capsules are in each other [T, P], metres, in which direction the first lies, and where.
 
     Depths are negative where the pair is apart; directions are unit vectors from the nearest point of the second's
-    axis to the first's [T, P, 3], or 0 where they meet.
+    axis to the first's [T, P, 3], or 0 where they meet. Last come the shares of the way along both axes at which these
+    points are [T, P, 2].
 
     Args:
         ends: of the capsules' axes [T, C, 2, 3], metres.
@@ -182,15 +183,17 @@ def pair_depths(ends: Floats, radii: Floats, pairs: Ints) -> tuple[Floats, Float
         pairs: numbers of capsules [P, 2].
     """
     depths, directions = np.empty((len(ends), len(pairs))), np.zeros((len(ends), len(pairs), 3))
+    shares = np.empty((len(ends), len(pairs), 2))
     for t in range(len(ends)):
         for p in range(len(pairs)):
             i, j = pairs[p]
             far, s, u = nearest_points(ends[t, i], ends[t, j])
             depths[t, p] = radius_at(radii[i], s) + radius_at(radii[j], u) - far
+            shares[t, p, 0], shares[t, p, 1] = s, u
             for k in range(3 if far > 0.0 else 0):
                 one = ends[t, i, 0, k] + s * (ends[t, i, 1, k] - ends[t, i, 0, k])
                 directions[t, p, k] = (one - ends[t, j, 0, k] - u * (ends[t, j, 1, k] - ends[t, j, 0, k])) / far
-    return depths, directions
+    return depths, directions, shares
 
 
 @jit

@@ -106,7 +106,7 @@ def centre_of_mass(skeleton: Skeleton, rotations: Floats, root: Floats) -> Float
         rotations: local rotations [..., J, 4].
         root: positions of the root [..., 3], metres.
     """
-    masses = _masses_of(skeleton)
+    masses = masses_of(skeleton)
     if masses is None:
         return None
     turned = skeleton.global_rotations(rotations)
@@ -115,12 +115,12 @@ def centre_of_mass(skeleton: Skeleton, rotations: Floats, root: Floats) -> Float
 
 def mass_of(skeleton: Skeleton, posed: Posed) -> Floats | None:
     """Return the same of a movement that is posed [T, 3], metres."""
-    masses = _masses_of(skeleton)
+    masses = masses_of(skeleton)
     return None if masses is None else masses.centre(posed.places, posed.turned)
 
 
 @remembered
-def _masses_of(skeleton: Skeleton) -> Masses | None:
+def masses_of(skeleton: Skeleton) -> Masses | None:
     """Return the masses of a body's segments; None where they are not known."""
     anatomy = anatomy_of(skeleton)
     return None if anatomy is None or not anatomy.has_masses else anatomy.masses_of(skeleton)

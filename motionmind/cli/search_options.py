@@ -230,7 +230,7 @@ SEARCH_OPTIONS = (
         "without",
         "--without",
         _MOTION,
-        "Leave out a correction of the movement. Repeatable.",
+        "Leave out a part of what makes the movement a body's own. Repeatable.",
         click.Choice(get_args(Correction)),
         multiple=True,
     ),

@@ -126,13 +126,18 @@ def prepare_in_steps() -> Generator[tuple[int, int, bool]]:
 
 
 def compile_beside_search() -> None:
-    """Compile all beside a search, which comes to `realise` last: the whole of a process that `prepare` has started."""
-    _compile_in_background([realise, draw, seek, learn, search], max(_processors() - 1, 1))
+    """Compile all beside a command that learns a corpus, searches, realises and draws: the whole of a process that
+    `prepare` has started.
+
+    Processes that run in step compile the same functions. So this one begins with work that needs no learned corpus,
+    until the command has learned and saved one, and then realises while the command searches.
+    """
+    _compile_in_background([turn, film, realise, seek, draw, learn, search], max(_processors() - 1, 1))
 
 
 def compile_before_searches() -> None:
     """Compile all, what searches need first: the whole of a process that `prepare_in_steps` has started."""
-    _compile_in_background([search, realise, draw, seek, learn], _processors())
+    _compile_in_background([turn, search, realise, film, learn, draw, seek], _processors())
 
 
 def _compile_in_background(works: Sequence[Callable[[], None]], processes: int) -> None:
@@ -155,7 +160,7 @@ def _wait_or_compile(place: Path) -> None:
     while not is_all_compiled():
         with _alone(place) as is_alone:
             if is_alone:
-                _compile([search, realise, draw, learn, seek], _processors(), hidden=hidden)
+                _compile([turn, search, realise, film, learn, draw, seek], _processors(), hidden=hidden)
                 return
         _show_progress(lambda: _is_running(place), hidden=hidden)
 
@@ -280,6 +285,20 @@ def _processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def turn() -> None:
+    """Take means of rotations, and a curve through some, to which learning comes last; no corpus need be learned."""
+    import numpy as np
+
+    from motionmind.geometry import rotations as rot
+    from motionmind.geometry.splines import rotation_spline
+    from motionmind.jit import read_only
+    from motionmind.walks.means import mean_rotations
+
+    poses = np.tile(rot.IDENTITY, (3, 2, 1))
+    mean_rotations(np.ones((3, 3)), read_only(poses), np.arange(2), poses)
+    rotation_spline(np.arange(3.0), poses, np.array([0.5]))
+
+
 def search() -> None:
     """Find a movement between two postures, and another one that differs."""
     from motionmind.tween.engine import Engine
@@ -291,41 +310,30 @@ def search() -> None:
 
 
 def realise() -> None:
-    """Realise moves of the corpus, which no search has to find, see how deep limbs are in each other, reach, and slow a
-    knee down, as few movements have to."""
-    import numpy as np
-
-    from motionmind.body.capsules import penetration
-    from motionmind.body.legs import find_legs
-    from motionmind.footing.knees import slow_down
-    from motionmind.footing.legs import reach
+    """Realise moves of the corpus, which no search has to find."""
     from motionmind.tween.engine import Engine
 
     engine = Engine.load("ballet")
     _realise(engine, engine.carriage)
-    skeleton, rotations = engine.corpus.skeleton, engine.corpus.rotations[:2]
-    penetration(skeleton, rotations)
-    leg = find_legs(skeleton)[1][0][0][:3]
-    places = skeleton.positions(rotations, engine.corpus.root[:2])[:, leg]
-    reach(skeleton.global_rotations(rotations)[:, leg[0]], places, places[:, 2])
-    stands = np.arange(4) % 2 == 0
-    slow_down(np.linspace(0.0, 2.0, 4), stands, stands, 1.0, 30.0)
 
 
 def seek() -> None:
-    """Search by A* alone, which a search comes to last."""
+    """Search by A* alone, which a search comes to last, and bound paths by pair chains alone."""
     import numpy as np
 
     from motionmind.search import astar, trws
     from motionmind.search.heuristic import Heuristic
     from motionmind.search.pieces import Pieces
     from motionmind.search.segments import Piece
+    from motionmind.search.solve import solve
 
     problem = _problem()
     trellis = Pieces(problem).trellis(Piece(0, 0, problem.rules.longest), np.inf)
     chosen = np.zeros(len(trellis.dom_ptr) - 1, dtype=np.int64)
     bound = Heuristic.of_messages(trws.no_messages(trellis))
     astar.search(trellis, bound, np.inf, astar.SAME, chosen, 1000, 1, np.zeros(1, dtype=np.bool_))
+    moves = problem.rules.longest
+    solve(replace(problem, rules=replace(problem.rules, shortest=moves, sweeps=0), tolls=None))
 
 
 def learn() -> None:
@@ -367,45 +375,41 @@ def _realise(engine: Engine, carriage: Carriage) -> None:
     import numpy as np
 
     from motionmind.body.motion import Velocity
+    from motionmind.realise.realise import Style, Wishes
     from motionmind.realise.realise import realise as realise_path
 
     clip = engine.corpus.motion(engine.corpus.clips[0])
     none = np.zeros(len(engine.space), dtype=np.bool_)
-    realise_path(
-        engine.space.assign(engine.corpus.to_chains(clip.rotations)),
-        clip.posture(0),
-        clip.posture(len(clip) - 1),
-        engine.corpus,
-        engine.grammar,
-        carriage,
-        np.radians(engine.space.tolerances),
-        none,
-        none,
-        30.0,
-        leaving=Velocity.at_start(clip),
-        fastest=engine.pace.fastest,
-        peaks=engine.pace.peaks_in,
-        slides=float(engine.plausibility.slides[0]),
-    )
+    slides = float(engine.plausibility.slides[0])
+    speeds = engine.pace.fastest, engine.pace.peaks_in, slides
+    style = Style(engine.corpus, engine.grammar, carriage, np.radians(engine.space.tolerances), *speeds)
+    ends = clip.posture(0), clip.posture(len(clip) - 1)
+    path = engine.space.assign(engine.corpus.to_chains(clip.rotations))
+    realise_path(path, style, Wishes(*ends, none, none, 30.0, leaving=Velocity.at_start(clip)))
+
+
+def film() -> None:
+    """Film a posture, as a command does last; no corpus need be learned."""
+    from motionmind.names.finding import find_motion
+    from motionmind.names.spelling import parse_source
+    from motionmind.render.pictures import write_picture
+
+    with tempfile.TemporaryDirectory(prefix="motionmind-") as folder:
+        write_picture(Path(folder) / "posture.gif", find_motion(parse_source("ballet/arabesque"), as_clip=False))
 
 
 def draw() -> None:
-    """Draw a clip in all ways; bound paths by pair chains alone, which a search comes to late."""
+    """Draw a clip in all other ways."""
     from motionmind.plots.attractor import write_attractor
     from motionmind.render.pictures import write_picture
-    from motionmind.search.solve import solve
     from motionmind.tween.engine import Engine
     from motionmind.variation.variation import vary
 
     engine = Engine.load("ballet")
     clip = engine.corpus.motion(engine.corpus.clips[0])
     with tempfile.TemporaryDirectory(prefix="motionmind-") as folder:
-        write_picture(Path(folder) / "clip.gif", clip.slice(0, 2))
         write_picture(Path(folder) / "clip.svg", clip.slice(0, 2))
         write_attractor(Path(folder) / "attractor.png", vary(clip, stretch=4))
-    problem = _problem()
-    moves = problem.rules.longest
-    solve(replace(problem, rules=replace(problem.rules, shortest=moves, sweeps=0), tolls=None))
 
 
 def _problem() -> Problem:

@@ -1,1 +1,1 @@
-"""A body's footing: what bears it and where, its root and balance, its flight, and legs that reach the floor."""
+"""A body's footing: its stances, its flights, the ground under it and its balance."""

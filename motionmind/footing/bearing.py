@@ -74,7 +74,6 @@ def points_of_feet(skeleton: Skeleton, joints: Indices, feet: list[Foot]) -> Boo
     return np.stack(own) if own else np.zeros((0, len(joints)), dtype=np.bool_)
 
 
-@jit
 def lowest(places: Floats, parts: Bools) -> Floats:
     """Return the height of the lowest point of each part [N, parts], metres; infinite for a part without points.
 
@@ -82,23 +81,16 @@ def lowest(places: Floats, parts: Bools) -> Floats:
         places: of the body's points [N, P, 3], metres.
         parts: which of them are each part's [parts, P].
     """
-    out = np.full((len(places), len(parts)), np.inf)
-    for t in range(len(places)):
-        for part in range(len(parts)):
-            for point in range(parts.shape[1]):
-                if parts[part, point]:
-                    out[t, part] = min(out[t, part], places[t, point, 1])
+    heights = [places[:, own, 1].min(axis=1, initial=np.inf) for own in parts]
+    return np.stack(heights, axis=1) if heights else np.zeros((len(places), 0))
+
+
+def _touching(places: Floats, parts: Bools, low: Floats, bears: Bools) -> Bools:
+    """Return which points are of parts that bear [N, parts], and about as low as the lowest of them [N, P]."""
+    out = np.zeros(places.shape[:2], dtype=np.bool_)
+    for own, lowest_of, on in zip(parts, low.T, bears.T, strict=True):
+        out[:, own] |= on[:, None] & (places[:, own, 1] < (lowest_of + TOUCHES)[:, None])
     return out
-
-
-@jit
-def _mark_touching(places: Floats, parts: Bools, low: Floats, bears: Bools, out: Bools) -> None:
-    """Mark points of parts that bear [N, parts], about as low as the lowest of them [N, parts]: `out` [N, P]."""
-    for t in range(len(places)):
-        for part in range(len(parts)):
-            for point in range(parts.shape[1]):
-                if bears[t, part] and parts[part, point]:
-                    out[t, point] = places[t, point, 1] < low[t, part] + TOUCHES
 
 
 class Bearing(NamedTuple):
@@ -118,30 +110,18 @@ class Bearing(NamedTuple):
     targets: Floats
     others: Floats
 
-    def holds(self, fps: float) -> Floats:
-        """Return how much each foot holds its place [N, feet], from 0 to 1: 1 while it stands, fading as it swings."""
-        out = self.stands.astype(np.float64)
-        fades = max(1, round(LOADS * fps))
-        for away in range(1, min(fades, len(out))):
-            share = 1.0 - away / fades
-            out[away:] = np.maximum(out[away:], share * self.stands[:-away])
-            out[:-away] = np.maximum(out[:-away], share * self.stands[away:])
-        return out
-
     def all_standing(self) -> Bearing:
         """Return the same with all feet on the floor throughout."""
         return self._replace(stands=np.ones_like(self.stands))
 
     def touching(self, shape: Shape) -> Bools:
         """Return which points touch the floor [N, P]: those of what bears, about as low as its lowest."""
-        out = np.zeros(shape.places.shape[:2], dtype=np.bool_)
         # A foot that comes down, or lifts, in this very frame carries nothing yet, or no more.
         still = self.stands.copy()
         still[1:] &= self.stands[:-1]
         still[:-1] &= self.stands[1:]
-        _mark_touching(shape.places, shape.feet, shape.low, still, out)
-        _mark_touching(shape.places, shape.others, shape.low_others, self.others > MOSTLY, out)
-        return out
+        feet = _touching(shape.places, shape.feet, shape.low, still)
+        return feet | _touching(shape.places, shape.others, shape.low_others, self.others > MOSTLY)
 
 
 def find_bearing(

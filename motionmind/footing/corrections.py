@@ -1,11 +1,11 @@
-"""The corrections that let a movement be a body's own, by name; light to import, for the command line names them.
+"""The parts of the synthesis that `--without` leaves out, by name; light to import, for the command line names them.
 
-- `pace`: the movement takes about as long as the corpus takes for so far a way.
-- `bounce`: the body's height changes smoothly, and the standing leg bears it.
-- `balance`: the weight stays over the support, as far as the corpus keeps it there.
-- `flight`: a body in the air falls.
-- `steps`: feet step to where they have to be next, and do not slide there.
-- `limbs`: limbs do not pass through each other.
+- `pace`: the typical duration of the corpus, and bounds on speed for which the clock slows down.
+- `bounce`: small vertical accelerations of the centre of mass in stance (a share of `terms.Ballistic`).
+- `balance`: the centre of mass over the support, as far as the corpus keeps it there (`terms.Balance`).
+- `flight`: flights, in which the centre of mass falls freely.
+- `steps`: places that feet keep in stance, and between which they swing; without them feet slide.
+- `limbs`: limbs that do not pass through each other (`terms.Collision`).
 """
 
 from __future__ import annotations

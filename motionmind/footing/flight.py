@@ -12,23 +12,18 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.body.contact import LOW, Posed, pose
+from motionmind.body.contact import LOW, Posed
 from motionmind.body.plausibility import FALLING, GRAVITY
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import mass_of, size_of
 from motionmind.body.tempo import runs_of
-from motionmind.footing.least_squares import Rows, difference_rows, joined, position_rows
 
 SURELY = 0.5  # share of the corpus's walks that are in the air where a given posture is
 EVER = 0.05  # share of them from which a movement may be
 HOVERS = 0.04  # metres above the floor from which a given posture is in the air, if walks there are
 SHORTEST, LONGEST = 0.15, 0.8  # seconds of a flight
 PUSHES = 0.25  # seconds that a push off, or a landing, takes at least
-BENDS = 0.5, 0.2  # seconds before and after a flight in which legs bend for it, and seconds from there to standing
-FALLS = 0.3, 0.5  # metres a second squared off free fall, standard deviation, vertical and level
-RATE = 0.02  # metres a second off a velocity that is given in the air, the same
 PAUSES = 0.1  # seconds for which a fall may be slower than that, as where legs are drawn up
-TOUCHES = 0.005  # metres off the height at which legs leave the floor, and come back to it
 
 
 class Flight(NamedTuple):
@@ -145,78 +140,6 @@ def flying_frames(flights: list[Flight], hovering: tuple[bool, bool], count: int
         out[flight.start + 1 : flight.end] = True
     if flights:
         out[[0, -1]] = hovering
-    return out
-
-
-def leg_freedom(flights: list[Flight], count: int, fps: float) -> Floats:
-    """Return how free the height of a body is that stands [N], from 0 to 1: near flights its legs bend for them."""
-    out, frames = np.zeros(count), np.arange(count)
-    for flight in flights:
-        seconds = np.maximum(flight.start - frames, frames - flight.end) / fps
-        away = np.clip((seconds - BENDS[0]) / BENDS[1], 0.0, 1.0)
-        out = np.maximum(out, 1.0 - away * away * (3.0 - 2.0 * away))
-    return out
-
-
-def flight_rows(flights: list[Flight], own: Floats, standing: Floats, gravity: float, fps: float) -> list[Rows]:
-    """Return rows for the root's trajectory that let the centre of mass fall freely in flights.
-
-    Args:
-        flights: the flights.
-        own: the centre of mass relative to the root [N, 3], metres.
-        standing: height of the root if the lowest point were on the floor [N], metres.
-        gravity: metres a second squared.
-        fps: frames a second.
-    """
-    if not flights:
-        return []
-    count = len(own)
-    weights, at = np.zeros(count - 2), []
-    leaves: list[Rows] = []
-    for flight in flights:
-        weights[flight.start : flight.end - 1] = 1.0
-        at += [frame for frame in (flight.start, flight.end) if 0 < frame < count - 1]
-        for rate, first, sign, shares in (
-            (flight.rates[0], 0, -1.0, (-fps, fps, 0.0)),
-            (flight.rates[1], count - 3, 1.0, (0.0, -fps, fps)),
-        ):
-            if rate is not None:
-                target = rate + sign * 0.5 * gravity / fps - np.array(shares) @ own[first : first + 3, 1]
-                row = difference_rows(1, shares, np.array([target]), np.array([RATE**-2.0]))
-                leaves.append(row._replace(first=np.array([first])))
-    rows = []
-    for axis, falls, spread in ((0, 0.0, FALLS[1]), (1, -gravity, FALLS[0]), (2, 0.0, FALLS[1])):
-        target = falls - fps**2 * np.diff(own[:, axis], 2)
-        rows.append(difference_rows(axis, (fps**2, -2.0 * fps**2, fps**2), target, weights * spread**-2.0))
-    frames = np.array(at, dtype=np.int64)
-    up = np.tile([0.0, 1.0, 0.0], (len(frames), 1))
-    rows.append(position_rows(frames, up, standing[frames], np.full(len(frames), TOUCHES**-2.0)))
-    return [joined(rows + leaves)]
-
-
-def fall_freely(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bools, fps: float) -> Floats:
-    """Return positions of the root [N, 3], metres, with which the centre of mass falls exactly where it nearly does.
-
-    Legs that bend in the air, limbs that are kept apart and a slower clock each take it a little off its parabola.
-    While it falls off the floor, with more than FALLING of gravity but for PAUSES, it is put back on the parabola
-    through its places just before and just after.
-
-    Args:
-        skeleton: the body.
-        rotations: local rotations [N, J, 4].
-        root: positions of the root [N, 3], metres.
-        given: frames that must not change, the first and the last among them [N].
-        fps: frames a second.
-    """
-    mass, falls = find_falls(skeleton, pose(skeleton, rotations, root), given, fps)
-    if not falls:
-        return root
-    out = root.copy()
-    for start, stop in falls:
-        seconds = np.arange(stop - start + 2) / fps
-        line = np.linspace(mass[start - 1, 1], mass[stop, 1], len(seconds))
-        fallen = line + 0.5 * GRAVITY * seconds * (seconds[-1] - seconds)
-        out[start:stop, 1] += fallen[1:-1] - mass[start:stop, 1]
     return out
 
 

@@ -86,7 +86,7 @@ def find_stances(
     stand, swing = _costs(stand, swing, others, flying, round(SHIFTS * fps), fps)
     # A foot that is given in the air comes down in half a step; on its way or with the body it does so as it falls.
     first, last = (0 if goes or flies else brief // 2 for goes, flies in zip(passing, flying[[0, -1]], strict=True))
-    parted = _part(track - track[0], outward, stand, swing, brief, (first, last), fps)
+    parted = _part(track - track[0], outward, _crossing(track, outward), stand, swing, brief, (first, last), fps)
     places, slips = _places(track, outward, parted, brief)
     return [
         Stance(start, end, place, slip)
@@ -144,7 +144,14 @@ def _places(track: Floats, outward: Floats, parted: Ints, brief: int) -> tuple[F
 
 @jit
 def _part(  # noqa: PLR0915 - one table, filled in one go
-    track: Floats, outward: Floats, stand: Floats, swing: Floats, brief: int, half: tuple[int, int], fps: float
+    track: Floats,
+    outward: Floats,
+    crosses: Floats,
+    stand: Floats,
+    swing: Floats,
+    brief: int,
+    half: tuple[int, int],
+    fps: float,
 ) -> Ints:
     """Return the intervals [K, 2] in which a foot stands, in order (see `find_stances`).
 
@@ -158,7 +165,6 @@ def _part(  # noqa: PLR0915 - one table, filled in one go
         sums[t + 1] = sums[t] + track[t]
         squares[t + 1] = squares[t] + track[t, 0] ** 2 + track[t, 1] ** 2
     last = count - 1
-    crosses = _crossing(track, outward)
     # best[0, t]: standing up to frame t, and swinging from t + 1 on; best[1, t]: swinging, and standing from t + 1 on.
     best = np.full((2, count), np.inf)
     came = np.full((2, count), -1)
@@ -217,14 +223,8 @@ def _part(  # noqa: PLR0915 - one table, filled in one go
     return out[:found][::-1].copy()
 
 
-@jit
 def _crossing(track: Floats, outward: Floats) -> Floats:
-    """Return what it costs, up to each frame [2, N + 1], that a foot stays at A, or comes to B early, while the body
-    goes to its other side."""
-    out, last = np.zeros((2, len(track) + 1)), len(track) - 1
-    for t in range(len(track)):
-        for side in range(2):
-            off = track[t] - track[side * last]
-            inward = max(off[0] * outward[t, 0] + off[1] * outward[t, 1], 0.0)
-            out[side, t + 1] = out[side, t] + CROSSES * inward * inward
-    return out
+    """Return the cumulative cost of a stance foot that the body overtakes, from A and to B [2, N + 1]: legs cross."""
+    off = track - track[[0, -1], None]
+    inward = np.maximum(np.sum(off * outward, axis=2), 0.0)
+    return np.concatenate([np.zeros((2, 1)), np.cumsum(CROSSES * inward**2, axis=1)], axis=1)

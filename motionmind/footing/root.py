@@ -8,7 +8,7 @@ from motionmind._typing import Floats
 from motionmind.body.contact import Posed, lowest_height
 from motionmind.body.limbs import limb_of_points
 from motionmind.body.skeleton import Skeleton
-from motionmind.footing.knees import smoothed
+from motionmind.footing.smoothing import smoothed
 
 GRIP = 0.015  # metres above the floor at which a foot's hold on it has fallen to 1/e
 SLIP = 0.15  # weight of the corpus's own travel, that of a standing foot being 1

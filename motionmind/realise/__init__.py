@@ -1,1 +1,1 @@
-"""Realising a path of states as a motion: in its own time, as walks expect, on its feet, its limbs apart."""
+"""From a path of states to a motion: its reference, the clock, and the synthesis of a movement on its feet."""

@@ -1,30 +1,27 @@
-"""From a path of states to a motion: exact at both ends, smooth between, near the path, on its feet."""
+"""From a path of states to a motion: exact at both ends, smooth, near the path, and carried by its feet."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
+from msgspec import structs
 
 from motionmind._typing import Bools, Floats, Int32s
 from motionmind.body.contact import lowest_height
-from motionmind.body.legs import find_legs
 from motionmind.body.limits import within_limits
 from motionmind.body.motion import Insertion, Motion, Posture, Velocity
 from motionmind.body.plausibility import GRAVITY
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import size_of
 from motionmind.corpus.corpus import Corpus, subdivide_times
-from motionmind.footing.carrying import Allowed
 from motionmind.footing.corrections import Correction
-from motionmind.footing.feet import KNEE
-from motionmind.footing.ground import Given, Stance, ends_in_air, floors_at_ends, set_on_floor
+from motionmind.footing.ground import Given, Stance, ends_in_air
 from motionmind.geometry import rotations as rot
-from motionmind.geometry.splines import rotation_spline
+from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.grammar import Grammar
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.bending import allowed_off, bend_to_states
@@ -37,24 +34,24 @@ from motionmind.realise.retime import (
     jump_in_time,
     keep_pace,
     land_between,
-    slow_down,
+    slower_steps,
 )
-from motionmind.realise.settling import keeper, settled
 from motionmind.realise.timeline import Timeline, stretch, timeline
+from motionmind.synth.gave import Gave
+from motionmind.synth.synthesise import Bounds, Synthesis, synthesise
 from motionmind.walks.expectation import Expectation, expect
 from motionmind.walks.headings import travel_along
 from motionmind.walks.minimal import departure
 from motionmind.walks.passages import Danced, Place, dance
 from motionmind.walks.stops import Stop, stop_at
 
-# Of a passage's displacement that legs get: feet find their places elsewhere. Chosen on ballet: with all of it a foot
-# that stands makes a step; with none, legs are as slow as the mean's.
-LEGS_SHARE = 0.4
 DANCED_WITHIN = (
-    0.9  # tolerances by which a dance may take a joint off its state, with room for the arc between two frames
+    0.9  # tolerances by which a passage may take a joint off its state; the rest is for the arc between frames
 )
-_SAME = 1e-9  # radians: two orientations no farther apart are the same but for rounding
-_UNSEEN = 2e-3  # radians: a joint that comes back to where it began, and goes no farther, does not move
+SOLVES = 2  # the first, and one on a slower clock
+SLIGHTLY = 1.03  # times as long as before: a clock that need not be slower stays
+_SAME = 1e-9  # radians: orientations no farther apart are equal but for rounding
+_UNSEEN = 2e-3  # radians: a joint that returns to its start, and goes no farther, does not move
 
 
 class Realised(NamedTuple):
@@ -62,177 +59,220 @@ class Realised(NamedTuple):
 
     Attributes:
         motion: the motion.
-        danced: the passage of the corpus that it is danced like; None if like none.
-        left_out: share of walks that begin or end in moments that others stand for (`mean_walk.MeanWalk`).
+        danced: passage of the corpus that it follows; None for none.
+        left_out: share of walks that begin or end in samples that others stand for (`mean_walk.MeanWalk`).
+        gave: largest residual of each term of the solve.
     """
 
     motion: Motion
     danced: Danced | None
     left_out: float
+    gave: tuple[Gave, ...] = ()
 
 
-def realise(
-    path: Int32s,
-    a: Posture,
-    b: Posture,
-    corpus: Corpus,
-    grammar: Grammar,
-    carriage: Carriage,
-    tolerances: Floats,
-    wished: Bools,
-    fixed: Bools,
-    fps: float,
-    length: float | None = None,
-    through: Mapping[int, Posture] = MappingProxyType({}),
-    leaving: Velocity | None = None,
-    arriving: Velocity | None = None,
-    without: Collection[Correction] = (),
-    pace: float = 1.0,
-    fastest: Floats | None = None,
-    peaks: Callable[[float, float], Floats] | None = None,
-    slides: float = np.inf,
-    liveliness: float = 0.5,
-    place: Place | None = None,
-) -> Realised:
-    """Return the motion from posture `a` to posture `b` in the moves of a path, on the body of `a`.
+class Style(NamedTuple):
+    """The style of a motion: what was learned of a corpus.
 
-    Its first and last frames are `a` and `b`, exactly, and at the moves in `through` its joints and its facing are as
-    in the postures there. Between them the body is, at the times of the moves, at the mean of the walks that the corpus
-    knows from `a` to `b` in that time and that count the more the nearer they are to the path
-    (`motionmind.walks.likelihood`); a C2 spline joins them. Where that leaves a chain too far from its state, the
-    movement is bent towards it, smoothly. It is danced like a passage of the corpus (`motionmind.walks.passages`).
+    Attributes:
+        corpus: the corpus.
+        grammar: its states and transitions.
+        carriage: its posture statistics: how bodies travel and stand.
+        tolerances: angle within which a state of each chain stands for an orientation [L], radians.
+        fastest: greatest speeds of the joints, of turning and of travel [J + 2], as in `motionmind.learned.pace`, at a
+            pace of 1; None for no bound. With a given length they hold as far as slower parts leave time.
+        peaks: returns the bounds on the peaks of movement of so many seconds at a pace [J + 4], as
+            `motionmind.learned.pace.Pace.peaks_in` does; None for no bounds.
+        slides: greatest speed of a foot near the floor at a pace of 1, heights/s, in movement with `peaks`.
+    """
 
-    Feet that stand carry the body; where none stands it travels as the corpus's bodies do, and it ends where `b`
-    stands. The legs hold what one root cannot (`motionmind.footing.feet`), but for those with `fixed` joints. The
-    lowest point stays as far above the floor as in the corpus's postures; the floor is at 0, or lower under ends that
-    are lower, or higher under ends higher than the corpus knows of such postures. Limbs that would then pass through
-    each other are kept apart (`motionmind.realise.limbs_apart`).
+    corpus: Corpus
+    grammar: Grammar
+    carriage: Carriage
+    tolerances: Floats
+    fastest: Floats | None = None
+    peaks: Callable[[float, float], Floats] | None = None
+    slides: float = np.inf
+
+
+class Wishes(NamedTuple):
+    """The request for a motion, besides its path.
+
+    Attributes:
+        a: first posture.
+        b: last posture.
+        wished: chains that the request constrains beyond their ends [L].
+        fixed: chains among them that must not move, not even for the feet [L].
+        fps: frames a second; the motion is stretched by less than a frame so that `b` falls on one.
+        length: duration, seconds; None for the typical duration of the corpus.
+        through: postures on the way, by the number of moves that lead there, increasing.
+        leaving: velocity at `a`; None where unknown.
+        arriving: velocity at `b`; None where unknown.
+        without: terms of the solve to leave out.
+        pace: speed relative to the corpus, where there is no `length`.
+        liveliness: 0 for the mean of walks, up to 1 for a passage of the corpus (`motionmind.walks.passages`).
+        place: start of that passage in the corpus; None for any.
+    """
+
+    a: Posture
+    b: Posture
+    wished: Bools
+    fixed: Bools
+    fps: float
+    length: float | None = None
+    through: Mapping[int, Posture] = MappingProxyType({})
+    leaving: Velocity | None = None
+    arriving: Velocity | None = None
+    without: Collection[Correction] = ()
+    pace: float = 1.0
+    liveliness: float = 0.5
+    place: Place | None = None
+
+    @property
+    def moving(self) -> tuple[bool, bool]:
+        """Whether the body passes the first and the last posture at a given velocity."""
+        return self.leaving is not None, self.arriving is not None
+
+
+def realise(path: Int32s, style: Style, wishes: Wishes) -> Realised:
+    """Return the motion of a path, on the body of its first posture.
+
+    Its first and last frames are exactly the given postures; at the moves in `through`, its joints and its facing are
+    those of the postures there. Its reference is the mean of the corpus walks from `a` to `b` in that time, weighted by
+    their nearness to the path (`motionmind.walks.likelihood`), with a C2 spline between the moves. Where that leaves a
+    chain too far from its state, the reference bends towards it, smoothly. It moves like a passage of the corpus
+    (`motionmind.walks.passages`).
+
+    The motion is the one nearest to its reference that stands, falls and turns as bodies do
+    (`motionmind.synth.synthesise`). The floor is at 0, lower under an end below 0, and higher under an end that is
+    higher than the corpus's bodies in such postures. Where the motion exceeds a bound on speed, its clock slows down
+    and it is solved again.
 
     Args:
         path: states of the chains [T + 1, L].
-        a: first posture.
-        b: last posture.
-        corpus: the movement that was learned from.
-        grammar: what was learned of its states.
-        carriage: how its bodies hold themselves, travel and stand.
-        tolerances: radians within which a state of each chain stands for an orientation [L].
-        wished: chains of which more is asked than that they go from `a` to `b` [L].
-        fixed: those of them that do not move for the feet's sake either [L].
-        fps: frames a second; the whole is stretched by less than a frame so that `b` falls on one.
-        length: duration, seconds, to which frames are fitted; None for as long as the corpus takes.
-        through: postures on the way, by the number of moves that lead there, increasing.
-        leaving: velocity with which the body leaves `a`; None where it is unknown.
-        arriving: velocity with which it arrives at `b`.
-        without: corrections to leave out.
-        pace: how many times as fast as the corpus to move, where there is no `length`.
-        fastest: speeds that the joints, the body's turning and its travel keep to [J + 2], as in
-            `motionmind.learned.pace`, at a pace of 1; None for any speed. Where there is a `length`, as far as slower
-            parts of the movement have the time for it.
-        peaks: returns what the greatest of movement of so many seconds keep to at a pace [J + 4], as
-            `motionmind.learned.pace.Pace.peaks_in` does; None for any.
-        slides: speed of a foot near the floor, heights/s, that movement with `peaks` keeps to at a pace of 1.
-        liveliness: from 0, the mean of walks, to 1, a passage of the corpus (`motionmind.walks.passages`).
-        place: where in the corpus that passage begins; None for any.
+        style: style of the motion.
+        wishes: request for it.
     """
+    a, b = wishes.a, wishes.b
     if len(path) == 1:
         still = Motion(a.skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", (Insertion(np.zeros(1)),))
         return Realised(still, None, 0.0)
-    clock = timeline(path, grammar.transitions, fps, length)
-    postures = {0: a, **through, len(path) - 1: b}
+    reference = _find_reference(path, style, wishes)
+    clock, rotations, stance, joints = reference.clock, reference.rotations, reference.stance, len(a.skeleton)
+    pace = max(wishes.pace, 1.0)
+    lasts, most, caps = wishes.length is not None, None, None
+    if style.peaks is not None:
+        caps = most = style.peaks(LONGER * float(clock.frames[-1]), pace)
+    slows = style.fastest is not None  # else its moves, which are given, say how long it takes
+    if lasts or not slows:  # fast parts then take time from slow ones, or stay
+        most = None
+    if most is not None and caps is not None:
+        given = [0, *(2 * move for move in wishes.through), -1]
+        stance = _without_high_jumps(stance, JUMPS_AT * most[-2] * a.skeleton.height, given)
+        caps = _quickest(caps, style.fastest, pace, joints)
+    travels = np.inf if style.fastest is None or lasts else HEADROOM * pace * float(style.fastest[-1])
+    wished = wishes.wished[:joints].copy()
+    wished[0] |= wishes.wished[joints:].any()  # the root turns the facing
+    fastest = None
+    if caps is not None:
+        fastest = caps[:joints].copy()
+        fastest[0] = max(caps[0], caps[joints])  # the root tilts at one of these speeds and turns at the other
+    bounds = Bounds(
+        wishes.fixed[:joints],
+        wished,
+        style.carriage.loose,
+        style.carriage.touches,
+        fastest,
+        travels * a.skeleton.height,
+        np.inf if most is None else float(most[-1]) * a.skeleton.height,
+    )
+    ends = Given(reference.low, (a.root, b.root), (_rate(wishes.leaving), _rate(wishes.arriving)))
+    before: Synthesis | None = None
+    for _ in range(SOLVES):
+        made = synthesise(a.skeleton, rotations, clock.frames, stance, ends, bounds, wishes.without, before)
+        motion = _exact(a, b, made.rotations, made.root, clock)
+        if caps is None or not slows:
+            break
+        slower = slower_steps(motion, caps, wishes.moving, pace * style.slides, lasts)
+        if slower.max() < SLIGHTLY:
+            break
+        was, end = clock.frames, clock.frames[-1]
+        clock, at = stretch(clock, was, slower, wishes.fps)
+        if lasts:  # the given length holds to the last digit
+            clock = clock._replace(frames=np.append(clock.frames[:-1], end), moves=np.append(clock.moves[:-1], end))
+        then = np.interp(clock.frames, at, was)
+        rotations = rot.normalise(rotation_spline(was, rotations, then))
+        rotations[0], rotations[-1] = a.rotations, b.rotations
+        before = made.at(was, then)
+        stance = stance._replace(half_steps=np.interp(stance.half_steps, was, at))
+    else:  # the last stretch of the clock is slight, and needs no solve
+        motion = _exact(a, b, rotation_spline(was, made.rotations, then), natural_spline(was, made.root, then), clock)
+        gave = tuple(structs.replace(one, at=float(np.interp(one.at, was, at))) for one in made.gave)
+        made = made._replace(gave=gave)
+    motion = replace(motion, insertions=(Insertion(clock.moves),))
+    return Realised(motion, reference.danced, reference.left_out, made.gave)
+
+
+def _exact(a: Posture, b: Posture, rotations: Floats, root: Floats, clock: Timeline) -> Motion:
+    """Return a motion of rotations [N, J, 4] and root positions [N, 3], metres, whose ends are exactly `a` and `b`."""
+    rotations = rot.normalise(rotations)
+    rotations[0], rotations[-1], root[0], root[-1] = a.rotations, b.rotations, a.root, b.root
+    return Motion(a.skeleton, rotations, root, clock.frames, "tween")
+
+
+class _Reference(NamedTuple):
+    """The reference of a motion: local rotations [N, J, 4], and the stances of the corpus's bodies along it."""
+
+    clock: Timeline
+    rotations: Floats
+    stance: Stance
+    low: dict[int, float]
+    danced: Danced | None
+    left_out: float
+
+
+def _find_reference(path: Int32s, style: Style, wishes: Wishes) -> _Reference:
+    """Return the mean of the corpus walks near a path, moved like a passage, in the time that they take."""
+    a, b, corpus, carriage, grammar = wishes.a, wishes.b, style.corpus, style.carriage, style.grammar
+    clock = timeline(path, grammar.transitions, wishes.fps, wishes.length)
+    postures = {0: a, **wishes.through, len(path) - 1: b}
     stops = {move: stop_at(corpus, posture) for move, posture in postures.items()}
-    slower = 1.0 if length else 1.0 / pace  # the walk is made at a pace of 1, and then taken faster
-    # Steps and the weight take their time at any pace: who is slower may take them as fast as the corpus does.
-    pace = max(pace, 1.0)
-    speeds, windows = fastest, peaks
-    if length is not None:  # what is faster than that then takes its time from the rest, in the end
-        fastest = peaks = None
-    stops[0] = stop_at(corpus, a, _times(slower, leaving))
-    stops[len(path) - 1] = stop_at(corpus, b, _times(slower, arriving))
+    # The walk is found at a pace of 1, then scaled in time.
+    slower = 1.0 if wishes.length else 1.0 / wishes.pace
+    stops[0] = stop_at(corpus, a, _times(slower, wishes.leaving))
+    stops[len(path) - 1] = stop_at(corpus, b, _times(slower, wishes.arriving))
     states = grammar.centres[grammar.transitions.starts[: path.shape[1]] + path]
-    walk = _walk_near(states, clock, stops, corpus, carriage, length is None and not through)
-    within = allowed_off(chains := walk.chains(corpus, clock.moves), path, grammar, tolerances, wished)
+    walk = _walk_near(states, clock, stops, corpus, carriage, wishes.length is None and not wishes.through)
+    chains = walk.chains(corpus, clock.moves)
+    within = allowed_off(chains, path, grammar, style.tolerances, wishes.wished)
     walk = bend_to_states(walk, chains, states, clock, stops, corpus, within)
     size = a.skeleton.height / corpus.skeleton.height if corpus.skeleton.height > 0.0 else 1.0
     travel = travel_along(walk.trust[:, :1] * (walk.moves @ carriage.travel[walk.of_moves]), walk.headings)
-    given = [0, *(2 * move for move in through), -1]
-    moving, low = (leaving is not None, arriving is not None), _given_heights(postures, walk)
-    # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
+    given = [0, *(2 * move for move in wishes.through), -1]
+    low = _given_heights(postures, walk)
+    # Heights are those of the body of `a`, which moves; `b` may have stood on shorter legs.
     stance = _stance(walk, carriage, travel, size, given)
-    longer = np.full(len(travel), slower)
-    if length is None:
-        if fastest is not None:
+    if wishes.length is None:
+        longer = np.full(len(travel), slower)
+        if style.fastest is not None:
             missing = (b.root - a.root) / size - travel.sum(axis=0)
-            longer *= keep_pace(walk, clock.frames, corpus, fastest, travel + missing / len(travel), moving)
-            if "flight" not in without:
-                longer *= _for_jumps(walk, longer, corpus, a.skeleton, stance, low, moving, pace * fastest)
-        clock, half_steps = stretch(clock, walk.half_steps, longer, fps)
+            even = travel + missing / len(travel)
+            longer *= keep_pace(walk, clock.frames, corpus, style.fastest, even, wishes.moving)
+            if "flight" not in wishes.without:
+                # Steps and weight shifts keep their own time: a slower body takes them as fast as the corpus does.
+                quick = max(wishes.pace, 1.0) * style.fastest
+                longer *= _for_jumps(walk, longer, corpus, a.skeleton, stance, low, wishes.moving, quick)
+        clock, half_steps = stretch(clock, walk.half_steps, longer, wishes.fps)
         walk, stance = walk._replace(half_steps=half_steps), stance._replace(half_steps=half_steps)
-    quick = None if fastest is None else pace * fastest
-    danced = _danced(walk, clock, stops, corpus, carriage, liveliness, place, states, tolerances, wished, fixed)
+    danced = _danced(walk, clock, stops, states, style, wishes)
     chains = walk.chains(corpus, clock.frames)
     rotations = corpus.from_chains(danced.move(chains, clock.frames) if danced else chains)
-    rotations = _with_rates(rotations, clock, [*stops], leaving, arriving, float(carriage.trust.lasts[0]))
-    # Once so that feet find places to stand at, and once for where they have been put.
-    keep_apart = keeper(clock, [*stops], fixed, wished, carriage, a.skeleton, without)
-    rotations = _limit(keep_apart(rotations, None), postures, carriage.loose)
-
-    greatest = None if windows is None else windows(LONGER * float(clock.frames[-1]), pace)
-    most = None if peaks is None else greatest
-    if most is not None:
-        stance = _without_high_jumps(stance, JUMPS_AT * most[-2] * a.skeleton.height, given)
-    rotations, root = set_on_floor(
-        a.skeleton,
-        rotations,
-        rotations,
-        clock.frames,
-        stance,
-        Given(low, (a.root, b.root), (_rate(leaving), _rate(arriving))),
-        _allowed(a.skeleton, fixed, carriage, quick, most),
-        without,
-    )
-    settle = partial(
-        settled,
-        fps=fps,
-        stops=[*stops],
-        moving=moving,
-        fixed=fixed,
-        wished=wished,
-        carriage=carriage,
-        overhang=stance.overhang,
-        floors=floors_at_ends(stance, low, size_of(a.skeleton)),
-        fastest=None if quick is None else quick[: len(a.skeleton)],
-        without=without,
-    )
-    motion = settle(Motion(a.skeleton, rotations, root, clock.frames), clock)
-    if greatest is not None:
-        if length is None:
-            greatest = _quickest(greatest, speeds, pace, len(a.skeleton))
-        motion, clock = slow_down(motion, clock, greatest, moving, pace * slides, settle, lasts=length is not None)
-    return Realised(replace(motion, name="tween", insertions=(Insertion(clock.moves),)), danced, walk.left_out)
-
-
-def _allowed(body: Skeleton, fixed: Bools, carriage: Carriage, quick: Floats | None, most: Floats | None) -> Allowed:
-    """Return what a body may change for its feet, and how fast it may be.
-
-    Args:
-        body: the body.
-        fixed: chains that do not move for the feet's sake [L].
-        carriage: how the corpus's bodies hold themselves.
-        quick: speeds of the joints, of turning and of travel [J + 2]; None for any.
-        most: the greatest of movement as long, as of `realise`'s `peaks` [J + 4]; None for any.
-    """
-    joints = len(body)
-    return Allowed(
-        fixed[:joints],
-        carriage.loose,
-        np.full(joints, KNEE) if quick is None else quick[:joints],
-        np.inf if quick is None else float(HEADROOM * quick[-1] * body.height),
-        np.inf if most is None else float(most[-1]) * body.height,
-    )
+    lasts = float(carriage.trust.lasts[0])
+    rotations = _with_rates(rotations, clock, [*stops], wishes.leaving, wishes.arriving, lasts)
+    return _Reference(clock, _limit(rotations, postures, carriage.loose), stance, low, danced, walk.left_out)
 
 
 def _rate(velocity: Velocity | None) -> Floats | None:
-    """Return the velocity of the root [3], metres a second; None for none."""
+    """Return the velocity of the root [3], m/s; None for none."""
     return None if velocity is None else velocity.root
 
 
@@ -246,10 +286,10 @@ def _walk_near(
 ) -> Expectation:
     """Return the mean of the walks that pass the stops and are near a path's states [T + 1, L, 4].
 
-    The body turns the `near` way from stop to stop, or as walks do.
+    The body turns the short way from stop to stop if `near`, else as walks do.
 
-    A path may take more moves than there is time for; the corpus's walks are not to be hurried, and take as many as it
-    usually does.
+    A path may have more moves than there is time for. Walks are not hurried: they take as many as the corpus usually
+    does.
     """
     last, joints = len(states) - 1, len(corpus.skeleton)
     half_steps, path = subdivide_times(clock.moves, 1), states[:, :joints]
@@ -261,20 +301,20 @@ def _walk_near(
 
 
 def _stance(walk: Expectation, carriage: Carriage, travel: Floats, size: float, given: Sequence[int]) -> Stance:
-    """Return how the corpus's bodies hold themselves along a walk, on a body so many times as large.
+    """Return the stances of the corpus's bodies along a walk, on a body of another size.
 
     Args:
         walk: the movement at its half steps.
-        carriage: how the corpus's bodies hold themselves.
+        carriage: posture statistics of the corpus.
         travel: level displacement of the root in each half step [2 T, 3], metres, on the corpus's skeleton.
-        size: of the body, in heights of the corpus's skeleton.
+        size: height of the body, in heights of the corpus's skeleton.
         given: half steps at which postures are given.
     """
     trust, in_air, clearance = walk.trust[:, 0], carriage.aloft[walk.of_moments], carriage.clearance[walk.of_moments]
     aloft = walk.moments @ in_air
     trusted = np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust)
     flies = trusted * aloft
-    flies[given] = aloft[given]  # whether a given posture is in the air is no matter of trust
+    flies[given] = aloft[given]  # trust has no say in whether a given posture is in the air
     return Stance(
         walk.half_steps,
         size * (walk.moments @ clearance),
@@ -288,7 +328,7 @@ def _stance(walk: Expectation, carriage: Carriage, travel: Floats, size: float, 
 
 
 def _without_high_jumps(stance: Stance, fastest: float, given: Sequence[int]) -> Stance:
-    """Return a stance that leaves the floor at most so fast, metres a second, but for the half steps that are given."""
+    """Return a stance without jumps that take off faster than `fastest`, m/s, except at the `given` half steps."""
     high = np.sqrt(2.0 * GRAVITY * stance.leaps) > fastest
     high[given] = False
     return stance._replace(aloft=np.where(high, 0.0, stance.aloft))
@@ -304,18 +344,18 @@ def _for_jumps(
     moving: tuple[bool, bool],
     fastest: Floats,
 ) -> Floats:
-    """Return how many times as long each half step is to take [2 T] for jumps into given postures (`jump_in_time`), or
+    """Return the factor by which each half step lasts longer [2 T], for jumps into a given posture (`jump_in_time`) or
     from one into another (`land_between`).
 
     Args:
         walk: the movement at its half steps.
-        longer: how many times longer each would take else [2 T].
-        corpus: what it was learned from.
+        longer: the factor without jumps [2 T].
+        corpus: the corpus.
         skeleton: the body.
-        stance: how the corpus's bodies hold themselves along the walk.
+        stance: stances of the corpus's bodies along the walk.
         low: height of the lowest point of the given postures, metres, by the number of the walk's moves to there.
-        moving: whether the first and the last posture are passed at a given velocity.
-        fastest: speeds of the joints first [J], rad/s.
+        moving: whether the velocity at the first and at the last posture is given.
+        fastest: greatest speeds, those of the joints first [J], rad/s.
     """
     (in_air, above), seconds = ends_in_air(stance, low, size_of(skeleton)), longer * np.diff(walk.half_steps)
     if (
@@ -334,8 +374,8 @@ def _for_jumps(
 
 
 def _quickest(most: Floats, speeds: Floats | None, pace: float, joints: int) -> Floats:
-    """Return what movement keeps to in the end [J + 4]: a little less than `most`; of its joints, not much more than
-    their speeds in all but a hundredth of the corpus's moments [J + 2], at a pace."""
+    """Return the bounds of the finished movement [J + 4]: a little less than `most` and, for joints, little more than
+    the speeds of all but a hundredth of the corpus's samples [J + 2], at a pace."""
     out = ENDS_AT * most
     if speeds is not None:
         out[:joints] = np.minimum(out[:joints], JOINTS_AT * pace * speeds[:joints])
@@ -343,48 +383,33 @@ def _quickest(most: Floats, speeds: Floats | None, pace: float, joints: int) -> 
 
 
 def _danced(
-    walk: Expectation,
-    clock: Timeline,
-    stops: Mapping[int, Stop],
-    corpus: Corpus,
-    carriage: Carriage,
-    liveliness: float,
-    place: Place | None,
-    states: Floats,
-    tolerances: Floats,
-    wished: Bools,
-    fixed: Bools,
+    walk: Expectation, clock: Timeline, stops: Mapping[int, Stop], states: Floats, style: Style, wishes: Wishes
 ) -> Danced | None:
-    """Return how a walk is danced; no joint leaves its states' tolerance for that, and `fixed` ones do not move.
+    """Return the passage that a walk follows; no joint leaves its states' tolerance for it, and `fixed` joints stay.
 
-    Where a joint is beyond the tolerance already, it may go on as far, unless something is asked of it.
+    A joint that is beyond the tolerance already may be as far off, unless the request constrains it.
 
     Args:
         walk: the movement at its half steps.
         clock: its times.
-        stops: what is passed exactly, by the number of moves that lead there.
-        corpus: what it was learned from.
-        carriage: how its bodies hold themselves.
-        liveliness: from 0 to 1, as `motionmind.walks.passages.dance` takes it.
-        place: where the passage begins; None for any.
+        stops: postures passed exactly, by the number of moves that lead there.
         states: orientations of the path's states at the moves [T + 1, L, 4].
-        tolerances: radians within which a state of each chain stands for an orientation [L].
-        wished: chains of which more is asked than that they go from A to B [L].
-        fixed: chains that are not displaced [L].
+        style: style of the motion.
+        wishes: request for it.
     """
+    corpus, wished = style.corpus, wishes.wished
     passed = {float(clock.moves[move]): stop for move, stop in stops.items()}
-    danced = dance(corpus, carriage, walk, passed, liveliness, place)
+    danced = dance(corpus, style.carriage, walk, passed, wishes.liveliness, wishes.place)
     if danced is None:
         return None
     chains, joints = walk.chains(corpus, clock.moves), danced.off.shape[1]
-    off, most = danced.at(clock.moves), DANCED_WITHIN * tolerances[:joints]
+    off, most = danced.at(clock.moves), DANCED_WITHIN * style.tolerances[:joints]
     moved = danced.move(chains, clock.moves)
     before, after = (rot.angle(found[:, :joints], states[:, :joints]) for found in (chains, moved))
     room = np.maximum(most - before, 0.0) / np.maximum(rot.norm(off), 1e-9)
     firmly = np.where(wished[:joints], most, np.maximum(most, before))
     share = np.where(after <= firmly, 1.0, np.minimum(room, 1.0))
-    share[:, fixed[:joints]] = 0.0
-    share[:, [joint for leg, _ in find_legs(corpus.skeleton)[1] for joint in leg]] *= LEGS_SHARE
+    share[:, wishes.fixed[:joints]] = 0.0
     shares = np.stack([np.interp(danced.times, clock.moves, own) for own in share.T], axis=1)
     return danced._replace(off=shares[..., None] * danced.off)
 
@@ -397,10 +422,10 @@ def _with_rates(
     arriving: Velocity | None,
     lasts: float,
 ) -> Floats:
-    """Return rotations [N, J, 4] that leave their first frame and arrive at their last with the given velocities, each
-    of which is felt for so many seconds at most.
+    """Return rotations [N, J, 4] with the given velocities at the first and last frames, each felt for at most `lasts`
+    seconds.
 
-    They do not change at the moves of the `stops` nor between those on the way.
+    Rotations at the moves of the `stops`, and between those on the way, do not change.
     """
     times = clock.frames
     turned = rot.log(rot.inv_mul(rotations[[0, -2]], rotations[[1, -1]])) / (times[1] - times[0])
@@ -413,14 +438,14 @@ def _with_rates(
 
 
 def _limit(rotations: Floats, postures: Mapping[int, Posture], loose: Bools) -> Floats:
-    """Return unit rotations [N, J, 4] within the joints' limits, exactly the first and last posture at their ends.
+    """Return unit rotations [N, J, 4] within the joints' limits, with the first and the last posture as exact ends.
 
-    Limits are widened to the postures.
+    The postures widen the limits.
     """
     first, *_, last = postures.values()
     given = np.stack([posture.rotations for posture in postures.values()])
     out = within_limits(first.skeleton, rot.normalise(rotations), given, loose)
-    # Such as fingers that were not recorded: walks may know other values of them.
+    # Fingers that were not recorded, for example, may have other values in walks.
     still = rot.angle(given, first.rotations).max(axis=0) < _SAME
     still &= rot.angle(out, first.rotations).max(axis=0) < _UNSEEN
     out[:, still] = first.rotations[still]

@@ -5,16 +5,16 @@ How long a movement takes on the whole is settled before its path is known, and 
 way a joint may go there and back. Where that would be faster than all but the corpus's fastest hundredth of moments,
 the clock slows down: all of the body, so that joints stay together, and smoothly, over a few half steps.
 
-Then feet, knees and the weight take what they need, and some of it is quick. So the clock slows down once more where
-the movement as it is made shows more than the corpus's own of that length (`motionmind.learned.pace.Pace.peaks`), or a
-joint is much faster than in nearly all of the corpus's moments, or a foot near the floor than it seldom is there. But
-not in the air, where the body falls as it does. One that dips as fast with its feet on the floor can be slower.
+The synthesis then gives feet and balance what they need, and some of it is quick. So the clock slows down once more
+where the synthesised movement exceeds the corpus's own of that length (`motionmind.learned.pace.Pace.peaks`), where a
+joint is much faster than in nearly all of the corpus's moments, and where a foot near the floor is faster than feet
+usually are there. It does not slow in the air, where the body falls as it does; a body that dips as fast with its feet
+on the floor can be slower.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -26,23 +26,19 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, size_of
 from motionmind.corpus.corpus import Corpus
 from motionmind.footing.flight import PUSHES, find_falls
-from motionmind.footing.knees import bell, greatest_around
+from motionmind.footing.smoothing import bell, sliding_max
 from motionmind.geometry import rotations as rot
-from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.learned.pace import moved_in, steps_of, ways
 from motionmind.learned.peaks import accelerations
-from motionmind.realise.timeline import Timeline, stretch
 from motionmind.walks.expectation import Expectation
 
-HEADROOM = 0.9  # share of the fastest speeds that is kept to: fine detail, and what holds the feet, come later
+HEADROOM = 0.9  # share of the fastest speeds that is kept to: passages, and the synthesis, add to them later
 ENDS_AT = 0.92  # share of the peaks that is kept to in the end; chosen on cmu-05
 JOINTS_AT = 1.13  # times as fast as all but a hundredth of the corpus's moments, as joints are at most; for ballet
 JUMPS_AT = 0.95  # share of the fastest rise with which a body jumps on the way at most
 AROUND = 1.0 / 6.0  # seconds about what is too quick, in which the clock is slower
 LONGER = 1.1  # times as long as it was a movement is taken to be at most, when it is compared with others as long
-ROUNDS = 3  # of slowing down at most
 SPARES = 0.3  # share of the time that slow parts could do without, which fast ones may take
-AGAIN = 3  # times at most that it slows down and settles
 SLIGHT = 1e-3  # by which a clock is not worth slowing
 LEFT = 0.1  # metres, of a person: walks that are no higher have not left the floor
 SITS = 0.1  # metres, of a person: a body that leaves the floor no lower than that under where it could is not hurried
@@ -79,7 +75,7 @@ def keep_pace(
     step = np.searchsorted(times, 0.5 * (frames[1:] + frames[:-1])) - 1
     np.maximum.at(slower, step.clip(0, len(slower) - 1), (speeds / (HEADROOM * fastest)).max(axis=1))
     # The greatest of three, twice, covers the mean of five: no half step is slowed less than it needs.
-    slower = _mean_around(greatest_around(slower, 2, 0), np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0)
+    slower = _mean_around(sliding_max(slower, 2), np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0)
     middle = 0.5 * (times[1:] + times[:-1])
     for is_moving, since in zip(moving, (middle - times[0], times[-1] - middle), strict=True):
         if is_moving:
@@ -164,50 +160,22 @@ def land_between(seconds: Floats, heights: Floats, size: float, moving: tuple[bo
     return np.asarray(1.0 + free * (needs - takes) / max(float(free @ seconds), 1e-9))
 
 
-def slow_down(
-    motion: Motion,
-    clock: Timeline,
-    most: Floats,
-    moving: tuple[bool, bool],
-    slides: float = np.inf,
-    settle: Callable[[Motion, Timeline], Motion] | None = None,
-    lasts: bool = False,
-) -> tuple[Motion, Timeline]:
-    """Return a movement and its clock, slower where a part of the body is faster than the most, or the root starts so.
-
-    Frames of the slower movement fall elsewhere on what was quick in it, and may show more of that; so does what has to
-    settle in it. Where they show what the corpus does not, it is done again.
+def slower_steps(
+    motion: Motion, most: Floats, moving: tuple[bool, bool], slides: float = np.inf, lasts: bool = False
+) -> Floats:
+    """Return how many times longer each step of a movement is to take [N - 1] so that nothing is faster than may be.
 
     Args:
-        motion: the movement, at the clock's frames.
-        clock: its clock.
+        motion: the movement.
         most: speeds of the joints, rad/s, of the body's turning, of its travel and its rise, heights/s, and the root's
             acceleration, heights/s^2 [J + 4].
         moving: whether the first and the last posture are passed at a given velocity, which is not to change.
         slides: speed of a foot near the floor, heights/s; of bodies at least as tall as people.
-        settle: returns a slower movement in which limbs do not meet and who is slower is in balance; None for as it is.
         lasts: whether it is to last as long as before: then what is slower takes its time from where nothing is fast.
     """
-    given = clock
-    for again in range(AGAIN if settle else 1):
-        before = clock
-        for number in range(ROUNDS):
-            posed = pose(motion.skeleton, motion.rotations, motion.root)
-            slower, slack = _slower(motion, posed, most, slides, moving)
-            if lasts:
-                slower = _within(slower, slack, np.diff(motion.times))
-            if slower.max() < (1.0 / ENDS_AT if again or number else 1.0 + SLIGHT):
-                break
-            motion, clock = _slowed(motion, clock, posed.lowest, slower)
-        if settle is None or clock is before:
-            break
-        motion = settle(motion, clock)
-    if lasts and clock is not given:  # it is given to the last digit how long it lasts
-        end = given.frames[-1]
-        frames = np.append(np.minimum(clock.frames[:-1], end), end)
-        clock = clock._replace(frames=frames, moves=np.append(np.minimum(clock.moves[:-1], end), end))
-        motion = replace(motion, times=frames)
-    return motion, clock
+    posed = pose(motion.skeleton, motion.rotations, motion.root)
+    slower, slack = _slower(motion, posed, most, slides, moving)
+    return _within(slower, slack, np.diff(motion.times)) if lasts else slower
 
 
 def _slower(
@@ -219,7 +187,7 @@ def _slower(
     Args:
         motion: the movement.
         posed: the same, in the world.
-        most: as for `slow_down`, as is all else.
+        most: as for `slower_steps`, as is all else.
         slides: speed of a foot near the floor, heights/s.
         moving: whether the first and the last posture are passed at a given velocity.
     """
@@ -240,7 +208,7 @@ def _slower(
     reach = max(1, round(AROUND * fps))
 
     def around(values: Floats) -> Floats:
-        return _mean_around(greatest_around(values, reach, 0), bell(reach))
+        return _mean_around(sliding_max(values, reach), bell(reach))
 
     slower = 1.0 + free * (around(np.maximum(shown, 1.0)) - 1.0)
     return slower, free * (1.0 - around(np.minimum(shown, 1.0)))
@@ -282,30 +250,6 @@ def _within(slower: Floats, slack: Floats, seconds: Floats) -> Floats:
     if more > SPARES * spare:
         return np.ones(len(slower))
     return np.asarray(slower - slack * (more / max(spare, 1e-9)))
-
-
-def _slowed(motion: Motion, clock: Timeline, low: Floats, slower: Floats) -> tuple[Motion, Timeline]:
-    """Return a movement whose steps take so many times longer [N - 1], and its clock.
-
-    Args:
-        motion: the movement.
-        clock: its clock.
-        low: height of its lowest point [N], metres.
-        slower: how many times longer its steps take [N - 1].
-    """
-    times = motion.times
-    later, at = stretch(clock, times, slower, 1.0 / float(times[1] - times[0]))
-    was = np.interp(later.frames, at, times)
-    rotations, root = (
-        rot.normalise(rotation_spline(times, motion.rotations, was)),
-        natural_spline(times, motion.root, was),
-    )
-    # A spline between frames may lead a little deeper into the floor than they do.
-    lowest = np.minimum(np.interp(was, times, low), _floor(times, low, was))
-    deep = lowest - lowest_height(motion.skeleton, rotations, root)
-    root[:, 1] += np.maximum(deep, 0.0)
-    rotations[[0, -1]], root[[0, -1]] = motion.rotations[[0, -1]], motion.root[[0, -1]]
-    return Motion(motion.skeleton, rotations, root, later.frames), later
 
 
 def _floor(times: Floats, low: Floats, at: Floats) -> Floats:

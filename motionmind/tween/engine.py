@@ -27,7 +27,7 @@ from motionmind.formats import read_motion
 from motionmind.geometry.splines import rotation_spline
 from motionmind.learned import graphs, summary
 from motionmind.learned.model import LearnedCorpus
-from motionmind.realise.realise import Realised, realise
+from motionmind.realise.realise import Realised, Style, Wishes, realise
 from motionmind.retarget.retarget import own_skeleton
 from motionmind.search.apart import TooAlikeError, difference, solve_apart
 from motionmind.search.problem import places
@@ -251,26 +251,30 @@ class Engine(LearnedCorpus):
         paced = request.paced and request.moves is None
         return realise(
             places(formulation.searched.model, certificate.path),
-            formulation.a,
-            formulation.b,
-            self.corpus,
-            self.grammar,
-            self.carriage,
-            np.radians(self.space.tolerances),
-            formulation.wished,
-            formulation.constrained,
-            request.fps,
-            request.duration,
-            dict(zip(certificate.passed, formulation.through, strict=True)),
-            formulation.leaving,
-            formulation.arriving,
-            request.without,
-            request.pace,
-            self.pace.fastest if paced else None,
-            self.pace.peaks_in if paced else None,
-            float(self.plausibility.slides[0]) if paced else np.inf,
-            0.0 if request.posturewise else request.liveliness,
-            formulation.place,
+            Style(
+                self.corpus,
+                self.grammar,
+                self.carriage,
+                np.radians(self.space.tolerances),
+                self.pace.fastest if paced else None,
+                self.pace.peaks_in if request.paced else None,
+                float(self.plausibility.slides[0]) if paced else np.inf,
+            ),
+            Wishes(
+                formulation.a,
+                formulation.b,
+                formulation.wished,
+                formulation.constrained,
+                request.fps,
+                request.duration,
+                dict(zip(certificate.passed, formulation.through, strict=True)),
+                formulation.leaving,
+                formulation.arriving,
+                request.without,
+                request.pace,
+                0.0 if request.posturewise else request.liveliness,
+                formulation.place,
+            ),
         )
 
     def _account_for(
@@ -329,6 +333,7 @@ class Engine(LearnedCorpus):
             sources=shown,
             detail=found,
             left_out=realised.left_out,
+            gave=realised.gave,
             expansions=certificate.expansions,
             peak_nodes=certificate.peak_nodes,
             costs=costs,

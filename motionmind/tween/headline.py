@@ -26,6 +26,12 @@ _SHOWN = {
     "sliding": ("feet slide: near the floor one moves in {0} of a second, in the corpus in {1} at most", 0, "%"),
     "pace": ("{2} is {0} times as fast as is fast in the corpus, where nothing is more than {1} times", 1, "f"),
 }
+# Words for residuals of the solve, and from how much on a viewer sees them: centimetres and degrees.
+_GAVE = {
+    "Contacts": ("a part that stands is {0:.0f} cm off its place at {1:.1f} s", 4.0),
+    "Floor": ("a part is {0:.0f} cm under the floor at {1:.1f} s", 2.0),
+    "Limits": ("a joint is {0:.0f} degrees beyond its limit at {1:.1f} s", 8.0),
+}
 _MORE_DIGITS = 3  # at most, where two numbers would look alike
 
 
@@ -48,6 +54,11 @@ def headline(tween: Tween) -> str:
 def beyond(tween: Tween) -> list[str]:
     """Say where a tween goes beyond all that the corpus shows, so that a viewer would wince; each in a line."""
     said = [shown_beyond(name, one) for name, one in tween.shown.items() if one.is_beyond]
+    said += [
+        _GAVE[one.term][0].format(one.most, one.at)
+        for one in tween.gave
+        if one.most > _GAVE.get(one.term, ("", math.inf))[1]
+    ]
     if tween.bridges:
         far = max(tween.bridges, key=lambda bridge: bridge.degrees)
         if far.degrees >= _FAR:

@@ -18,6 +18,7 @@ from motionmind.errors import FormatError
 from motionmind.files import FilePath, read_bytes
 from motionmind.learned.plausibility import Sighting
 from motionmind.search.length import LengthChoice
+from motionmind.synth.gave import Gave
 from motionmind.tween.certificate import Bridge, Source, Wait
 from motionmind.tween.pacing import Tempo
 from motionmind.tween.what_if import WhatIf
@@ -73,6 +74,8 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         detail: places in the corpus of the passage that the motion is danced like, one for each tenth of a second.
         left_out: share of the corpus's walks that begin or end in postures for which others stand, about; 0 of a small
             corpus.
+        gave: what had to give so that the body stands, falls and turns as bodies do: the largest residual of each term
+            of the synthesis, its unit, and its time, seconds; empty in reports of 0.1.
         shown: what the motion shows a viewer, beside what the corpus shows at most: "balance", "bounce", "flight",
             "crossed_limbs" and "pace"; empty in reports of 0.1.
         times: of the moves [T + 1], seconds.
@@ -120,6 +123,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     sources: list[list[Source | None]]
     detail: list[Source] = []
     left_out: float = 0.0
+    gave: list[Gave] = []
     shown: dict[str, Sighting] = {}
     times: list[float]
     names: list[list[str]]

@@ -92,7 +92,7 @@ class TweenRequest:
             passage's quick one.
         passage: a passage of the corpus that the movement follows in place of the mean, by its clip and the time at
             which it begins there: "adagio@3.2s"; None for none.
-        without: corrections of the movement to leave out: see `motionmind.footing.corrections`.
+        without: parts of the synthesis to leave out: see `motionmind.footing.corrections`.
         fps: frames a second of the motion.
 
     Raises:

@@ -17,6 +17,7 @@ from motionmind.search.cfn import Ingredients, cfn
 from motionmind.search.length import LengthChoice
 from motionmind.search.problem import Problem, Via
 from motionmind.search.solve import Status
+from motionmind.synth.gave import Gave
 from motionmind.tween.certificate import Bridge, CostBreakdown, Source, Wait, gap_of
 from motionmind.tween.pacing import Tempo, UsualTime
 from motionmind.tween.report import PassedPosture, ReportedCosts, TweenReport, plain
@@ -52,6 +53,7 @@ class Tween:
             empty where it is danced like none.
         left_out: share of the corpus's walks that begin or end in postures for which others stand, about, in the part
             of the body where it is greatest; 0 of a small corpus, of which every posture counts for itself.
+        gave: what had to give so that the body stands, falls and turns as bodies do: the largest residual of each term.
         expansions: nodes that A* expanded.
         peak_nodes: greatest number of nodes that A* held.
         costs: the cost, joint by joint and move by move.
@@ -94,6 +96,7 @@ class Tween:
     sources: tuple[tuple[Source | None, ...], ...]
     detail: tuple[Source, ...]
     left_out: float
+    gave: tuple[Gave, ...]
     expansions: int
     peak_nodes: int
     costs: CostBreakdown
@@ -197,6 +200,7 @@ def report_of(tween: Tween, motion_sha256: str | None = None) -> TweenReport:
         followed=tween.followed.tolist(),
         sources=[list(row) for row in tween.sources],
         detail=list(tween.detail),
+        gave=list(tween.gave),
         left_out=tween.left_out,
         shown=tween.shown,
         times=tween.motion.insertions[0].times.tolist(),

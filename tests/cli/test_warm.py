@@ -58,15 +58,33 @@ def names_called(function: FunctionType) -> set[str]:
 
 def reach_everything() -> None:
     """Check that what is compiled ahead is all that there is to compile, in a process that has compiled nothing."""
-    for work in (warming.search, warming.realise, warming.seek, warming.draw, warming.learn):
+    for work in (
+        warming.turn,
+        warming.search,
+        warming.realise,
+        warming.film,
+        warming.learn,
+        warming.draw,
+        warming.seek,
+    ):
         work()
     reached = {name for one in dispatchers().values() if one.overloads for name in names_called(one.py_func)}
     assert codecache.decorated_names() - reached == set()
 
 
-def test_the_workers_reach_every_function_that_is_to_be_compiled() -> None:
+def compile_ahead_of_learning() -> None:
+    """Check that learning calls what is compiled before a corpus is learned, in a process that has compiled nothing."""
+    warming.turn()
+    ahead = {name: set(one.overloads) for name, one in dispatchers().items() if one.overloads}
+    Engine.fit(map(ballet_clip, ("adagio", "jump", "plies")))
+    assert {"walks/means.mean_rotations", "geometry/charts._write_curve"} <= set(ahead)
+    assert {name: set(one.overloads) for name, one in dispatchers().items() if name in ahead} == ahead
+
+
+@pytest.mark.parametrize("check", [reach_everything, compile_ahead_of_learning])
+def test_what_is_compiled_is_what_is_called(check: Callable[[], None]) -> None:
     # In a process of its own: here other tests have reached some.
-    code = f"import sys; sys.path[:] = {sys.path!r}; import {__name__}; {__name__}.reach_everything()"
+    code = f"import sys; sys.path[:] = {sys.path!r}; import {__name__}; {__name__}.{check.__name__}()"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 

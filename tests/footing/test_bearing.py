@@ -7,7 +7,7 @@ import numpy as np
 from motionmind.body.contact import pose
 from motionmind.body.human import human23
 from motionmind.footing.bearing import MOSTLY, TOUCHES, Bearing, lowest, shape_of
-from motionmind.footing.feet import bend_legs, find_free_feet
+from motionmind.footing.feet import find_free_feet
 from motionmind.geometry import rotations as rot
 
 BODY = human23()
@@ -40,17 +40,3 @@ def test_points_touch_the_floor_with_what_bears() -> None:
     expected = (near[0] & shape.feet[0] & bears[:, None]) | (near[1] & shape.feet[1]) | (near[2] & shape.others[0])
     np.testing.assert_array_equal(touches, expected)
     assert touches.any(axis=0).sum() > 4
-
-
-def test_legs_that_are_bent_bring_their_ends_where_they_are_to_be_and_keep_their_feet_level() -> None:
-    rotations = MOVEMENT.copy()
-    rotations[:, [foot.chain(BODY)[1] for foot in FEET]] = rot.exp(
-        np.array([0.8, 0.0, 0.0])
-    )  # none is all but straight
-    posed, off = pose(BODY, rotations), RNG.uniform(-0.02, 0.02, size=(FRAMES, 2, 3))
-    bent = pose(BODY, bend_legs(BODY, posed, FEET, off, np.zeros((FRAMES, 2))))
-    ends = [foot.chain(BODY)[2] for foot in FEET]
-    np.testing.assert_allclose(bent.places[:, ends], posed.places[:, ends] + off, atol=1e-9)
-    assert rot.angle(bent.turned[:, ends], posed.turned[:, ends]).max() < 1e-9
-    still = [joint for joint in range(len(BODY)) if joint not in [one for foot in FEET for one in foot.leg]]
-    np.testing.assert_array_equal(bent.rotations[:, still], rotations[:, still])

@@ -18,6 +18,7 @@ from motionmind.footing.footfalls import (
     SLIPS,
     STEP_COST,
     STRAYS,
+    _crossing,
     _part,
     find_stances,
     standing_costs,
@@ -80,7 +81,8 @@ def test_time_is_parted_in_the_way_that_costs_least(seed: int) -> None:
     half = (3 * seed % 4, seed % 3)  # frames that a foot swings at least which is given in the air
     known = track, outward, stand, swing, half, fps
     best = min(product((True, False), repeat=frames), key=lambda one: cost_of(one, *known))
-    parted = _part(track, outward, stand / fps, swing / fps, max(2, round(BRIEF * fps)), half, fps)
+    crosses = _crossing(track, outward)
+    parted = _part(track, outward, crosses, stand / fps, swing / fps, max(2, round(BRIEF * fps)), half, fps)
     found = np.zeros(frames, dtype=bool)
     for start, end in parted:
         found[start : end + 1] = True

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from bodies import insect
+from grounds import grounded
 
 from motionmind._typing import Floats
-from motionmind.body.capsules import capsules_of, legs_depth, pair_depths, penetration
+from motionmind.body.capsules import capsules_of, legs_depth, penetration
 from motionmind.body.contact import lowest_height
 from motionmind.body.human import human23
 from motionmind.body.motion import Posture
+from motionmind.footing.root import stand
 from motionmind.geometry import rotations as rot
-from motionmind.realise.limb_turns import LEAST, Placed, is_any_deeper, least_turns
-from motionmind.realise.limbs_apart import _give_way, _limbs_of, keep_limbs_apart
 from motionmind.tween.engine import Engine
 
 BODY = human23()
 FRAMES = 31
-TIMES = np.arange(FRAMES) / 30.0
-ENDS = np.array([0.0, FRAMES - 1.0])
 FREE = np.zeros(len(BODY), dtype=np.bool_)
 UNUSUAL = np.zeros(len(capsules_of(BODY).pairs()))
 LEGS = [BODY.index(f"{side}_{joint}") for side in ("left", "right") for joint in ("hip", "ankle")]
@@ -44,12 +44,13 @@ def between(a: Floats, b: Floats) -> Floats:
     return rot.slerp(a[None], b[None], share[:, None])
 
 
-def apart(rotations: Floats, root: Floats | None = None, **options: Floats) -> Floats:
-    """The movement with limbs kept apart, on a body in the air unless its root's places are given."""
-    frame = np.arange(FRAMES)
-    flying = np.stack([np.zeros(FRAMES), 0.1 * frame * (FRAMES - 1 - frame), frame], axis=1)
-    given = {"given": ENDS, "fixed": FREE, "usual": UNUSUAL} | options
-    return keep_limbs_apart(BODY, rotations, flying if root is None else root, TIMES, **given)
+def apart(rotations: Floats, root: Floats | None = None, **options: Any) -> Floats:
+    """The movement with limbs kept apart, of a body that leaps for half a second unless its root is given."""
+    options = {"usual": UNUSUAL} | options
+    if root is None:
+        flies = {"aloft": np.ones(2 * len(options.get("given", ())) + 3 if options.get("given") else 17), "leap": 1.0}
+        root, options = stand(BODY, rotations, np.zeros((FRAMES, 3)), np.ones(FRAMES)), flies | {"fps": 60.0} | options
+    return grounded(rotations, root, **options)[0]
 
 
 THROUGH = between(crossed(0.2), crossed(-0.2))
@@ -62,15 +63,75 @@ IN_PASSING = between(
 def test_legs_do_not_pass_through_each_other(movement: Floats) -> None:
     assert legs_depth(BODY, movement[[0, -1]]).max() == 0.0
     assert legs_depth(BODY, movement).max() > 0.035
-    assert legs_depth(BODY, apart(movement)).max() < 0.01
+    assert legs_depth(BODY, apart(movement)).max() < 0.02
 
 
 @pytest.mark.parametrize("movement", [THROUGH, IN_PASSING], ids=["to the other side", "in passing"])
-def test_ends_and_other_joints_stay_to_the_bit(movement: Floats) -> None:
+def test_ends_stay_and_the_rest_of_the_body_hardly_changes(movement: Floats) -> None:
     out = apart(movement)
-    np.testing.assert_array_equal(out[[0, 1, -2, -1]], movement[[0, 1, -2, -1]])
+    np.testing.assert_allclose(out[[0, -1]], movement[[0, -1]], rtol=0.0, atol=1e-12)
     others = np.delete(np.arange(len(BODY)), LEGS)
-    np.testing.assert_array_equal(out[:, others], movement[:, others])
+    assert rot.angle(out, apart(movement, without=["limbs"]))[:, others].max() < np.radians(10.0)
+
+
+@pytest.mark.parametrize("usual", [0.0, 0.2])
+def test_limbs_that_are_in_each_other_at_both_ends_or_in_the_corpus_stay(usual: float) -> None:
+    deep = crossed(0.05)
+    assert legs_depth(BODY, deep) > 0.03
+    movement = THROUGH if usual else between(deep, deep)
+    out, without = apart(movement, usual=UNUSUAL + usual), apart(movement, without=["limbs"])
+    assert rot.angle(out, without)[:, LEGS].max() < np.radians(2.0)
+
+
+def test_postures_on_the_way_stay() -> None:
+    out = apart(THROUGH, given=[9.5])
+    np.testing.assert_allclose(out[9:11], THROUGH[9:11], rtol=0.0, atol=1e-12)
+    assert legs_depth(BODY, out).max() <= legs_depth(BODY, THROUGH).max()
+
+
+def test_a_fixed_leg_stays_and_the_other_gives_way() -> None:
+    fixed = FREE.copy()
+    fixed[LEGS[:2]] = True
+    out = apart(THROUGH, fixed=fixed)
+    np.testing.assert_allclose(out[:, LEGS[:2]], THROUGH[:, LEGS[:2]], rtol=0.0, atol=1e-12)
+    assert legs_depth(BODY, out).max() < 0.02
+
+
+def test_a_standing_foot_stays_where_it_stands() -> None:
+    """The left leg stands straight; the right one swings through it, and does not sink into the floor."""
+    swing = between(posture(right_hip=(-0.6, 0.0, 0.28)), posture(right_hip=(0.6, 0.0, 0.28)))
+    root = stand(BODY, swing, np.zeros((FRAMES, 3)), np.zeros(FRAMES))
+    assert legs_depth(BODY, swing).max() > 0.05
+    out, went = grounded(swing, root, usual=UNUSUAL)
+    assert legs_depth(BODY, out).max() < 0.02
+    left = BODY.index("left_ankle")
+    moved = np.linalg.norm(BODY.positions(out, went)[:, left] - BODY.positions(swing, root)[:, left], axis=-1)
+    assert moved.max() < 0.02
+    assert lowest_height(BODY, out, went).min() > -0.005
+
+
+def test_legs_that_are_apart_are_not_driven_farther() -> None:
+    movement = between(crossed(0.2, 0.25), crossed(-0.2, 0.25))
+    out = apart(movement)
+    assert legs_depth(BODY, movement).max() > 0.09
+    assert legs_depth(BODY, out).max() < 0.02
+    assert rot.angle(out, apart(movement, without=["limbs"]))[:, LEGS].max() < np.radians(18.0)
+
+
+def test_limbs_that_are_apart_hardly_change() -> None:
+    wide = between(posture(left_hip=(0.5, 0.0, 0.3)), posture(left_hip=(-0.5, 0.0, 0.3)))
+    np.testing.assert_allclose(apart(wide), apart(wide, without=["limbs"]), rtol=0.0, atol=1e-9)
+
+
+def test_a_body_without_capsules_has_no_limbs_to_keep_apart() -> None:
+    body, rng = insect(), np.random.default_rng(0)
+    swings = np.sin(np.linspace(0.0, np.pi, FRAMES))[:, None, None] * rng.normal(scale=0.2, size=(len(body), 3))
+    root = stand(body, rot.exp(swings), np.zeros((FRAMES, 3)), np.zeros(FRAMES))
+    fixed = np.zeros(len(body), dtype=np.bool_)
+    with_limbs, without = (
+        grounded(rot.exp(swings), root, skeleton=body, fixed=fixed, without=left)[0] for left in ((), ("limbs",))
+    )
+    np.testing.assert_array_equal(with_limbs, without)
 
 
 def walking(rotations: Floats) -> Floats:
@@ -87,82 +148,13 @@ def test_legs_that_stand_in_turn_come_apart(frames: int, forward: float) -> None
     share = 0.5 - 0.5 * np.cos(np.pi * since)
     movement = rot.slerp(crossed(forward, 0.3)[None], crossed(-forward, 0.3)[None], share[:, None])
     assert legs_depth(BODY, movement).max() > 0.09
-    assert legs_depth(BODY, apart(movement, walking(movement))).max() < 0.01
-
-
-def test_feet_keep_their_orientations() -> None:
-    ankles = [BODY.index("left_ankle"), BODY.index("right_ankle")]
-    before, after = (BODY.global_rotations(each)[:, ankles] for each in (THROUGH, apart(THROUGH)))
-    assert rot.angle(before, after).max() < 1e-6
+    assert legs_depth(BODY, apart(movement, walking(movement))).max() < 0.02
 
 
 def test_the_movement_stays_smooth() -> None:
     """No joint turns from frame to frame by much more than before, nor changes how fast it turns."""
     before, after = (rot.log(rot.inv_mul(each[:-1], each[1:]))[:, LEGS] for each in (THROUGH, apart(THROUGH)))
     assert np.abs(np.diff(after, axis=0)).max() < np.abs(np.diff(before, axis=0)).max() + np.radians(3.0)
-
-
-def test_what_the_ends_have_in_each_other_stays() -> None:
-    deep = crossed(0.05)
-    assert legs_depth(BODY, deep) > 0.03
-    still = np.tile(deep, (FRAMES, 1, 1))
-    np.testing.assert_array_equal(apart(still), still)
-
-
-def test_what_the_corpus_has_in_each_other_stays() -> None:
-    np.testing.assert_array_equal(apart(THROUGH, usual=np.full(len(UNUSUAL), 0.2)), THROUGH)
-
-
-def test_postures_on_the_way_stay() -> None:
-    out = apart(THROUGH, given=np.array([0.0, 9.5, FRAMES - 1.0]))
-    np.testing.assert_array_equal(out[8:12], THROUGH[8:12])
-    assert legs_depth(BODY, out).max() < legs_depth(BODY, THROUGH).max()
-
-
-def test_a_fixed_leg_stays_and_the_other_gives_way() -> None:
-    fixed = FREE.copy()
-    fixed[BODY.index("left_hip")] = True
-    out = apart(THROUGH, fixed=fixed)
-    np.testing.assert_array_equal(out[:, LEGS[:2]], THROUGH[:, LEGS[:2]])
-    assert legs_depth(BODY, out).max() < 0.02
-
-
-def test_a_standing_foot_stays_where_it_stands() -> None:
-    """The left leg stands straight; the right one swings through it, and does not sink into the floor."""
-    swing = between(posture(right_hip=(-0.6, 0.0, 0.28)), posture(right_hip=(0.6, 0.0, 0.28)))
-    root = np.zeros((FRAMES, 3))
-    assert legs_depth(BODY, swing).max() > 0.05
-    out = apart(swing, root)
-    assert legs_depth(BODY, out).max() < 0.01
-    left, right = BODY.index("left_ankle"), BODY.index("right_ankle")
-    moved = np.linalg.norm(BODY.positions(out, root) - BODY.positions(swing, root), axis=-1)
-    assert moved[:, left].max() < 0.005
-    assert moved[:, right].max() > 0.05
-    assert lowest_height(BODY, out, root).min() > lowest_height(BODY, swing, root).min() - 0.002
-
-
-def test_of_two_standing_feet_the_one_that_steps_sooner_gives_way() -> None:
-    """The right foot stands from the first frame on, the left one until the last; for a while their legs cross."""
-    still = np.zeros((FRAMES, 4))
-    still[:20, 1] = still[12:, 0] = 1.0
-    crosses = np.zeros(FRAMES, dtype=np.bool_)
-    crosses[13:16] = True
-    held, stands = _give_way(still, still, crosses)
-    expected = still.copy()
-    expected[12:16, 0] = 0.0  # it comes down a frame before they cross
-    np.testing.assert_array_equal(held, expected)
-    np.testing.assert_array_equal(stands, expected)
-    for unchanged in _give_way(still, still, ~still[:, :2].all(axis=1)):
-        np.testing.assert_array_equal(unchanged, still)
-
-
-def test_legs_that_are_apart_are_not_driven_farther() -> None:
-    """Each side of a plane asked of them throughout, these turned by 17 degrees; by 11 they have passed each other."""
-    movement = between(crossed(0.2, 0.25), crossed(-0.2, 0.25))
-    out = apart(movement)
-    assert legs_depth(BODY, movement).max() > 0.09
-    assert legs_depth(BODY, out).max() < 0.015
-    assert rot.angle(out, movement)[:, LEGS].max() < np.radians(13.0)
 
 
 def test_a_hand_goes_round_the_thigh() -> None:
@@ -179,40 +171,9 @@ def test_a_hand_goes_round_the_thigh() -> None:
     assert max(depth[[0, -1]].max() for depth in depths.values()) == 0.0
     assert depths["left_hand", "left_thigh"].max() > 0.03
     out = apart(swing)
-    assert max(depth.max() for depth in penetration(BODY, out).values()) < 0.01
-    assert np.all(out[:, BODY.index("left_hip")] == swing[:, BODY.index("left_hip")])
-
-
-def test_a_limb_is_as_deep_as_in_the_deepest_of_its_pairs() -> None:
-    rng, capsules = np.random.default_rng(0), capsules_of(BODY)
-    pairs, limbs = capsules.pairs(), _limbs_of(BODY)
-    places = BODY.positions_and_tips(rot.exp(rng.normal(0.0, 0.6, (60, len(BODY), 3))), np.zeros(3))
-    ends = capsules.place(places)
-    placed = Placed(ends, places[:, limbs.first], places[:, limbs.last], np.zeros((60, 4)))
-    allowed = rng.uniform(0.0, 0.05, (60, len(pairs)))
-    deep, steps = least_turns(placed, limbs, capsules.radii, pairs, allowed, np.zeros((60, len(pairs), 3)))
-    beyond = pair_depths(ends, capsules.radii, pairs)[0] - allowed
-    expected = np.zeros_like(deep)
-    for (limb, other), depth in zip(limbs.owner[pairs], beyond.T, strict=True):
-        for mine, against in ((limb, other), (other, limb)):
-            if mine > 1 or (mine >= 0 and against < 2):
-                expected[:, mine] = np.maximum(expected[:, mine], np.where(depth > LEAST, depth, 0.0))
-    assert (expected > 0.0).any(axis=0).all()
-    np.testing.assert_allclose(deep, expected, rtol=0.0, atol=1e-12)
-    assert not steps[deep == 0.0].any()
-
-
-def test_limbs_that_are_apart_do_not_change() -> None:
-    wide = between(posture(left_hip=(0.5, 0.0, 0.3)), posture(left_hip=(-0.5, 0.0, 0.3)))
-    assert apart(wide) is wide
-
-
-def test_a_body_without_capsules_does_not_change() -> None:
-    body, rng = insect(), np.random.default_rng(0)
-    rotations = rot.normalise(rng.normal(size=(FRAMES, len(body), 4)))
-    fixed = np.zeros(len(body), dtype=np.bool_)
-    out = keep_limbs_apart(body, rotations, np.zeros((FRAMES, 3)), TIMES, ENDS, fixed, np.zeros(0))
-    assert out is rotations
+    assert max(depth.max() for depth in penetration(BODY, out).values()) < 0.02
+    hip = BODY.index("left_hip")
+    assert rot.angle(out, apart(swing, without=["limbs"]))[:, hip].max() < np.radians(15.0)
 
 
 def test_tweens_keep_their_legs_apart_unless_told_otherwise() -> None:
@@ -238,20 +199,3 @@ def test_arms_that_meet_beside_a_given_posture_part_without_a_jerk() -> None:
     fastest = [fps * rot.angle(one.rotations[:-1, arms], one.rotations[1:, arms])[:10].max() for one in (plain, apart_)]
     assert fastest[0] < 6.0
     assert fastest[1] < 11.5
-
-
-def test_any_pair_that_is_deeper_than_allowed_is_seen() -> None:
-    capsules = capsules_of(BODY)
-    pairs = capsules.pairs()
-    rng = np.random.default_rng(0)
-    rotations = rot.exp(0.7 * rng.normal(size=(40, len(BODY), 3)))
-    ends = np.ascontiguousarray(capsules.place(BODY.positions_and_tips(rotations, np.zeros(3))))
-    depths, _ = pair_depths(ends, capsules.radii, pairs)
-    deepest = np.sort(depths.max(axis=0))
-    assert deepest[-1] > 0.02
-    assert deepest[0] < 0.0
-    for off in (-1e-9, 1e-9):
-        for frame, pair in np.argwhere(depths > LEAST)[::7]:
-            allowed = np.full(depths.shape, 1.0)
-            allowed[frame, pair] = depths[frame, pair] - LEAST + off
-            assert is_any_deeper(ends, capsules.radii, pairs, allowed) == (off < 0.0)

@@ -19,10 +19,10 @@ from motionmind.studio.stays import in_place, stays_of
 MILLIMETRE = 1e-3
 FAST = 2.5  # metres a second that no joint of a dancer who changes her posture exceeds
 PINS = [
-    Pin("left_wrist", "place", 0.25, 0.75),
+    Pin("left_wrist", "place", 0.25, 0.5),
     Pin("left_wrist", "place", 0.5, 1.0),
-    Pin("right_wrist", "place", 0.0, 0.5),
-    Pin("left_ankle", "place"),
+    Pin("right_wrist", "place", 0.6, 1.0),
+    Pin("left_ankle", "place", 0.1, 0.4),
 ]
 
 

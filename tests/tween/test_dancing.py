@@ -226,8 +226,8 @@ def test_no_joint_leaves_its_states_to_dance(
     ballet.tween(*ends, liveliness=1.0, pin={"left_elbow": "A"})
     ballet.tween(*ends[::-1], liveliness=1.0)
     assert len(calls) == 2
-    for (walk, clock, _, corpus, _, _, _, states, tolerances, _, fixed), danced in calls:
-        chains = walk.chains(corpus, clock.moves)
+    for (walk, clock, _, states, style, wishes), danced in calls:
+        chains, tolerances, fixed = walk.chains(style.corpus, clock.moves), style.tolerances, wishes.fixed
         moved = danced.move(chains, clock.moves)
         joints = danced.off.shape[1]
         before, after = (rot.angle(found[:, :joints], states[:, :joints]) for found in (chains, moved))
@@ -237,4 +237,4 @@ def test_no_joint_leaves_its_states_to_dance(
         assert np.all((after <= within) | (after <= before + np.radians(0.5)))
         np.testing.assert_array_equal(danced.off[:, fixed[:joints]], 0.0)
         assert rot.norm(danced.off).max() > np.radians(5.0)
-    assert calls[0][0][-1].any()
+    assert calls[0][0][-1].fixed.any()

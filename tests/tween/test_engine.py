@@ -262,6 +262,7 @@ REPORT = [
     "sources",
     "detail",
     "left_out",
+    "gave",
     "shown",
     "times",
     "names",

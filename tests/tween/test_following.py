@@ -15,7 +15,7 @@ from motionmind.body.motion import Posture
 from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
 from motionmind.realise.bending import FREELY
-from motionmind.realise.realise import realise
+from motionmind.realise.realise import Style, Wishes, realise
 from motionmind.tween.engine import SAME_ANGLE, Engine
 from motionmind.tween.result import Tween
 
@@ -157,10 +157,8 @@ def test_other_states_on_the_way_are_another_motion(ballet: Engine) -> None:
             shuffled[1:-1, chain] = rng.integers(0, size, 5)
         tolerances = np.radians(ballet.space.tolerances)
         none = np.zeros(len(tolerances), dtype=np.bool_)
-        motions = [
-            realise(path, a, b, ballet.corpus, ballet.grammar, ballet.carriage, tolerances, none, none, 30.0, 2.4)[0]
-            for path in (tween.path, shuffled)
-        ]
+        style = Style(ballet.corpus, ballet.grammar, ballet.carriage, tolerances)
+        motions = [realise(path, style, Wishes(a, b, none, none, 30.0, 2.4)).motion for path in (tween.path, shuffled)]
         apart = np.degrees(rot.angle(*(motion.rotations for motion in motions)))
         assert apart[20:-20].max(axis=0).mean() > 10.0
         at = [ballet.corpus.to_chains(motion.at(motion.insertions[0].times).rotations) for motion in motions]

@@ -1,0 +1,21 @@
+"""The residuals that a solve reports; light to import, because reports hold them."""
+
+from __future__ import annotations
+
+import msgspec
+
+
+class Gave(msgspec.Struct, frozen=True):
+    """The largest residual of a term of the solve.
+
+    Attributes:
+        term: name of the term, a class of `motionmind.synth.terms`.
+        most: the residual, in `unit`.
+        unit: its unit.
+        at: seconds from the start.
+    """
+
+    term: str
+    most: float
+    unit: str
+    at: float

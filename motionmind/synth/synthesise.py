@@ -1,0 +1,398 @@
+"""Synthesis: from a reference movement to one that its feet carry, exact in the given postures.
+
+`motionmind.synth.plan` first plans stances and flights. `motionmind.synth.solve` then solves one least-squares problem
+over the root and the joints of all frames: its terms (`motionmind.synth.terms`) say what the movement should be like,
+and `WEIGHTS` how firmly. Every body is scaled to the size of a person, for which the weights were chosen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats
+from motionmind.body.capsules import capsules_of
+from motionmind.body.contact import pose
+from motionmind.body.legs import find_hinge, find_legs
+from motionmind.body.limbs import limbs_of
+from motionmind.body.plausibility import GRAVITY
+from motionmind.body.skeleton import Skeleton, remembered
+from motionmind.body.support import size_of
+from motionmind.footing.corrections import Correction
+from motionmind.footing.feet import find_free_feet
+from motionmind.footing.ground import Given, Stance, find_ground
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.splines import natural_spline
+from motionmind.synth.gave import Gave
+from motionmind.synth.kinematics import Freedom, State, body_of
+from motionmind.synth.plan import Plan, Stretch, plan_contacts
+from motionmind.synth.solve import Problem, solve
+from motionmind.synth.terms import (
+    EDGE,
+    Balance,
+    Ballistic,
+    Collision,
+    Contacts,
+    Floor,
+    Limits,
+    Run,
+    Speed,
+    Term,
+    Track,
+    Travel,
+)
+from motionmind.synth.weights import WEIGHTS, Weights
+
+STILL_RAD = 2e-3  # a joint outside the legs that the reference turns less has no unknowns
+LONG_M = 0.3  # of a person: a joint outside the legs with a shorter reach has no unknowns
+PASSES_S = 0.12  # before legs meet and after they part, in which the plane between them turns; chosen on cmu-05
+SWAYS_S = 0.5  # in which a body that is given out of balance comes over its support
+WINDOW = 400  # frames solved at once
+OVERLAP = 60  # frames at the end of a window that the next one solves again
+ITERATIONS = 16, 10  # at most, of a first solve and of one that starts from another
+REPLANS = 2, 0  # times that steps are planned again, in the same
+LENGTHS = "cm", "m/s^2"  # units that scale with the body
+LEVEL = np.array([1.0, 0.0, 1.0])
+
+
+class Bounds(NamedTuple):
+    """The bounds of a movement.
+
+    Attributes:
+        fixed: joints that must not change [J].
+        wished: joints that a request constrains: they stay close to the reference [J].
+        loose: joints without limits [J].
+        touches: overlap allowed to the pairs of `Capsules.pairs` [P], metres.
+        fastest: greatest speeds of the joints [J], rad/s; None for no bound.
+        travels: greatest level speed of the root, m/s; infinite for no bound.
+        pushes: greatest acceleration of the root in stance, m/s^2; infinite for no bound.
+    """
+
+    fixed: Bools
+    wished: Bools
+    loose: Bools
+    touches: Floats
+    fastest: Floats | None
+    travels: float
+    pushes: float
+
+    def scaled(self, by: float) -> Bounds:
+        """Return the bounds of a body of another size."""
+        return self._replace(touches=by * self.touches, travels=by * self.travels, pushes=by * self.pushes)
+
+
+class Synthesis(NamedTuple):
+    """A synthesised movement.
+
+    Attributes:
+        rotations: local rotations [N, J, 4].
+        root: positions of the root [N, 3], metres.
+        freedom: the degrees of freedom of the solve.
+        x: their unknowns [N, n].
+        falls: how far the body would fall without each foot [N, feet], from 0 to 1.
+        gave: largest residual of each term.
+    """
+
+    rotations: Floats
+    root: Floats
+    freedom: Freedom
+    x: Floats
+    falls: Floats
+    gave: tuple[Gave, ...]
+
+    def at(self, times: Floats, then: Floats) -> Synthesis:
+        """Return the start of a solve on a slower clock: this movement at other times [M] of its own [N], seconds."""
+        falls = np.zeros((len(then), self.falls.shape[1]))
+        for foot, own in enumerate(self.falls.T):
+            falls[:, foot] = np.interp(then, times, own)
+        return self._replace(x=natural_spline(times, self.x, then), falls=falls)
+
+
+def synthesise(
+    skeleton: Skeleton,
+    reference: Floats,
+    times: Floats,
+    stance: Stance,
+    given: Given,
+    bounds: Bounds,
+    without: Collection[Correction] = (),
+    before: Synthesis | None = None,
+    weights: Weights = WEIGHTS,
+) -> Synthesis:
+    """Return the movement near a reference that its feet carry; given postures are exact.
+
+    Args:
+        skeleton: the body.
+        reference: local rotations of the reference [N, J, 4].
+        times: times of the frames [N], seconds, evenly spaced.
+        stance: stances and travel of the corpus's bodies along it.
+        given: its ends, and the heights of the given postures.
+        bounds: its bounds.
+        without: terms to leave out (`motionmind.footing.corrections`).
+        before: movement to start from (`Synthesis.at`); None for the reference.
+        weights: standard deviations of the terms.
+    """
+    size = size_of(skeleton)
+    by, person = 1.0 / size, _as_large_as_a_person(skeleton)
+    lengths = stance.scaled(by), given.scaled(by), bounds.scaled(by)
+    scene = _Scene(person, reference, times, *lengths, GRAVITY / size, without, weights, before)
+    x = scene.solve()
+    state = scene.problem(slice(0, len(times))).state(x)
+    root = size * state.root
+    root[0], root[-1] = given.ends
+    gave = tuple(
+        Gave(term, size * most if unit in LENGTHS else most, unit, float(times[frame]))
+        for term, (most, unit, frame) in scene.gave.items()
+    )
+    return Synthesis(rot.normalise(state.rotations), root, scene.freedom, x, scene.falls(), gave)
+
+
+class _Scene:
+    """A movement of N frames to synthesise: what is known of it, its plans and its residuals."""
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        reference: Floats,
+        times: Floats,
+        stance: Stance,
+        given: Given,
+        bounds: Bounds,
+        gravity: float,
+        without: Collection[Correction],
+        weights: Weights,
+        before: Synthesis | None,
+    ) -> None:
+        self.before = before
+        self.skeleton, self.reference, self.given, self.bounds = skeleton, reference, given, bounds
+        self.gravity, self.without, self.weights, self.overhang = gravity, without, weights, stance.overhang
+        self.fps, self.feet = 1.0 / (times[1] - times[0]), find_free_feet(skeleton, bounds.fixed)
+        self.posed = pose(skeleton, reference)
+        self.ground = find_ground(skeleton, self.posed, times, stance, given, self.feet, gravity)
+        self.body = body_of(skeleton)
+        # On another clock a joint that hardly moves may seem still.
+        self.freedom = _freedom(skeleton, bounds.fixed, reference) if before is None else before.freedom
+        self.stops = self.fps * stance.half_steps[2 * np.array(list(given.low))]
+        moving = given.rates[0] is not None, given.rates[1] is not None
+        self.fixed = np.zeros(len(times), dtype=np.bool_)
+        # A posture that falls on a frame but for rounding errors keeps that frame.
+        self.fixed[np.floor(self.stops + 1e-6).astype(int)] = True
+        self.fixed[np.ceil(self.stops - 1e-6).astype(int)] = True
+        self.fixed[[1, -2]] |= moving
+        self.plans: list[Plan] = []
+        self.gave: dict[str, tuple[float, str, int]] = {}
+
+    def problem(self, frames: slice) -> Problem:
+        """Return the problem of a slice of the frames."""
+        reference, root = self.reference[frames], self.ground.root[frames]
+        return Problem(self.body, self.freedom, reference, root, self.fixed[frames].copy())
+
+    def solve(self) -> Floats:
+        """Return the unknowns [N, n], and record the residuals."""
+        count = len(self.reference)
+        x = np.zeros((count, self.freedom.unknowns)) if self.before is None else self.before.x.copy()
+        self.plans = list(self._planned(x))
+        if not self.plans:
+            return x
+        starts = [0, *range(WINDOW - OVERLAP, count - OVERLAP, WINDOW - OVERLAP)]
+        for begin in starts:
+            frames = slice(begin, min(begin + WINDOW, count))
+            problem = self.problem(frames)
+            if begin:
+                problem.fixed[:2] = True
+            terms = self._terms(frames, self.ground.root[frames] + x[frames, :3])
+            which = 0 if self.before is None else 1
+            replan = self._replanner(frames, terms, REPLANS[which])
+            state = solve(problem, terms, x[frames], replan, ITERATIONS[which])
+            x[frames] = state.x
+            for term in terms:
+                last = count if frames.stop == count else frames.stop - OVERLAP  # the next window solves the rest again
+                off, name = term.gives(state)[: last - begin], type(term).__name__
+                worst = int(np.argmax(off))
+                if term.unit and off[worst] > self.gave.get(name, (EDGE,))[0]:
+                    self.gave[name] = float(off[worst]), term.unit, begin + worst
+        return x
+
+    def falls(self) -> Floats:
+        """Return how far the body would fall without each foot, by the last plan of steps [N, feet]."""
+        out = np.zeros((len(self.reference), len(self.feet)))
+        for plan in self.plans:
+            if plan.falls is not None:
+                out[plan.stretch.frames] = plan.falls
+        return out
+
+    def _planned(self, x: Floats) -> Iterator[Plan]:
+        """Plan each stretch between two given postures."""
+        state = self.problem(slice(0, len(x))).state(np.zeros_like(x))
+        mass = state.mass - state.root if self.body.weighs else np.zeros_like(state.root)
+        ground, rates, last = self.ground, self.given.rates, len(self.stops) - 2
+        for number, (begin, end) in enumerate(pairwise(self.stops)):
+            part = slice(int(np.ceil(begin - 1e-6)), int(end + 1e-6) + 1)
+            if part.stop - part.start < 3:
+                continue
+            rate = rates[0] if number == 0 else None, rates[1] if number == last else None
+            stretch = Stretch(
+                part,
+                self.posed.part(part),
+                ground.part(part),
+                (rate[0] is not None, rate[1] is not None),
+                (number > 0 or rate[0] is not None, number < last or rate[1] is not None),
+                (None if rate[0] is None else float(rate[0][1]), None if rate[1] is None else float(rate[1][1])),
+            )
+            falls = None if self.before is None else self.before.falls[part]
+            flies = "flight" not in self.without
+            yield plan_contacts(
+                self.skeleton, stretch, mass[part], self.feet, self.overhang, self.gravity, self.fps, flies, falls
+            )
+
+    def _terms(self, frames: slice, root: Floats) -> list[Term]:
+        """Return the terms of a slice of the frames, with the root near these positions [M, 3]."""
+        w, bounds, fps = self.weights, self.bounds, self.fps
+        flying = np.zeros(len(self.reference), dtype=np.bool_)
+        for plan in self.plans:
+            flying[plan.stretch.frames] |= plan.flying
+        flying = flying[frames]
+        spreads, runs = _spreads(self.skeleton, self.freedom, bounds.wished, fps, w)
+        floor = self.ground.floor[frames]
+        push = w.push_level, w.push_vertical if "bounce" not in self.without else np.inf
+        terms: list[Term] = [
+            Track(np.broadcast_to(spreads, (len(root), len(spreads)))),
+            Run(runs),
+            Ballistic(fps, flying[1:-1], self.gravity, push, w.falls),
+            self._contacts(frames, root),
+            Floor(floor, w.floor, w.sinks),
+        ]
+        if len(self.freedom.joints):
+            terms.append(Limits(self.reference[self.fixed], bounds.loose, w.limits))
+        if self.body.weighs and "balance" not in self.without:
+            away = np.arange(len(self.reference)) / (SWAYS_S * fps)
+            near = 1.0 - _eased(np.stack([away, away[::-1]]))
+            balance = self._touches(frames), floor, self.overhang, w.room, near[:, frames], self.gravity, fps, w.balance
+            terms.append(Balance(*balance))
+        if "limbs" not in self.without and len(capsules_of(self.skeleton).names):
+            usual = np.maximum(bounds.touches, w.touches)
+            terms.append(Collision(usual, w.collision, max(1, round(PASSES_S * fps))))
+        if bounds.fastest is not None:
+            terms.append(Speed(bounds.fastest, fps, w.speed))
+        if np.isfinite(bounds.travels):
+            terms.append(Travel(1, LEVEL, bounds.travels, flying[1:] | flying[:-1], fps, w.travel))
+        if np.isfinite(bounds.pushes):
+            terms.append(Travel(2, np.ones(3), bounds.pushes, flying[1:-1], fps, w.pushes))
+        return terms
+
+    def _replanner(self, frames: slice, terms: list[Term], times: int) -> Callable[[State], bool]:
+        """Return the callback that plans steps again from the current movement, `times` times, and updates terms."""
+        balance = [term for term in terms if isinstance(term, Balance)]
+        steps, left = balance and "steps" not in self.without, times
+
+        def replan(state: State) -> bool:
+            nonlocal left
+            left -= 1
+            if left < 0:
+                return False
+            for plan in self.plans:
+                part = plan.stretch.frames
+                if steps and frames.start <= part.start and part.stop <= frames.stop:
+                    here = slice(part.start - frames.start, part.stop - frames.start)
+                    plan.again(state.root[here], state.mass[here])
+            for at, term in enumerate(terms):
+                if isinstance(term, Contacts):
+                    terms[at] = self._contacts(frames, state.root)
+            for term in balance:
+                term.touches = self._touches(frames)
+            for term in terms:
+                if isinstance(term, Collision):
+                    term.separate(state)
+            return True
+
+        return replan
+
+    def _contacts(self, frames: slice, root: Floats) -> Contacts:
+        """Return the contacts of a slice of the frames, with the root near these positions [M, 3]."""
+        whole = self.ground.root.copy()
+        whole[frames] = root
+        found = [plan.contacts(whole[plan.stretch.frames], "steps" not in self.without) for plan in self.plans]
+        return Contacts.joined(found, [plan.stretch.frames.start for plan in self.plans], len(whole)).part(frames)
+
+    def _touches(self, frames: slice) -> Bools:
+        """Return which points support the body in a slice of the frames [M, P]."""
+        out = np.zeros((len(self.reference), len(self.body.owners)), dtype=np.bool_)
+        for plan in self.plans:
+            out[plan.stretch.frames] = plan.bearing.touching(plan.shape)
+        return out[frames]
+
+
+def _freedom(skeleton: Skeleton, fixed: Bools, reference: Floats) -> Freedom:
+    """Return the degrees of freedom of a solve: legs down to the foot, and other joints with a long reach.
+
+    A joint that must not change has none, nor has a joint outside the legs that the reference does not turn. Knees and
+    elbows are hinges.
+    """
+    moves = rot.angle(reference, reference[:1]).max(axis=0) > STILL_RAD
+    joints, axes, legs, reach = [], [], _in_legs(skeleton), _reach(skeleton)
+    # The first joint of a long limb is a collarbone.
+    chosen = reach > LONG_M
+    chosen[[limb[0] for limb in limbs_of(skeleton) if len(limb) > 3]] = False
+    for joint in range(len(skeleton)):
+        free = legs[joint] <= 1 if joint in legs else chosen[joint]
+        if not free or fixed[joint] or not (moves[joint] or joint in legs):
+            continue
+        is_hinge = legs.get(joint) == 0 or skeleton.names[joint].endswith("elbow")
+        hinge = find_hinge(skeleton, joint) if is_hinge else None
+        own = np.eye(3) if hinge is None else hinge[None]
+        joints += [joint] * len(own)
+        axes.append(own)
+    return Freedom(np.array(joints, dtype=np.int64), np.concatenate([np.zeros((0, 3)), *axes]))
+
+
+def _spreads(
+    skeleton: Skeleton, freedom: Freedom, wished: Bools, fps: float, weights: Weights
+) -> tuple[Floats, Floats]:
+    """Return standard deviations of the unknowns (`Track`) and of their second differences (`Run`) [n]."""
+    legs, limbs = _in_legs(skeleton), {joint for limb in limbs_of(skeleton) for joint in limb}
+    level, vertical, seconds = weights.root_level, weights.root_height, [weights.root_s] * 3
+    spreads = [level, vertical, level]
+    for joint in freedom.joints.tolist():
+        if joint in legs:
+            own, slow = (weights.hip, weights.knee, weights.foot)[min(legs[joint], 1) + 1], weights.legs_s
+        elif joint in limbs:
+            own, slow = weights.arm, weights.arms_s
+        else:
+            own, slow = weights.pelvis if joint == 0 else weights.trunk, weights.trunk_s
+        # Legs may leave constrained states, so that feet can stand.
+        spreads.append(weights.wished if wished[joint] and joint not in legs else own)
+        seconds.append(slow)
+    return np.array(spreads), np.array(spreads) / (np.array(seconds) * fps) ** 2
+
+
+@remembered
+def _as_large_as_a_person(skeleton: Skeleton) -> Skeleton:
+    """Return the body scaled to the size of a person."""
+    size = size_of(skeleton)
+    return replace(skeleton, offsets=skeleton.offsets / size, tips=skeleton.tips / size)
+
+
+@remembered
+def _in_legs(skeleton: Skeleton) -> dict[int, int]:
+    """Return the joints of the legs, each with its place below the knee: 0 for the knee, -1 above it."""
+    legs = find_legs(skeleton)[1]
+    return {joint: max(place - knee, -1) for leg, knee in legs for place, joint in enumerate(leg)}
+
+
+@remembered
+def _reach(skeleton: Skeleton) -> Floats:
+    """Return the distance from each joint to the farthest point that it carries, at rest [J], metres."""
+    above = body_of(skeleton).above
+    far = np.linalg.norm(skeleton.rest - skeleton.rest[: len(skeleton), None], axis=-1)
+    carried = np.concatenate([above, above]).T  # joints, then their tips, as in `rest`
+    return np.asarray(np.where(carried, far, 0.0).max(axis=1))
+
+
+def _eased(share: Floats) -> Floats:
+    """Return the smoothstep of a share, clipped to 0 and 1."""
+    share = np.clip(share, 0.0, 1.0)
+    return np.asarray(share * share * (3.0 - 2.0 * share))
