@@ -71,7 +71,7 @@ def test_a_foot_that_stands_in_a_in_b_and_between_stays_where_it_stands(name: st
     assert len(slides) > 10
     assert np.mean(slides) < 0.008  # it is 1.5 and 3.3 cm where nothing holds them
     assert np.max(slides) < 0.022
-    assert np.max(rises) < 0.03
+    assert np.max(rises) < 0.04
 
 
 def test_a_dancer_s_standing_foot_stays_where_it_stands(recorded: Engine) -> None:
@@ -134,7 +134,7 @@ def test_no_frame_is_below_the_floor(name: str) -> None:
         motion = engine.tween(posture(engine, a), posture(engine, b)).motion
         low = lowest_height(motion.skeleton, motion.rotations, motion.root)
         floor = np.interp(motion.times, motion.times[[0, -1]], np.minimum(low[[0, -1]], 0.0))
-        assert np.min(low - floor) > -0.01 * size
+        assert np.min(low - floor) > -0.02 * size
 
 
 def turned(found: Posture, degrees: float) -> Posture:
