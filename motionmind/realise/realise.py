@@ -109,6 +109,7 @@ class Wishes(NamedTuple):
         arriving: velocity at `b`; None where unknown.
         without: terms of the solve to leave out.
         pace: speed relative to the corpus, where there is no `length`.
+        slows: whether the clock may slow down; else the given moves say how long they take.
         liveliness: 0 for the mean of walks, up to 1 for a passage of the corpus (`motionmind.walks.passages`).
         place: start of that passage in the corpus; None for any.
     """
@@ -124,6 +125,7 @@ class Wishes(NamedTuple):
     arriving: Velocity | None = None
     without: Collection[Correction] = ()
     pace: float = 1.0
+    slows: bool = True
     liveliness: float = 0.5
     place: Place | None = None
 
@@ -162,8 +164,7 @@ def realise(path: Int32s, style: Style, wishes: Wishes) -> Realised:
     lasts, most, caps = wishes.length is not None, None, None
     if style.peaks is not None:
         caps = most = style.peaks(LONGER * float(clock.frames[-1]), pace)
-    slows = style.fastest is not None  # else its moves, which are given, say how long it takes
-    if lasts or not slows:  # fast parts then take time from slow ones, or stay
+    if lasts or not wishes.slows:  # fast parts then take time from slow ones, or stay
         most = None
     if most is not None and caps is not None:
         given = [0, *(2 * move for move in wishes.through), -1]
@@ -190,7 +191,7 @@ def realise(path: Int32s, style: Style, wishes: Wishes) -> Realised:
     for _ in range(SOLVES):
         made = synthesise(a.skeleton, rotations, clock.frames, stance, ends, bounds, wishes.without, before)
         motion = _exact(a, b, made.rotations, made.root, clock)
-        if caps is None or not slows:
+        if caps is None or not wishes.slows:
             break
         slower = slower_steps(motion, caps, wishes.moving, pace * style.slides, lasts)
         if slower.max() < SLIGHTLY:

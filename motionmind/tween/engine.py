@@ -272,6 +272,7 @@ class Engine(LearnedCorpus):
                 formulation.arriving,
                 request.without,
                 request.pace,
+                request.moves is None,
                 0.0 if request.posturewise else request.liveliness,
                 formulation.place,
             ),
