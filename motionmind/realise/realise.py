@@ -8,7 +8,6 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from msgspec import structs
 
 from motionmind._typing import Bools, Floats, Int32s
 from motionmind.body.contact import lowest_height
@@ -21,7 +20,7 @@ from motionmind.corpus.corpus import Corpus, subdivide_times
 from motionmind.footing.corrections import Correction
 from motionmind.footing.ground import Given, Stance, ends_in_air
 from motionmind.geometry import rotations as rot
-from motionmind.geometry.splines import natural_spline, rotation_spline
+from motionmind.geometry.splines import rotation_spline
 from motionmind.grammar.grammar import Grammar
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.bending import allowed_off, bend_to_states
@@ -48,7 +47,7 @@ from motionmind.walks.stops import Stop, stop_at
 DANCED_WITHIN = (
     0.9  # tolerances by which a passage may take a joint off its state; the rest is for the arc between frames
 )
-SOLVES = 2  # the first, and one on a slower clock
+SOLVES = 3  # at most: the first, and others on slower clocks
 SLIGHTLY = 1.03  # times as long as before: a clock that need not be slower stays
 _SAME = 1e-9  # radians: orientations no farther apart are equal but for rounding
 _UNSEEN = 2e-3  # radians: a joint that returns to its start, and goes no farther, does not move
@@ -188,10 +187,10 @@ def realise(path: Int32s, style: Style, wishes: Wishes) -> Realised:
     )
     ends = Given(reference.low, (a.root, b.root), (_rate(wishes.leaving), _rate(wishes.arriving)))
     before: Synthesis | None = None
-    for _ in range(SOLVES):
+    for number in range(SOLVES):
         made = synthesise(a.skeleton, rotations, clock.frames, stance, ends, bounds, wishes.without, before)
         motion = _exact(a, b, made.rotations, made.root, clock)
-        if caps is None or not wishes.slows:
+        if caps is None or not wishes.slows or number == SOLVES - 1:
             break
         slower = slower_steps(motion, caps, wishes.moving, pace * style.slides, lasts)
         if slower.max() < SLIGHTLY:
@@ -205,10 +204,6 @@ def realise(path: Int32s, style: Style, wishes: Wishes) -> Realised:
         rotations[0], rotations[-1] = a.rotations, b.rotations
         before = made.at(was, then)
         stance = stance._replace(half_steps=np.interp(stance.half_steps, was, at))
-    else:  # the last stretch of the clock is slight, and needs no solve
-        motion = _exact(a, b, rotation_spline(was, made.rotations, then), natural_spline(was, made.root, then), clock)
-        gave = tuple(structs.replace(one, at=float(np.interp(one.at, was, at))) for one in made.gave)
-        made = made._replace(gave=gave)
     motion = replace(motion, insertions=(Insertion(clock.moves),))
     return Realised(motion, reference.danced, reference.left_out, made.gave)
 

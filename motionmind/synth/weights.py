@@ -44,7 +44,7 @@ class Weights(NamedTuple):
     push_vertical: float = 6.0
     falls: float = 0.15
     floor: float = 0.001
-    sinks: float = 0.0005
+    sinks: float = 0.0
     limits: float = 0.03
     balance: float = 0.005
     room: float = 0.04
