@@ -48,7 +48,8 @@ DANCED_WITHIN = (
     0.9  # tolerances by which a passage may take a joint off its state; the rest is for the arc between frames
 )
 SOLVES = 3  # at most: the first, and others on slower clocks
-SLIGHTLY = 1.03  # times as long as before: a clock that need not be slower stays
+KEEPS = 0.97  # share of the bounds on speed that the solve keeps to: it gives a little
+SLIGHTLY = 1.02  # times as long as before: a clock that need not be slower stays
 _SAME = 1e-9  # radians: orientations no farther apart are equal but for rounding
 _UNSEEN = 2e-3  # radians: a joint that returns to its start, and goes no farther, does not move
 
@@ -174,8 +175,8 @@ def realise(path: Int32s, style: Style, wishes: Wishes) -> Realised:
     wished[0] |= wishes.wished[joints:].any()  # the root turns the facing
     fastest = None
     if caps is not None:
-        fastest = caps[:joints].copy()
-        fastest[0] = max(caps[0], caps[joints])  # the root tilts at one of these speeds and turns at the other
+        fastest = KEEPS * caps[:joints]
+        fastest[0] = KEEPS * max(caps[0], caps[joints])  # the root tilts at one of these speeds and turns at the other
     bounds = Bounds(
         wishes.fixed[:joints],
         wished,

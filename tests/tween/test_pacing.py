@@ -206,7 +206,7 @@ def test_the_command_line_takes_it(run: Run) -> None:
         run("tween", A, B, "--corpus", "ballet", *asked, "--report", "-").json
         for asked in ((), ("--pace", 2), ("--without", "pace"))
     )
-    assert fast["times"][-1] == pytest.approx(own["times"][-1] / 2.0, rel=0.08)
+    assert fast["times"][-1] == pytest.approx(own["times"][-1] / 2.0, abs=FRAMES)
     assert (fast["asked"]["pace"], fast["moves"]) == (2.0, own["moves"])
     assert old["moves"] < own["moves"]
     assert run("tween", A, B, "--corpus", "ballet", "--pace", 0).code == 2
@@ -271,7 +271,7 @@ def test_no_joint_is_much_faster_than_nearly_all_of_the_corpus(ballet: Engine) -
         a, b = (Posture(corpus.skeleton, corpus.rotations[start + k], corpus.root[start + k]) for k in pair)
         motion = ballet.tween(a, b).motion
         speeds = way_of(motion).parts / np.diff(motion.times)[:, None]
-        assert (speeds / ballet.pace.fastest)[:, : len(corpus.skeleton)].max() < 1.06 * JOINTS_AT
+        assert (speeds / ballet.pace.fastest)[:, : len(corpus.skeleton)].max() < 1.02 * JOINTS_AT
 
 
 def test_who_has_too_much_time_fills_it_as_the_corpus_does(engine: Engine) -> None:
