@@ -173,16 +173,14 @@ def realise(path: Int32s, style: Style, wishes: Wishes) -> Realised:
     travels = np.inf if style.fastest is None or lasts else HEADROOM * pace * float(style.fastest[-1])
     wished = wishes.wished[:joints].copy()
     wished[0] |= wishes.wished[joints:].any()  # the root turns the facing
-    fastest = None
-    if caps is not None:
-        fastest = KEEPS * caps[:joints]
-        fastest[0] = KEEPS * max(caps[0], caps[joints])  # the root tilts at one of these speeds and turns at the other
+    kept = None if caps is None else KEEPS * caps
     bounds = Bounds(
         wishes.fixed[:joints],
         wished,
         style.carriage.loose,
         style.carriage.touches,
-        fastest,
+        None if kept is None else kept[:joints],
+        np.inf if kept is None else float(kept[joints]),
         travels * a.skeleton.height,
         np.inf if most is None else float(most[-1]) * a.skeleton.height,
     )

@@ -291,3 +291,16 @@ def _right_jacobian(turned: Floats, axes: Floats) -> Floats:
     c = np.where(square < SERIES, 1.0 / 6.0 - square / 120.0, (size - np.sin(size)) / size**3)
     across = rot.cross(turned, np.broadcast_to(axes, turned.shape))
     return np.asarray(axes - b * across + c * rot.cross(turned, across))
+
+
+def inverse_right_jacobian(turned: Floats, vectors: Floats) -> Floats:
+    """Return the inverse of the right Jacobian of SO(3) at rotation vectors [..., 3], times vectors [..., 3].
+
+    The left one's is that at -v, and its transpose. J^-1(v) e = e + v x e / 2 + d v x (v x e), d = (1 - (|v| / 2)
+    cot (|v| / 2)) / |v|^2. Source: as of `_right_jacobian`.
+    """
+    square = np.sum(turned * turned, axis=-1)[..., None]
+    half = 0.5 * np.sqrt(np.maximum(square, SERIES))
+    d = np.where(square < SERIES, 1.0 / 12.0 + square / 720.0, (1.0 - half / np.tan(half)) / (4.0 * half**2))
+    across = rot.cross(turned, vectors)
+    return np.asarray(vectors + 0.5 * across + d * rot.cross(turned, across))

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats
+from motionmind.geometry import rotations as rot
 from motionmind.synth.kinematics import Body, Freedom, State
 from motionmind.synth.system import Normal
 from motionmind.synth.terms import OneSided, Term
@@ -70,7 +71,8 @@ def solve(
         for term in terms:
             if isinstance(term, OneSided):
                 term.after(state, step)
-        greatest = float(np.abs(step).max(initial=0.0))
+        # The root counts as a whole: which way the body faces must not matter.
+        greatest = float(max(rot.norm(step[:, :3]).max(), np.abs(step[:, 3:]).max(initial=0.0)))
         share = min(1.0, 2.0 * farthest, STEP / max(greatest, STILL))
         for _ in range(TRIES):
             there = problem.state(state.x + share * step)

@@ -67,7 +67,8 @@ class Bounds(NamedTuple):
         wished: joints that a request constrains: they stay close to the reference [J].
         loose: joints without limits [J].
         touches: overlap allowed to the pairs of `Capsules.pairs` [P], metres.
-        fastest: greatest speeds of the joints [J], rad/s; None for no bound.
+        fastest: greatest speeds of the joints [J], rad/s, of the root how fast it tilts; None for no bound.
+        turns: greatest speed at which it turns about the vertical, rad/s.
         travels: greatest level speed of the root, m/s; infinite for no bound.
         pushes: greatest acceleration of the root in stance, m/s^2; infinite for no bound.
     """
@@ -77,6 +78,7 @@ class Bounds(NamedTuple):
     loose: Bools
     touches: Floats
     fastest: Floats | None
+    turns: float
     travels: float
     pushes: float
 
@@ -264,7 +266,7 @@ class _Scene:
             Run(runs),
             Ballistic(fps, flying[1:-1], self.gravity, push, w.falls),
             self._contacts(frames, root),
-            Floor(floor, w.floor, w.sinks),
+            Floor(floor, w.floor),
         ]
         if len(self.freedom.joints):
             terms.append(Limits(self.reference[self.fixed], bounds.loose, w.limits))
@@ -277,7 +279,7 @@ class _Scene:
             usual = np.maximum(bounds.touches, w.touches)
             terms.append(Collision(usual, w.collision, max(1, round(PASSES_S * fps))))
         if bounds.fastest is not None:
-            terms.append(Speed(bounds.fastest, fps, w.speed))
+            terms.append(Speed(bounds.fastest, bounds.turns, fps, w.speed))
         if np.isfinite(bounds.travels):
             terms.append(Travel(1, LEVEL, bounds.travels, flying[1:] | flying[:-1], fps, w.travel))
         if np.isfinite(bounds.pushes):

@@ -20,7 +20,7 @@ from motionmind.body.tempo import runs_of
 from motionmind.footing.balance import nearest_in_support
 from motionmind.footing.smoothing import sliding_max
 from motionmind.geometry import rotations as rot
-from motionmind.synth.kinematics import Rows, State, rows_at
+from motionmind.synth.kinematics import Rows, State, inverse_right_jacobian, rows_at
 from motionmind.synth.system import Normal
 
 UP = np.array([0.0, 1.0, 0.0])
@@ -59,7 +59,7 @@ class OneSided:
 
     def _activate(self, over: Floats) -> tuple[Indices, ...]:
         """Return the indices of the rows that push; `over` is the excess over the bound, negative within it."""
-        pushes = over > 0.0
+        pushes = over > EDGE
         if self._kept is not None:
             pushes |= self._kept
         self._active = np.nonzero(pushes)
@@ -285,18 +285,16 @@ class Floor(OneSided):
 
     Attributes:
         floor: its height [N], metres.
-        spread: standard deviation of the excess depth, metres.
-        sinks: depth that is allowed, metres.
+        spread: standard deviation of the depth, metres.
     """
 
     unit: ClassVar[str] = "cm"
 
     floor: Floats
     spread: float
-    sinks: float
 
     def _deep(self, state: State) -> Floats:
-        return np.asarray(self.floor[:, None] - self.sinks - state.places[..., 1])
+        return np.asarray(self.floor[:, None] - state.places[..., 1])
 
     def add(self, state: State, normal: Normal) -> None:
         """Add the rows; see `Term.add`."""
@@ -317,7 +315,7 @@ class Floor(OneSided):
 
 
 @dataclass
-class Balance(OneSided):
+class Balance:
     """Keep the zero-moment point and the centre of mass within their allowed distances from the support.
 
     The zero-moment point is where the floor's force acts, c - (h / g) c'' for a centre of mass c at height h. Source:
@@ -347,51 +345,41 @@ class Balance(OneSided):
     spread: float
     reach: float = 0.005
 
-    def _over(self, state: State) -> tuple[Floats, Floats, Floats]:
-        """Return the excess of both points in inner frames [2, N - 2], negative within bounds; their directions away
-        from the support [2, N - 2, 2]; and h / g, frames squared [N - 2]."""
+    def _excess(self, state: State) -> tuple[Floats, Floats]:
+        """Return the excess displacement of both points from the support in inner frames [2, N - 2, 2], metres, and h /
+        g, frames squared [N - 2]."""
         mass, level = state.mass, state.mass[:, [0, 2]]
         lever = np.maximum(mass[1:-1, 1] - self.floor[1:-1], 0.1) / self.gravity * self.fps**2
         pressure = level.copy()
         pressure[1:-1] -= lever[:, None] * np.diff(level, 2, axis=0)
         points = np.ascontiguousarray(state.places[..., [0, 2]])
-        over, away = np.empty((2, len(lever))), np.empty((2, len(lever), 2))
+        excess = np.empty((2, len(lever), 2))
         for which, (point, room) in enumerate(((pressure, self.room), (level, self.overhang))):
             off = point - nearest_in_support(points, self.touches, point)
-            far = np.linalg.norm(off, axis=1)
-            allowed = np.maximum(np.maximum(far[0] * self.near[0], far[-1] * self.near[1]), room)
-            over[which] = np.where(far > EDGE, far - allowed, -1.0)[1:-1]
-            away[which] = (off / np.maximum(far, 1e-9)[:, None])[1:-1]
-        return over, away, lever
+            far = np.linalg.norm(off[[0, -1]], axis=1)
+            excess[which] = _beyond(off, np.maximum(np.maximum(far[0] * self.near[0], far[1] * self.near[1]), room))[1:-1]
+        return excess, lever
 
     def add(self, state: State, normal: Normal) -> None:
         """Add the rows; see `Term.add`."""
-        over, away, lever = self._over(state)
+        excess, lever = self._excess(state)
         shares = np.zeros((2, len(lever), 3))
         shares[0] = np.stack([-lever, 1.0 + 2.0 * lever, -lever], axis=1)
         shares[1, :, 1] = 1.0
-        which, first = self._activate(over)
-        self._ways = np.zeros((len(first), 3, 3))
-        self._ways[:, :, [0, 2]] = shares[which, first][:, :, None] * away[which, first][:, None]
-        beyond = np.maximum(self._left, 0.0)
-        eased = np.sqrt(1.0 + (beyond / self.reach) ** 2)
-        weight = self.spread**-2.0 / eased
+        size = np.linalg.norm(excess, axis=2)
+        eased = np.sqrt(1.0 + (size / self.reach) ** 2)
         normal.cost += float(np.sum(2.0 * (self.reach / self.spread) ** 2 * (eased - 1.0)))
-        for one in range(2):
-            some = which == one
-            normal.add_mass(first[some], self._ways[some], self._left[some], weight[some])
-
-    def after(self, state: State, step: Floats) -> None:
-        """Keep the active rows; see `OneSided.after`."""
-        moved = np.einsum("txi,ti->tx", state.mass_jacobian, step)
-        first = self._active[1]
-        changes = sum(np.sum(self._ways[:, k] * moved[first + k], axis=1) for k in range(3))
-        self._keep((2, len(step) - 2), np.asarray(changes, dtype=np.float64))
+        for which in range(2):
+            (first,) = np.nonzero(size[which] > EDGE)
+            weight = self.spread**-2.0 / eased[which, first]
+            for axis in range(2):
+                ways = shares[which, first][:, :, None] * np.eye(3)[2 * axis]
+                normal.add_mass(first, ways, excess[which, first, axis], weight)
 
     def gives(self, state: State) -> Floats:
         """Return the residual of each frame; see `Term.gives`."""
         out = np.zeros(len(state.x))
-        out[1:-1] = 100.0 * np.maximum(self._over(state)[0][1], 0.0)
+        out[1:-1] = 100.0 * np.linalg.norm(self._excess(state)[0][1], axis=1)
         return out
 
 
@@ -438,11 +426,12 @@ class Limits:
 
 
 @dataclass
-class Speed(OneSided):
-    """Bound the angular speed of the joints.
+class Speed:
+    """Bound the angular speed of the joints; that of the root by how it tilts, and by how it turns about the vertical.
 
     Attributes:
-        most: greatest speeds of the joints [J], rad/s.
+        most: greatest speeds of the joints [J], rad/s; of the root, how fast it tilts.
+        turns: greatest speed at which the root turns about the vertical, rad/s.
         fps: frames a second.
         spread: standard deviation of the excess, rad/s.
     """
@@ -450,50 +439,52 @@ class Speed(OneSided):
     unit: ClassVar[str] = "degrees/s"
 
     most: Floats
+    turns: float
     fps: float
     spread: float
 
-    def _turned(self, state: State) -> tuple[Floats, Floats]:
-        joints = np.unique(state.freedom.joints)
-        turned = np.zeros((len(state.x) - 1, state.rotations.shape[1], 3))
+    def _excess(self, state: State) -> tuple[Floats, Floats]:
+        """Return the turn of joints from frame to frame, radians, and their excess angular velocity [N - 1, J, 3].
+
+        Both are in the joints' frames, those of the root in the world. The excess leads to the nearest velocity that is
+        allowed: along the excess speed alone, rows would overshoot as it turns.
+        """
+        joints, turned = np.unique(state.freedom.joints), np.zeros((len(state.x) - 1, state.rotations.shape[1], 3))
         before, after = state.rotations[:-1, joints], state.rotations[1:, joints]
-        turned[:, joints] = self.fps * rot.log(rot.inv_mul(before, after))
-        return turned, rot.norm(turned)
+        turned[:, joints] = rot.log(rot.inv_mul(before, after))
+        turned[:, 0] = rot.mul_vec(state.rotations[:-1, 0], turned[:, 0])
+        excess = _beyond(self.fps * turned, self.most)
+        root = self.fps * turned[:, 0]
+        excess[:, 0] = _beyond(root * (1.0 - UP), self.most[0]) + _beyond(root * UP, self.turns)
+        return turned, excess
 
     def add(self, state: State, normal: Normal) -> None:
         """Add the rows; see `Term.add`."""
-        turned, speed = self._turned(state)
-        frames, joints = self._activate(np.where(speed > EDGE, speed - self.most, -1.0))
-        ways = self.fps * turned[frames, joints] / speed[frames, joints][:, None]
-        self._ways = ways
-        for joint in np.unique(joints):
-            some, columns = joints == joint, state.freedom.of(joint)[1]
-            jacobian = self._jacobian(state, frames[some], joint, ways[some])
-            normal.add_joint(frames[some], columns, jacobian, self._left[some], self.spread**-2.0)
-        normal.cost += float(np.sum(np.maximum(self._left, 0.0) ** 2)) * self.spread**-2.0
-
-    def after(self, state: State, step: Floats) -> None:
-        """Keep the active rows; see `OneSided.after`."""
-        frames, joints = self._active
-        changes = np.zeros(len(frames))
-        for joint in np.unique(joints):
-            some, columns = joints == joint, state.freedom.of(joint)[1]
-            jacobian = self._jacobian(state, frames[some], joint, self._ways[some])
-            pairs = np.stack([step[frames[some] + a, columns] for a in range(2)], axis=1)
-            changes[some] = np.sum(jacobian * pairs, axis=(1, 2))
-        self._keep((len(step) - 1, state.rotations.shape[1]), changes)
-
-    def _jacobian(self, state: State, frames: Indices, joint: int, ways: Floats) -> Floats:
-        """Return the Jacobian of speeds along directions [R, 3] in a joint's unknowns of two frames [R, 2, d]."""
-        own = state.freedom.of(joint)[0]
-        along = [np.einsum("rdk,rk->rd", state.own_axes[frames + a][:, own], ways) for a in range(2)]
-        return np.stack([-along[0], along[1]], axis=1)
+        turned, excess = self._excess(state)
+        for joint in np.unique(state.freedom.joints):
+            (first,) = np.nonzero(np.any(excess[:, joint] != 0.0, axis=1))
+            own, columns = state.freedom.of(joint)
+            # A turn in the world is one in the joint's frame, seen backwards.
+            axes, turn = (state.own_axes, turned[first, joint]) if joint else (state.axes, -turned[first, joint])
+            for axis in range(3):
+                way = np.broadcast_to(np.eye(3)[axis], turn.shape)
+                ends = -inverse_right_jacobian(turn, way), inverse_right_jacobian(-turn, way)
+                along = [np.einsum("rdk,rk->rd", axes[first + k][:, own], end) for k, end in enumerate(ends)]
+                jacobian = self.fps * np.stack(along, axis=1)
+                normal.add_joint(first, columns, jacobian, excess[first, joint, axis], self.spread**-2.0)
+        normal.cost += float(np.sum(excess**2)) * self.spread**-2.0
 
     def gives(self, state: State) -> Floats:
         """Return the residual of each frame; see `Term.gives`."""
         out = np.zeros(len(state.x))
-        out[1:] = np.degrees(np.maximum(self._turned(state)[1] - self.most, 0.0).max(axis=1))
+        out[1:] = np.degrees(rot.norm(self._excess(state)[1]).max(axis=1))
         return out
+
+
+def _beyond(vectors: Floats, most: Floats | float) -> Floats:
+    """Return the part of vectors [..., 3] beyond a length [...]."""
+    size = np.linalg.norm(vectors, axis=-1)
+    return np.asarray(vectors * np.maximum(1.0 - most / np.maximum(size, EDGE), 0.0)[..., None])
 
 
 @dataclass
@@ -520,11 +511,9 @@ class Travel:
 
     def add(self, state: State, normal: Normal) -> None:
         """Add the rows; see `Term.add`."""
-        moved = self.fps**self.order * np.diff(state.root, self.order, axis=0) * self.axes
-        size = np.linalg.norm(moved, axis=1)
-        (first,) = np.nonzero(~self.free & (size > self.most))
-        # Towards the nearest that is allowed: along the excess alone, rows would overshoot as it turns.
-        excess = moved[first] * (1.0 - self.most / size[first])[:, None]
+        excess = _beyond(self.fps**self.order * np.diff(state.root, self.order, axis=0) * self.axes, self.most)
+        (first,) = np.nonzero(~self.free & np.any(excess != 0.0, axis=1))
+        excess = excess[first]
         shares = self.fps**self.order * np.array([[-1.0, 1.0], [1.0, -2.0, 1.0]][self.order - 1])
         for axis in np.flatnonzero(self.axes):
             shape = len(first), len(shares)

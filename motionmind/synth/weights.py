@@ -15,8 +15,7 @@ class Weights(NamedTuple):
         root_s, trunk_s, arms_s, legs_s: time over which these departures come and go, seconds.
         push_level, push_vertical: acceleration of the centre of mass in stance, m/s^2.
         falls: departure from free fall in flight, m/s^2.
-        floor: depth in the floor beyond `sinks`, metres.
-        sinks: depth in the floor that is allowed, metres.
+        floor: depth in the floor, metres.
         limits: excess over a joint's limits, radians.
         balance: excess distance from the support, metres.
         room: allowed distance of the zero-moment point: half a foot's width, because points lie on its midline.
@@ -44,7 +43,6 @@ class Weights(NamedTuple):
     push_vertical: float = 6.0
     falls: float = 0.15
     floor: float = 0.001
-    sinks: float = 0.0
     limits: float = 0.03
     balance: float = 0.005
     room: float = 0.04

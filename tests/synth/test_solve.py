@@ -217,12 +217,12 @@ FREE: dict[str, Callable[[State], Term]] = {
         np.ones((N - 1, 1, 2)),
         np.full((N - 1, 1), INF),
     ),
-    "floor": lambda _: Floor(np.ones(N), INF, 0.0),
+    "floor": lambda _: Floor(np.ones(N), INF),
     "balance": lambda _: Balance(
         np.tile(np.arange(POINTS) == 4, (N, 1)), np.full(N, -1.0), 0.0, 0.0, np.zeros((2, N)), GRAVITY, FPS, INF
     ),
     "limits": lambda _: Limits(np.tile(rot.IDENTITY, (2, J, 1)), np.zeros(J, np.bool_), INF),
-    "speed": lambda _: Speed(np.full(J, 0.1), FPS, INF),
+    "speed": lambda _: Speed(np.full(J, 0.1), 0.1, FPS, INF),
     "travel": lambda _: Travel(1, np.ones(3), 0.1, np.zeros(N - 1, np.bool_), FPS, INF),
     "travel, accelerated": lambda _: Travel(2, np.ones(3), 0.1, np.zeros(N - 2, np.bool_), FPS, INF),
     "collision": lambda _: Collision(np.zeros(len(capsules_of(HUMAN).pairs())), INF, 4),
@@ -300,7 +300,7 @@ def test_what_is_too_fast_slows_down_by_the_time_it_has() -> None:
     shoulder = HUMAN.index("left_shoulder")
     rotations[:, shoulder] = rot.exp(turn[:, None] * [0.0, 1.0, 0.0])
     problem = problem_of(rotations, np.zeros((N, 3)))
-    speed = Speed(np.full(J, 4.0), FPS, 0.05)
+    speed = Speed(np.full(J, 4.0), 4.0, FPS, 0.05)
     made = solve(problem, [Track(np.full((N, problem.freedom.unknowns), 0.5)), speed], rest(problem))
     assert speed.gives(problem.state(rest(problem))).max() > 500.0
     assert speed.gives(made).max() < 5.0

@@ -80,8 +80,8 @@ SMOOTH: dict[str, Callable[[State], Term]] = {
     "contacts far": lambda state: contacts(state, 0.2, ALIKE),
     "contacts far, height firmer": lambda state: contacts(state, 0.2, ALIKE * [1.0, 0.1, 1.0]),
     "contacts far, free": lambda state: contacts(state, 0.2, LEVEL_FREE),
-    "floor": lambda _: Floor(np.linspace(-0.5, 0.5, N), 0.01, 0.01),
-    "speed": lambda _: Speed(FASTEST, FPS, 0.05),
+    "floor": lambda _: Floor(np.linspace(-0.5, 0.5, N), 0.01),
+    "speed": lambda _: Speed(FASTEST, float(FASTEST[0]), FPS, 0.05),
     "travel": lambda _: Travel(1, LEVEL, 20.0, SOME[1:], FPS, 0.02),
     "travel, accelerated": lambda _: Travel(2, np.ones(3), 900.0, SOME[1:-1], FPS, 0.2),
 }
@@ -290,14 +290,13 @@ def satisfied() -> dict[str, tuple[Term, State]]:
         "ballistic, on the floor": (Ballistic(FPS, np.zeros(N - 2, np.bool_), GRAVITY, (2.0, 2.0), 0.1), state),
         "ballistic, in the air": (Ballistic(FPS, np.ones(N - 2, np.bool_), GRAVITY, (2.0, 2.0), 0.1), fell),
         "contacts": (placed, state),
-        "floor": (Floor(floor - 0.01, 0.003, 0.0), state),
-        "floor, within what may sink": (Floor(floor + 0.002, 0.003, 0.003), state),
+        "floor": (Floor(floor - 0.01, 0.003), state),
         "balance": (Balance(touches, floor, 0.02, 0.04, np.zeros((2, N)), GRAVITY, FPS, 0.005), state),
         "limits": (Limits(posture()[:2], np.zeros(J, np.bool_), 0.03), state),
         "limits, loose": (Limits(posture()[:2], np.ones(J, np.bool_), 0.03), random_state(0, 1.0, N)),
         "limits, given": (Limits(random_state(0, 1.0, N).rotations, np.zeros(J, np.bool_), 0.03), random_state(0, 1.0)),
-        "speed": (Speed(np.full(J, 1.0), FPS, 0.05), state),
-        "speed, any": (Speed(np.full(J, np.inf), FPS, 0.05), random_state(0, 1.0, N)),
+        "speed": (Speed(np.full(J, 1.0), 1.0, FPS, 0.05), state),
+        "speed, any": (Speed(np.full(J, np.inf), np.inf, FPS, 0.05), random_state(0, 1.0, N)),
         "travel": (Travel(1, LEVEL, 1.0, np.zeros(N - 1, np.bool_), FPS, 0.02), fell),
         "travel, free": (Travel(2, np.ones(3), 1.0, np.ones(N - 2, np.bool_), FPS, 0.2), random_state(0, 1.0, N)),
         "collision": (Collision(np.full(PAIRS, 0.03), 0.0025, 2), state),
@@ -318,12 +317,12 @@ def test_terms_say_by_how_much_they_give() -> None:
     state = at_rest(posture(left_elbow=[0.0, 0.5, 0.0]))
     lowest = state.places[..., 1].min()
     falling = np.array([True, False, False, False])
-    assert Floor(np.full(N, lowest + 0.05), 0.01, 0.01).gives(state) == pytest.approx(4.0)
+    assert Floor(np.full(N, lowest + 0.05), 0.01).gives(state) == pytest.approx(5.0)
     np.testing.assert_allclose(
         Ballistic(FPS, falling, GRAVITY, (2.0, 2.0), 0.1).gives(state), GRAVITY * (np.arange(N) == 1)
     )
     turning = State(state.body, state.freedom, state.rotations, state.root, np.arange(N)[:, None] * np.eye(UNKNOWNS)[5])
-    faster = Speed(np.full(J, 10.0), FPS, 0.05).gives(turning)
+    faster = Speed(np.full(J, 10.0), 10.0, FPS, 0.05).gives(turning)
     np.testing.assert_allclose(faster, np.degrees(FPS - 10.0) * (np.arange(N) > 0), rtol=1e-6)
     np.testing.assert_allclose(Track(np.ones((N, UNKNOWNS))).gives(turning), np.degrees(np.arange(N)))
 
@@ -334,16 +333,16 @@ def test_terms_say_by_how_much_they_give() -> None:
 def test_a_row_stays_as_long_as_it_would_push_and_no_longer() -> None:
     """A body under the floor is lifted onto it; a second solve from there keeps the rows that carry it."""
     state = at_rest(posture())
-    term = Floor(np.full(N, state.places[..., 1].min() + 0.05), 0.01, 0.0)
+    term = Floor(np.full(N, state.places[..., 1].min() + 0.05), 0.01)
     fixed = np.arange(N) % (N - 1) == 0
     lifted = linearised(term, state).step(1e-3, fixed)
     term.after(state, lifted)
     there = State(state.body, state.freedom, state.rotations, state.root, 1.01 * lifted)
     assert term.gives(there)[1:-1].max() < 0.1
     assert np.abs(linearised(term, there).gradient[1:-1, 1]).min() > 0.0  # it pulls back down to the floor
-    assert np.abs(linearised(Floor(term.floor, 0.01, 0.0), there).gradient[1:-1, 1]).max() < 1.0
+    assert np.abs(linearised(Floor(term.floor, 0.01), there).gradient[1:-1, 1]).max() < 1.0
     term.after(there, np.tile(np.eye(UNKNOWNS)[1], (N, 1)))  # a metre up
-    assert linearised(term, there).cost == pytest.approx(linearised(Floor(term.floor, 0.01, 0.0), there).cost)
+    assert linearised(term, there).cost == pytest.approx(linearised(Floor(term.floor, 0.01), there).cost)
 
 
 def test_contacts_of_parts_are_those_of_the_whole() -> None:
