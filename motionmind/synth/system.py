@@ -59,15 +59,15 @@ class Normal:
         Args:
             first: first frame of each row [R], each once.
             columns: the unknowns.
-            jacobian: their coefficients [R, frames, unknowns].
-            residual: of the rows [R].
+            jacobian: their coefficients [R, frames, unknowns, C].
+            residual: of the rows, of C components each [R, C].
             weight: of their squares.
         """
         weighted = weight * jacobian
         for a in range(jacobian.shape[1]):
-            self.gradient[first + a, columns] += weighted[:, a] * residual[:, None]
+            self.gradient[first + a, columns] += (weighted[:, a] @ residual[..., None])[..., 0]
             for b in range(a, jacobian.shape[1]):
-                self.block(b - a)[first + a, columns, columns] += weighted[:, a, :, None] * jacobian[:, b, None, :]
+                self.block(b - a)[first + a, columns, columns] += weighted[:, a] @ np.swapaxes(jacobian[:, b], 1, 2)
 
     def expand(self, jacobian: Floats) -> None:
         """Turn rows in the centre of mass into rows in the unknowns, by its Jacobian [N, 3, n]."""

@@ -357,7 +357,9 @@ class Balance:
         for which, (point, room) in enumerate(((pressure, self.room), (level, self.overhang))):
             off = point - nearest_in_support(points, self.touches, point)
             far = np.linalg.norm(off[[0, -1]], axis=1)
-            excess[which] = _beyond(off, np.maximum(np.maximum(far[0] * self.near[0], far[1] * self.near[1]), room))[1:-1]
+            excess[which] = _beyond(off, np.maximum(np.maximum(far[0] * self.near[0], far[1] * self.near[1]), room))[
+                1:-1
+            ]
         return excess, lever
 
     def add(self, state: State, normal: Normal) -> None:
@@ -417,7 +419,7 @@ class Limits:
         for joint in np.unique(joints):
             some, own, columns = joints == joint, *state.freedom.of(joint)
             along = np.einsum("rdk,rk->rd", state.own_axes[frames[some]][:, own], ways[some])
-            normal.add_joint(frames[some], columns, along[:, None], beyond[some], self.spread**-2.0)
+            normal.add_joint(frames[some], columns, along[:, None, :, None], beyond[some, None], self.spread**-2.0)
         normal.cost += float(np.sum(beyond**2)) * self.spread**-2.0
 
     def gives(self, state: State) -> Floats:
@@ -461,17 +463,16 @@ class Speed:
     def add(self, state: State, normal: Normal) -> None:
         """Add the rows; see `Term.add`."""
         turned, excess = self._excess(state)
-        for joint in np.unique(state.freedom.joints):
+        for joint in np.flatnonzero(np.any(excess != 0.0, axis=(0, 2))):
             (first,) = np.nonzero(np.any(excess[:, joint] != 0.0, axis=1))
             own, columns = state.freedom.of(joint)
-            # A turn in the world is one in the joint's frame, seen backwards.
-            axes, turn = (state.own_axes, turned[first, joint]) if joint else (state.axes, -turned[first, joint])
-            for axis in range(3):
-                way = np.broadcast_to(np.eye(3)[axis], turn.shape)
-                ends = -inverse_right_jacobian(turn, way), inverse_right_jacobian(-turn, way)
-                along = [np.einsum("rdk,rk->rd", axes[first + k][:, own], end) for k, end in enumerate(ends)]
-                jacobian = self.fps * np.stack(along, axis=1)
-                normal.add_joint(first, columns, jacobian, excess[first, joint, axis], self.spread**-2.0)
+            axes = (state.own_axes if joint else state.axes)[:, own]
+            before, after = axes[first], axes[first + 1]
+            if joint == 0:  # the others' excess is along their turn, which these leave as it is
+                turn = np.broadcast_to(turned[first, :1], before.shape)
+                before, after = inverse_right_jacobian(turn, before), inverse_right_jacobian(-turn, after)
+            jacobian = self.fps * np.stack([-before, after], axis=1)
+            normal.add_joint(first, columns, jacobian, excess[first, joint], self.spread**-2.0)
         normal.cost += float(np.sum(excess**2)) * self.spread**-2.0
 
     def gives(self, state: State) -> Floats:

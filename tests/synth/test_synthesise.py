@@ -359,7 +359,7 @@ def test_a_solve_goes_on_from_another() -> None:
     np.testing.assert_allclose(same.x, made.x, atol=1e-9)
     np.testing.assert_allclose(same.falls, made.falls)
     again = toy.made(before=same)
-    np.testing.assert_allclose(again.root, made.root, atol=0.05)
+    np.testing.assert_allclose(again.root, made.root, atol=0.01)
     np.testing.assert_allclose(made.at(toy.times, toy.times[:5]).x, made.x[:5], atol=1e-9)
 
 

@@ -82,15 +82,15 @@ def test_what_lies_under_the_diagonal_is_not_read() -> None:
 @pytest.mark.parametrize("frames", [1, 2, 3])
 def test_rows_of_a_joint_are_those_of_a_dense_jacobian(frames: int) -> None:
     rng, normal, columns = np.random.default_rng(frames), Normal(7, 6), slice(2, 5)
-    first, jacobian = np.array([0, 1, 4]), rng.normal(size=(3, frames, 3))
-    residual = rng.normal(size=3)
+    first, jacobian = np.array([0, 1, 4]), rng.normal(size=(3, frames, 3, 2))
+    residual = rng.normal(size=(3, 2))
     normal.add_joint(first, columns, jacobian, residual, 2.5)
-    rows = np.zeros((3, 7, 6))
+    rows = np.zeros((3, 2, 7, 6))
     for r, begin in enumerate(first):
-        rows[r, begin : begin + frames, columns] = jacobian[r]
-    flat = rows.reshape(3, 42)
+        rows[r, :, begin : begin + frames, columns] = np.moveaxis(jacobian[r], 2, 0)
+    flat = rows.reshape(6, 42)
     np.testing.assert_allclose(written_out(normal), 2.5 * flat.T @ flat, atol=1e-12)
-    np.testing.assert_allclose(normal.gradient.ravel(), 2.5 * flat.T @ residual, atol=1e-12)
+    np.testing.assert_allclose(normal.gradient.ravel(), 2.5 * flat.T @ residual.ravel(), atol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(3))
