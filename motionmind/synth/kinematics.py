@@ -18,6 +18,7 @@ from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.body.support import masses_of
 from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
+from motionmind.synth.system import Normal
 
 SERIES = 1e-8  # rad^2: below this, series replace sin and cos
 
@@ -168,9 +169,21 @@ class Rows(NamedTuple):
         _change(*self, *_of_state(state), step, out)
         return out
 
-    def add(self, state: State, blocks: Floats, gradient: Floats, residual: Floats, weight: Floats) -> None:
-        """Add the squared rows to the normal equations (`motionmind.synth.system`), by residual and weight [R]."""
-        _add(*self, *_of_state(state), residual, weight, blocks, gradient)
+    def add(self, state: State, normal: Normal, residual: Floats, weight: Floats) -> None:
+        """Add the squared rows to the normal equations, by residual and weight [R]."""
+        _add(*self, *_of_state(state), residual, weight, normal.blocks, normal.gradient)
+
+    def add_alike(self, state: State, normal: Normal, residual: Floats, spread: float) -> None:
+        """Add the squared rows by residual [R], with one standard deviation."""
+        self.add(state, normal, residual, np.full(len(self.first), spread**-2.0))
+
+    def add_broken(self, state: State, step: Floats, normal: Normal, residual: Floats, spread: float) -> bool:
+        """Add those rows alike whose residual [R] a step [N, 3 + D] makes positive; return whether there are any."""
+        broken = residual + self.changes(state, step) > 0.0
+        first, ways, points, after, shares = self
+        rows = Rows(first[broken], ways[broken], points[broken], after[broken], shares[broken])
+        rows.add_alike(state, normal, residual[broken], spread)
+        return bool(broken.any())
 
 
 def rows_at(first: Indices, ways: Floats, points: Indices) -> Rows:

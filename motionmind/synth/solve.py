@@ -10,8 +10,9 @@ import numpy as np
 from motionmind._typing import Bools, Floats
 from motionmind.geometry import rotations as rot
 from motionmind.synth.kinematics import Body, Freedom, State
+from motionmind.synth.one_sided import OneSided
 from motionmind.synth.system import Normal
-from motionmind.synth.terms import OneSided, Term
+from motionmind.synth.terms import Term
 
 LOOKS = 4  # iterations after which the terms are planned again at the latest
 DAMPING = 0.3  # added to the diagonal, so that unknowns without rows stay
@@ -68,9 +69,10 @@ def solve(
     for number in range(iterations):
         cost = normal.cost
         step = normal.step(DAMPING, problem.fixed)
-        for term in terms:
-            if isinstance(term, OneSided):
-                term.after(state, step)
+        broken = [term.foresee(state, step, normal) for term in terms if isinstance(term, OneSided)]
+        if any(broken):
+            normal.expand(state.mass_jacobian)
+            step = normal.step(DAMPING, problem.fixed)
         # The root counts as a whole: which way the body faces must not matter.
         greatest = float(max(rot.norm(step[:, :3]).max(), np.abs(step[:, 3:]).max(initial=0.0)))
         share = min(1.0, 2.0 * farthest, STEP / max(greatest, STILL))

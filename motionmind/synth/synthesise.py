@@ -29,22 +29,10 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline
 from motionmind.synth.gave import Gave
 from motionmind.synth.kinematics import Freedom, State, body_of
+from motionmind.synth.one_sided import EDGE, Balance, Collision, Floor, Limits, Speed, Travel
 from motionmind.synth.plan import Plan, Stretch, plan_contacts
 from motionmind.synth.solve import Problem, solve
-from motionmind.synth.terms import (
-    EDGE,
-    Balance,
-    Ballistic,
-    Collision,
-    Contacts,
-    Floor,
-    Limits,
-    Run,
-    Speed,
-    Term,
-    Track,
-    Travel,
-)
+from motionmind.synth.terms import Ballistic, Contacts, Run, Term, Track
 from motionmind.synth.weights import WEIGHTS, Weights
 
 STILL_RAD = 2e-3  # a joint outside the legs that the reference turns less has no unknowns

@@ -76,18 +76,20 @@ class Normal:
         for k in range(SPAN):
             count = len(jacobian) - k
             self.block(k)[:count] += across[:count] @ (self.weights[k, :count] @ jacobian[k:])
+        self.weights[:], self.pull[:] = 0.0, 0.0
 
     def step(self, damping: float, fixed: Bools) -> Floats:
         """Return the Gauss-Newton step [N, n], zero in the `fixed` frames [N]."""
         n = self.gradient.shape[1]
         step = -self.gradient
         step[fixed] = 0.0
-        self.blocks[fixed] = 0.0
+        blocks = self.blocks.copy()
+        blocks[fixed] = 0.0
         for k in range(1, SPAN):
-            self.block(k)[:-k][fixed[k:]] = 0.0
+            blocks[:-k, :, k * n : (k + 1) * n][fixed[k:]] = 0.0
         diagonal = np.arange(n)
-        self.blocks[:, diagonal, diagonal] += np.where(fixed[:, None], 1.0, damping)
-        _solve(self.blocks, step)
+        blocks[:, diagonal, diagonal] += np.where(fixed[:, None], 1.0, damping)
+        _solve(blocks, step)
         return step
 
 

@@ -396,7 +396,7 @@ def test_a_body_that_stands_on_a_stage_stays_on_it(walking: Learned) -> None:
     motion, rows, up = walk(), [2, 3, 4, 5, 6, 7, 8], np.array([0.0, 0.3, 0.0])
     a, b = (replace(motion.posture(row), root=motion.root[row] + up) for row in (2, 8))
     found = realised(walking, rows, a, b)
-    np.testing.assert_allclose(lowest_height(human23(), found.rotations, found.root), 0.3, atol=0.025)
+    np.testing.assert_allclose(lowest_height(human23(), found.rotations, found.root), 0.3, atol=0.03)
 
 
 def test_a_body_whose_floor_is_below_zero_stays_on_it(walking: Learned) -> None:

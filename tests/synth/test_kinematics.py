@@ -136,7 +136,7 @@ def test_rows_of_several_points_and_frames_add_what_a_dense_jacobian_does(seed: 
     step = rng.normal(size=state.x.shape)
     np.testing.assert_allclose(rows.changes(state, step), jacobian @ step.ravel(), atol=1e-6)
     normal = Normal(*state.x.shape)
-    rows.add(state, normal.blocks, normal.gradient, residual, weight)
+    rows.add(state, normal, residual, weight)
     np.testing.assert_allclose(normal.gradient.ravel(), jacobian.T @ (weight * residual), atol=1e-6)
     count, n = state.x.shape
     wanted = (jacobian.T @ (weight[:, None] * jacobian)).reshape(count, n, count, n)

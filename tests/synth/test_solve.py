@@ -16,21 +16,10 @@ from motionmind.body.plausibility import GRAVITY
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
 from motionmind.synth.kinematics import Freedom, State, body_of
+from motionmind.synth.one_sided import Balance, Collision, Floor, Limits, Speed, Travel
 from motionmind.synth.solve import LOOKS, Problem, solve
 from motionmind.synth.system import Normal
-from motionmind.synth.terms import (
-    Balance,
-    Ballistic,
-    Collision,
-    Contacts,
-    Floor,
-    Limits,
-    Run,
-    Speed,
-    Term,
-    Track,
-    Travel,
-)
+from motionmind.synth.terms import Ballistic, Contacts, Run, Term, Track
 
 N, J = 11, len(HUMAN)
 POINTS = len(body_of(HUMAN).owners)

@@ -25,9 +25,10 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
 from motionmind.synth import synthesise as module
 from motionmind.synth.kinematics import State
+from motionmind.synth.one_sided import Limits
 from motionmind.synth.solve import Problem, solve
 from motionmind.synth.synthesise import Bounds, Synthesis, synthesise
-from motionmind.synth.terms import Ballistic, Contacts, Limits, Term
+from motionmind.synth.terms import Ballistic, Contacts, Term
 from motionmind.synth.weights import WEIGHTS, Weights
 
 MOVES = 8

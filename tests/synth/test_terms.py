@@ -14,21 +14,11 @@ from motionmind.body.capsules import capsules_of, legs_depth, pair_depths
 from motionmind.body.legs import find_hinge
 from motionmind.body.plausibility import GRAVITY
 from motionmind.geometry import rotations as rot
-from motionmind.synth import terms
+from motionmind.synth import one_sided
 from motionmind.synth.kinematics import Freedom, State, body_of
-from motionmind.synth.terms import (
-    Balance,
-    Ballistic,
-    Collision,
-    Contacts,
-    Floor,
-    Limits,
-    Run,
-    Speed,
-    Term,
-    Track,
-    Travel,
-)
+from motionmind.synth.one_sided import Balance, Collision, Floor, Limits, OneSided, Speed, Travel
+from motionmind.synth.system import Normal
+from motionmind.synth.terms import Ballistic, Contacts, Run, Term, Track
 
 N, J = 6, len(HUMAN)
 LEVEL = np.array([1.0, 0.0, 1.0])
@@ -141,7 +131,7 @@ def untapered(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let capsules be as thick at both ends: where axes are nearest is then where capsules are deepest."""
     own = capsules_of(HUMAN)
     even = own._replace(radii=np.repeat(own.radii[:, :1], 2, axis=1))
-    monkeypatch.setattr(terms, "capsules_of", lambda skeleton: even)
+    monkeypatch.setattr(one_sided, "capsules_of", lambda skeleton: even)
 
 
 def test_the_gradient_of_a_collision_is_exact_but_for_tapering_limbs(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -170,7 +160,7 @@ def test_the_gradient_of_legs_on_a_plane_is_exact_but_for_how_nearest_points_mov
         thick = radii[pairs, 0] + at[0] * (radii[pairs, 1] - radii[pairs, 0])
         return thick.sum(axis=2) - far, apart / far[..., None], at[0]
 
-    monkeypatch.setattr(terms, "pair_depths", held)
+    monkeypatch.setattr(one_sided, "pair_depths", held)
     term = collision()
     assert_gradient(term, state)
     assert np.any(term._planes)
@@ -330,19 +320,53 @@ def test_terms_say_by_how_much_they_give() -> None:
 # --- one-sided terms, and contacts of parts ---------------------------------------------------------------------------
 
 
-def test_a_row_stays_as_long_as_it_would_push_and_no_longer() -> None:
-    """A body under the floor is lifted onto it; a second solve from there keeps the rows that carry it."""
-    state = at_rest(posture())
-    term = Floor(np.full(N, state.places[..., 1].min() + 0.05), 0.01)
-    fixed = np.arange(N) % (N - 1) == 0
-    lifted = linearised(term, state).step(1e-3, fixed)
-    term.after(state, lifted)
-    there = State(state.body, state.freedom, state.rotations, state.root, 1.01 * lifted)
-    assert term.gives(there)[1:-1].max() < 0.1
-    assert np.abs(linearised(term, there).gradient[1:-1, 1]).min() > 0.0  # it pulls back down to the floor
-    assert np.abs(linearised(Floor(term.floor, 0.01), there).gradient[1:-1, 1]).max() < 1.0
-    term.after(there, np.tile(np.eye(UNKNOWNS)[1], (N, 1)))  # a metre up
-    assert linearised(term, there).cost == pytest.approx(linearised(Floor(term.floor, 0.01), there).cost)
+def down(state: State) -> Floats:
+    return np.tile(-0.05 * np.eye(UNKNOWNS)[1], (N, 1))
+
+
+def aside(state: State) -> Floats:
+    """The trunk jerks."""
+    return np.where(state.freedom.joints == HUMAN.index("lumbar"), 0.02, 0.0) @ np.eye(UNKNOWNS)[3:] * np.ones((N, 1))
+
+
+def across(state: State) -> Floats:
+    """The left leg swings into the other."""
+    own, columns = state.freedom.of(HUMAN.index("left_hip"))
+    step = np.zeros((N, UNKNOWNS))
+    step[:, columns] = state.freedom.axes[own] @ [0.0, 0.0, -0.1]
+    return step
+
+
+def at_random(state: State) -> Floats:
+    return np.asarray(0.1 * np.random.default_rng(0).normal(size=(N, UNKNOWNS)))
+
+
+BREAKS: dict[str, Callable[[State], Floats]] = {
+    "floor": down,
+    "balance": aside,
+    "speed": at_random,
+    "travel": at_random,
+    "collision": across,
+}
+
+
+@pytest.mark.parametrize("name", BREAKS)
+def test_a_step_that_would_break_a_bound_is_computed_again(name: str) -> None:
+    term, state = satisfied()[name]
+    if name == "collision":
+        state = at_rest(posture(left_hip=[0.0, 0.0, -0.12]))
+    assert isinstance(term, OneSided)
+    normal, fixed = Normal(N, UNKNOWNS), np.arange(N) % (N - 1) == 0
+    normal.block(0)[:] = np.eye(UNKNOWNS)
+    normal.gradient -= BREAKS[name](state)
+    breaks = normal.step(0.0, fixed)
+    assert not term.foresee(state, 0.0 * breaks, normal)
+    assert term.foresee(state, breaks, normal)
+    normal.expand(state.mass_jacobian)
+    keeps = normal.step(0.0, fixed)
+    costs = [linearised(term, moved(state, step)).cost for step in (breaks, keeps)]
+    assert costs[1] < 0.05 * costs[0]
+    assert np.abs(keeps).max() > 0.1 * np.abs(breaks).max()
 
 
 def test_contacts_of_parts_are_those_of_the_whole() -> None:
