@@ -48,7 +48,7 @@ def grounded(
     stance = Stance(half_steps, clearance, none + 1.0, stands, flies, leaps, np.zeros((2 * moves, 3)), 0.08)
     none_of_joints = np.zeros(len(skeleton), dtype=np.bool_)
     touches = np.zeros(len(capsules_of(skeleton).pairs())) if usual is None else usual
-    bounds = Bounds(fixed, none_of_joints, none_of_joints, touches, fastest, np.inf, travels, pushes)
+    bounds = Bounds(fixed, none_of_joints, none_of_joints, touches, fastest, np.inf, travels, np.inf, pushes)
     made = synthesise(
         skeleton, q, np.arange(len(q)) / fps, stance, Given(low, (root[0], root[-1]), rates), bounds, **options
     )

@@ -182,6 +182,7 @@ def realise(path: Int32s, style: Style, wishes: Wishes) -> Realised:
         None if kept is None else kept[:joints],
         np.inf if kept is None else float(kept[joints]),
         travels * a.skeleton.height,
+        np.inf if kept is None else float(kept[joints + 2]) * a.skeleton.height,
         np.inf if most is None else float(most[-1]) * a.skeleton.height,
     )
     ends = Given(reference.low, (a.root, b.root), (_rate(wishes.leaving), _rate(wishes.arriving)))

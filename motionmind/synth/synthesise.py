@@ -58,6 +58,7 @@ class Bounds(NamedTuple):
         fastest: greatest speeds of the joints [J], rad/s, of the root how fast it tilts; None for no bound.
         turns: greatest speed at which it turns about the vertical, rad/s.
         travels: greatest level speed of the root, m/s; infinite for no bound.
+        rises: greatest speed at which it rises or sinks, m/s; infinite for no bound.
         pushes: greatest acceleration of the root in stance, m/s^2; infinite for no bound.
     """
 
@@ -68,11 +69,13 @@ class Bounds(NamedTuple):
     fastest: Floats | None
     turns: float
     travels: float
+    rises: float
     pushes: float
 
     def scaled(self, by: float) -> Bounds:
         """Return the bounds of a body of another size."""
-        return self._replace(touches=by * self.touches, travels=by * self.travels, pushes=by * self.pushes)
+        travels, rises, pushes = (by * most for most in (self.travels, self.rises, self.pushes))
+        return self._replace(touches=by * self.touches, travels=travels, rises=rises, pushes=pushes)
 
 
 class Synthesis(NamedTuple):
@@ -268,8 +271,9 @@ class _Scene:
             terms.append(Collision(usual, w.collision, max(1, round(PASSES_S * fps))))
         if bounds.fastest is not None:
             terms.append(Speed(bounds.fastest, bounds.turns, fps, w.speed))
-        if np.isfinite(bounds.travels):
-            terms.append(Travel(1, LEVEL, bounds.travels, flying[1:] | flying[:-1], fps, w.travel))
+        for axes, most in ((LEVEL, bounds.travels), (1.0 - LEVEL, bounds.rises)):
+            if np.isfinite(most):
+                terms.append(Travel(1, axes, most, flying[1:] | flying[:-1], fps, w.travel))
         if np.isfinite(bounds.pushes):
             terms.append(Travel(2, np.ones(3), bounds.pushes, flying[1:-1], fps, w.pushes))
         return terms

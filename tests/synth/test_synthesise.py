@@ -78,7 +78,9 @@ class Toy(NamedTuple):
     @property
     def bounds(self) -> Bounds:
         none = np.zeros(len(self.skeleton), dtype=np.bool_)
-        return Bounds(none, none, none, np.zeros(len(capsules_of(self.skeleton).pairs())), None, np.inf, np.inf, np.inf)
+        return Bounds(
+            none, none, none, np.zeros(len(capsules_of(self.skeleton).pairs())), None, np.inf, np.inf, np.inf, np.inf
+        )
 
     def made(
         self, without: Collection[Correction] = (), before: Synthesis | None = None, weights: Weights = WEIGHTS
