@@ -42,7 +42,7 @@ class Weights(NamedTuple):
     push_level: float = 3.0
     push_vertical: float = 6.0
     falls: float = 0.15
-    floor: float = 0.001
+    floor: float = 0.0007
     limits: float = 0.03
     balance: float = 0.005
     room: float = 0.04
