@@ -167,8 +167,11 @@ def test_a_leap_begins_after_the_posture_before_it() -> None:
 
 def test_who_gives_up_flight_gives_up_its_time(ballet: Engine) -> None:
     a = posture(ballet, 0)
-    plain = ballet.tween(a, in_place(leap(ballet, 1), a), without={"flight"}, duration=2.4, fps=FPS).motion
-    assert plain.root[:, 1].min() < 0.62
+    lowest = [
+        ballet.tween(a, in_place(leap(ballet, 1), a), without=names, duration=2.4, fps=FPS).motion.root[:, 1].min()
+        for names in ((), ("flight",))
+    ]
+    assert lowest[1] < lowest[0] - 0.1  # it goes down longer
 
 
 def split(share: Floats) -> Floats:

@@ -22,6 +22,7 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
     const measure = () => does.show({ width: current.clientWidth });
     const observer = new ResizeObserver(measure);
     observer.observe(current);
+    measure(); // a browser that draws nothing, behind another window, does not observe
     // Preact listens passively to wheels, and the page would zoom with them.
     const wheel = (event) => {
       if (!event.ctrlKey && !event.metaKey) return;
