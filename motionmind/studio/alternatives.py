@@ -1,7 +1,7 @@
-"""Alternatives from one posture to another, found while someone waits for them, and what there is to say of each.
+"""Find alternatives from one posture to another while the user waits, and describe each in plain words.
 
-They are said in the words of whoever dances: how sure it is that nothing better is to be found, how usual the movement
-is in the corpus, and for each joint where it was seen.
+A description says how close to optimal the alternative is, how usual its moves are in the corpus, and where the corpus
+shows each joint's movement.
 """
 
 from __future__ import annotations
@@ -25,27 +25,27 @@ from motionmind.tween.headline import beyond, feet_staying, seen_in
 from motionmind.tween.result import Tween
 
 COUNT = 4
-# To prove the last percent of an alternative takes most of its time: four within 6 % of the best, of as many moves as
-# people wait for, take a second or two, and proofs would take six.
+# Proving the last percent takes most of a search's time: four alternatives within 6 % of the best take one or two
+# seconds for a length that people wait for; with proofs they would take six.
 WITHIN = 0.06
-_MOVES = 2000  # of the corpus, at most, beside which a movement is usual or rare
-_TELLING = 10.0  # degrees: a joint that turns elsewhere by less hardly makes another movement
-_NAMED = 2  # joints, at most, in which alternatives differ
-_USUAL, _RARE = 25.0, 5.0  # percentiles of the corpus's own moves, below which movement is less usual, and rare
+_MOVES = 2000  # moves of the corpus, at most, that define usual and rare
+_TELLING = 10.0  # degrees: a smaller difference in a joint is hardly another movement
+_NAMED = 2  # joints, at most, that a description of a difference names
+_USUAL, _RARE = 25.0, 5.0  # percentiles of the corpus's own moves: below them movement is less usual, or rare
 
 How = Literal["seen", "waits", "new", "between"]
 
 
 class Stretch(msgspec.Struct, frozen=True):
-    """A joint's way for some moves.
+    """A joint's movement for some consecutive moves, from one source.
 
     Attributes:
         begins: seconds from the beginning of the movement.
         ends: seconds from the beginning.
-        how: whether the corpus shows the moves, the joint waits, no clip shows them, or the movement does not follow
-            them closely enough to say that it was seen.
-        where: in words, such as "adagio at 0:12"; "" where it was not seen.
-        key: of the movement where it was seen; "" where it was not.
+        how: "seen" if the corpus shows the moves, "waits" if the joint waits, "new" if no clip shows them, "between" if
+            the movement does not follow them closely enough to count as seen.
+        where: the source in words, such as "adagio at 0:12"; "" without a source.
+        key: key of the source movement; "" without a source.
         at: seconds in that movement.
         degrees: angle by which the joint turns.
     """
@@ -63,12 +63,12 @@ class Account(msgspec.Struct, frozen=True):
     """An alternative in words.
 
     Attributes:
-        words: it in a line.
-        differs: by what it differs from the one that was found first; "" for that one.
-        sure: how sure it is that there is nothing better of its kind.
+        words: summary in one line.
+        differs: difference from the first alternative; "" for the first.
+        sure: how close to optimal it is proven to be.
         usual: how usual the movement is.
-        beyond: what a viewer may wince at, a line each.
-        joints: the way of each joint, by its name in words.
+        beyond: flaws that a viewer may notice, a line each.
+        joints: stretches of each joint, by the joint's name in words.
     """
 
     words: str
@@ -80,13 +80,13 @@ class Account(msgspec.Struct, frozen=True):
 
 
 def find(engine: Engine, a: Posture, b: Posture, count: int = COUNT, **options: Any) -> Iterator[Tween]:
-    """Find movements from `a` to `b` that differ, the best first, near enough to the best and soon.
+    """Find distinct movements from `a` to `b`, the best first, each within `WITHIN` of the optimal cost.
 
     Args:
-        engine: what was learned.
-        a: where they start.
-        b: where they end.
-        count: how many to find; there are fewer where nothing else differs by enough.
+        engine: the engine of the corpus.
+        a: start posture.
+        b: end posture.
+        count: how many to find; there are fewer if no other movement differs enough.
         options: further arguments of `Engine.tween`.
 
     Raises:
@@ -99,20 +99,20 @@ def find(engine: Engine, a: Posture, b: Posture, count: int = COUNT, **options: 
             found += 1
             yield tween
             if tween.moves < 2:
-                return  # nothing on the way could differ
+                return  # a single move cannot differ
     except NoPathError:
         if not found:
             raise
 
 
 def account(tween: Tween, corpus: Corpus, own: Floats, first: Motion | None = None) -> Account:
-    """Say what there is to say of an alternative.
+    """Describe an alternative.
 
     Args:
         tween: the alternative.
-        corpus: what it was learned from.
+        corpus: the corpus of its engine.
         own: `usual_likelihoods` of the corpus [101].
-        first: the movement that was found first; None if it is this one.
+        first: the movement that was found first; None if it is this alternative.
     """
     if tween.moves == 0:
         return Account("no movement: both postures are the same", "", "nothing is better", "", [], {})
@@ -124,7 +124,7 @@ def account(tween: Tween, corpus: Corpus, own: Floats, first: Motion | None = No
 
 
 def usual_likelihoods(engine: Engine) -> Floats:
-    """Return how likely the corpus's own moves are: quantiles of the mean over the joints that move, of ln P [101]."""
+    """Return percentiles [101] of the corpus's own moves' likelihood: the mean ln P over the joints that move."""
     moves, graph = engine.corpus.moves, engine.grammar.transitions
     chosen = np.unique(np.linspace(0, len(moves) - 1, _MOVES).astype(int))
     states = np.asarray(engine.states)
@@ -139,13 +139,13 @@ def usual_likelihoods(engine: Engine) -> Floats:
 
 
 def key_of(source: Source, corpus: Corpus) -> str:
-    """Return the key of the movement that a source is in."""
+    """Return the key of a source's movement."""
     origin = f"{source.corpus}: " * (source.corpus != corpus.name)
     return f"{corpus.name}/{origin}{source.clip}{' (mirrored)' * source.mirrored}"
 
 
 def clock(seconds: float) -> str:
-    """Return a time as people read it off a clock: 12.4 is "0:12"."""
+    """Return a time as minutes and seconds: 12.4 is "0:12"."""
     minutes, rest = divmod(int(seconds), 60)
     return f"{minutes}:{rest:02}"
 
@@ -157,7 +157,7 @@ def _clip(source: Source, corpus: Corpus) -> str:
 
 
 def _differs(motion: Motion, first: Motion) -> str:
-    """Say in which joints a movement differs most from the first, by how much, and when."""
+    """Describe in which joints a movement differs most from the first, by how much, and when."""
     as_far = np.rint(np.linspace(0.0, len(first) - 1, len(motion))).astype(np.intp)
     degrees = np.degrees(rot.angle(motion.rotations, first.rotations[as_far]))
     frame = int(degrees.max(axis=1).argmax())
@@ -173,7 +173,7 @@ def _differs(motion: Motion, first: Motion) -> str:
 
 
 def _sure(tween: Tween) -> str:
-    """Say how sure it is that nothing of its kind is better."""
+    """Describe how close to optimal an alternative is proven to be."""
     kind = "so different" if tween.differs else "of its kind"
     if tween.status == "optimal":
         return f"nothing {kind} is better"
@@ -182,7 +182,7 @@ def _sure(tween: Tween) -> str:
 
 
 def _usual(tween: Tween, own: Floats) -> str:
-    """Say how usual the movement is beside the corpus's own moves, and whether all of it was seen."""
+    """Describe how usual the movement is among the corpus's own moves, and whether the corpus shows all of it."""
     moved = (tween.path[1:] != tween.path[:-1]) & (tween.costs.likelihood > 0.0)
     seen = seen_in(tween).replace("every one", "every move").replace("_", " ")
     if not moved.any():
@@ -193,7 +193,7 @@ def _usual(tween: Tween, own: Floats) -> str:
 
 
 def _stretches(tween: Tween, corpus: Corpus) -> dict[str, list[Stretch]]:
-    """Return the way of each joint, moves that follow one another in one clip as one stretch."""
+    """Return the stretches of each joint; moves that are consecutive in one clip make one stretch."""
     bridges = {(bridge.joint, bridge.move) for bridge in tween.bridges}
     waits = {(wait.joint, wait.move) for wait in tween.waits}
     times, degrees = tween.motion.insertions[0].times, tween.costs.degrees
@@ -223,7 +223,7 @@ def _stretches(tween: Tween, corpus: Corpus) -> dict[str, list[Stretch]]:
 
 
 def _goes_on(one: Source, other: Source) -> bool:
-    """Return whether a move was seen in a clip right after another."""
+    """Return whether one source directly follows another in the same clip."""
     same = (one.clip, one.corpus, one.mirrored, one.reversed) == (
         other.clip,
         other.corpus,

@@ -1,4 +1,4 @@
-"""Answers of the API, as types: what the page gets."""
+"""Types of the API's answers to the page."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ class _Answer(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Failure(_Answer):
-    """The reason that something was not done, in one line."""
+    """The reason for a failure, in one line."""
 
     error: Annotated[str, msgspec.Meta(pattern=r"^[^\n]+\Z")]
 
 
 class Nothing(_Answer):
-    """Nothing but that it was done."""
+    """An empty answer: the request succeeded."""
 
 
 class Health(_Answer):
-    """Whether the studio answers."""
+    """Readiness of the studio."""
 
     ready: Literal[True]
 
@@ -57,7 +57,7 @@ class PartView(_Answer):
 
 
 class BlockView(_Answer):
-    """A stretch of the piece; `missing` if there is no such movement any more, as of a corpus that was deleted."""
+    """A stretch of the piece; `missing` if its movement no longer exists, such as after deleting a corpus."""
 
     id: str
     source: str
@@ -99,7 +99,7 @@ class PieceView(_Answer):
 
 
 class Saved(_Answer):
-    """A saved posture, and the movement that it is."""
+    """A saved posture and the key of its movement."""
 
     name: str
     key: str
@@ -122,7 +122,7 @@ class ProjectView(_Answer):
 
 
 class JobView(_Answer, omit_defaults=True):
-    """A job of the workers, and the data of an event `job`."""
+    """A job of the workers; also the data of a `job` event."""
 
     id: str
     kind: str
@@ -135,7 +135,7 @@ class JobView(_Answer, omit_defaults=True):
 
 
 class Begun(_Answer):
-    """The id of a job that has begun."""
+    """The id of a job that was submitted."""
 
     job: str
 
@@ -149,14 +149,14 @@ class Skeleton(_Answer):
 
 
 class InsertionView(_Answer):
-    """A stretch that the engine made."""
+    """A stretch that the engine inserted."""
 
     times: list[float]
     bridged: list[dict[str, int]]
 
 
 class MovementData(_Answer):
-    """A movement as the player reads it: player/README.md."""
+    """A movement in the format of the player (player/README.md)."""
 
     name: str
     first: int
@@ -231,7 +231,7 @@ class Variation(_Answer):
 
 
 class FactsView(_Answer):
-    """An account of a file that was read."""
+    """Facts about an uploaded motion file."""
 
     clips: list[ClipFacts]
     joints: int
@@ -247,7 +247,7 @@ class FactsView(_Answer):
 
 
 class UploadView(_Answer):
-    """A file that somebody brought."""
+    """An uploaded file."""
 
     id: str
     name: str
@@ -260,14 +260,14 @@ class UploadView(_Answer):
 
 
 class KeptView(_Answer):
-    """A movement that the project keeps now."""
+    """A movement that was added to the project."""
 
     key: str
     frames: int = 1
 
 
 class CorpusView(_Answer):
-    """A corpus, or why it cannot be read."""
+    """A corpus, or the error on reading it."""
 
     name: str
     title: str
@@ -278,7 +278,7 @@ class CorpusView(_Answer):
 
 
 class SheetClip(_Answer):
-    """A clip on a corpus's sheet, and the frames that show it."""
+    """A clip on a corpus's sheet, and the frames to show of it."""
 
     key: str
     name: str
@@ -290,7 +290,7 @@ class SheetClip(_Answer):
 
 
 class Sheet(_Answer):
-    """A corpus looked through."""
+    """An overview of a corpus."""
 
     name: str
     title: str
@@ -316,7 +316,7 @@ class TurnView(_Answer):
 
 
 class Posed(_Answer):
-    """A posture in the editor; `turns` or the degrees of the same angles."""
+    """A posture in the editor, with `turns` or, for the same angles, `degrees` alone."""
 
     rotations: list[float]
     root: tuple[float, float, float]
@@ -329,7 +329,7 @@ class Posed(_Answer):
 
 
 class HandleView(_Answer):
-    """A joint or a heel that can be dragged: its name, words, and where it is on a joint, metres."""
+    """A joint or a heel that can be dragged: its name, words for it, and its place in a joint's frame, metres."""
 
     joint: str
     words: str
@@ -338,7 +338,7 @@ class HandleView(_Answer):
 
 
 class Opened(Posed):
-    """A posture, and all that the editor shows of its body."""
+    """A posture, with what the editor shows of its body."""
 
     key: str = ""
     title: str = ""

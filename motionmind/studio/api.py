@@ -22,35 +22,35 @@ from motionmind.studio.thumbnails import HEIGHT, thumbnail
 
 T = TypeVar("T")
 Window = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_-]{1,40}\Z")]
-_GONE = 10.0  # seconds after which a window that has closed does not come back: a reload takes less
+_GONE = 10.0  # seconds until a closed window counts as gone: a reload takes less
 FOREVER = "private, max-age=31536000, immutable"
 
 
 class Edited(msgspec.Struct, forbid_unknown_fields=True):
-    """An edit, and the window that it is done in."""
+    """An edit and the window that makes it."""
 
     window: Window
     edit: Edit
 
 
 class Windowed(msgspec.Struct, forbid_unknown_fields=True):
-    """The window that takes back, or does again."""
+    """The window that undoes or redoes an edit."""
 
     window: Window
 
 
 def json(value: Any, status: int = 200) -> Response:
-    """Return plain values, in which numpy's numbers may stand, as JSON."""
+    """Return plain values, which may include numpy numbers, as a JSON response."""
     return Response(msgspec.json.encode(value, enc_hook=float), status, media_type="application/json")
 
 
 def error(words: str, status: int = 400) -> Response:
-    """Return an error in one line."""
+    """Return an error response with a one-line message."""
     return json({"error": words}, status)
 
 
 async def body_of(request: Request, schema: type[T]) -> T:
-    """Read the body of a request; MotionMindError if it is not what the schema says."""
+    """Decode the body of a request; raise MotionMindError if it does not match the schema."""
     try:
         return msgspec.json.decode(await request.body(), type=schema)
     except (ValueError, RecursionError) as problem:
@@ -58,14 +58,14 @@ async def body_of(request: Request, schema: type[T]) -> T:
 
 
 def number(text: str | None, words: str) -> int:
-    """Return the whole number that a text is; MotionMindError, with words for it, if it is none."""
+    """Parse a whole number; otherwise raise MotionMindError, which names the value with `words`."""
     if text is None or not (text.isascii() and text.isdigit() and len(text) < 10):
         raise MotionMindError(f"{words} must be a whole number")
     return int(text)
 
 
 def window_of(request: Request) -> str:
-    """Return the window that a request names by `?window=`; MotionMindError if that can be none."""
+    """Return the window that a request names by `?window=`; raise MotionMindError if the name is invalid."""
     try:
         return msgspec.convert(request.query_params.get("window", "-"), Window)
     except msgspec.ValidationError:
@@ -85,7 +85,7 @@ def _project_routes(studio: Studio) -> list[BaseRoute]:
         return json(studio.view(window))
 
     def written(window: str, write: Callable[[], None]) -> Response:
-        """Write, and return what the window sees then."""
+        """Write, then return the window's view of the project."""
         try:
             write()
         except RefusedError as refusal:
@@ -111,7 +111,7 @@ def _project_routes(studio: Studio) -> list[BaseRoute]:
             studio.events.send("project", {"sequence": studio.project.sequence, "left": window})
 
     async def watched(window: str, told: AsyncGenerator[bytes]) -> AsyncIterator[bytes]:
-        """What a window is told; some time after it has closed, others may take back what it did."""
+        """Stream events to a window; some time after it closes, other windows may undo its edits."""
         open_streams[window] += 1
         try:
             async with aclosing(told):
@@ -151,7 +151,7 @@ def _project_routes(studio: Studio) -> list[BaseRoute]:
 
 
 def _movement_routes(studio: Studio) -> list[BaseRoute]:
-    drawing = asyncio.Lock()  # one small picture at a time leaves a processor to the engine
+    drawing = asyncio.Lock()  # draw one picture at a time: it leaves a processor to the engine
 
     async def movement(request: Request) -> Response:
         key = request.path_params["key"]

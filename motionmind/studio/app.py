@@ -1,4 +1,4 @@
-"""The studio's application: the routes of its parts, the page's files, and the guard around them."""
+"""The studio's ASGI application: the routes of its parts and the page's files, behind the guard."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def app(studio: Studio, keys: Keys, host: str, port: int) -> Application:
 
     Args:
         studio: the studio.
-        keys: who is let in.
-        host: the name or address at which it listens.
+        keys: admits requests.
+        host: the name or address that the server listens on.
         port: its port.
     """
 
@@ -47,14 +47,14 @@ def app(studio: Studio, keys: Keys, host: str, port: int) -> Application:
     router = Router(found, redirect_slashes=False, lifespan=lifespan)
 
     async def routed(scope: Message, receive: Receive, send: Send) -> None:
-        scope["app"] = router  # or it would answer by itself, in plain text, what it does not know
+        scope["app"] = router  # otherwise the router answers unknown paths itself, in plain text
         await router(scope, receive, send)
 
     return Guard(routed, host, port, keys)
 
 
 def _open_routes(keys: Keys, port: int) -> list[BaseRoute]:
-    """Return the routes that tell nothing of the project."""
+    """Return the routes that reveal nothing about the project."""
     page = read_page()
     headers = {"content-security-policy": policy(page.script)}
 

@@ -1,4 +1,4 @@
-"""The map of an attractor: points all over it, and trajectories thinned out to what is drawn."""
+"""The map of an attractor: points all over it, and trajectories thinned out for drawing."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from motionmind.chaos.trajectories import trajectory
 from motionmind.studio.varying import EVERY, flow_of
 
 _SHEETS = 12_000  # points that show an attractor
-_MOST_DRAWN = 6_000  # points of a trajectory that a map is sent
-_USUAL = {"lorenz": (0, 2, 1)}  # coordinates to the right, up and towards the viewer, if not in their own order
+_MOST_DRAWN = 6_000  # points of a trajectory, beyond which a map thins it out
+_USUAL = {"lorenz": (0, 2, 1)}  # coordinates to the right, up and towards the viewer, if not (0, 1, 2)
 
 
 def axes_of(flow: Flow) -> tuple[int, int, int]:
-    """Return the coordinates to the right, up and towards the viewer on a map of a flow."""
+    """Return the coordinates that point right, up and towards the viewer on a map of a flow."""
     return _USUAL.get(flow.name, (0, 1, 2))
 
 
 @lru_cache(maxsize=4)
 def map_of(name: str) -> dict[str, Any]:
-    """Return what a map of an attractor shows, whatever the piece: points all over it [M][3], and its axes.
+    """Return the part of a map that does not depend on the piece: points all over the attractor [M][3], and its axes.
 
     Raises:
         MotionMindError: no flow in three dimensions has this name.
@@ -33,7 +33,7 @@ def map_of(name: str) -> dict[str, Any]:
 
 
 def drawn(points: Floats) -> list[list[float]]:
-    """Thin a trajectory out, but for its sites, to what a map is sent [M][3]."""
+    """Thin a trajectory out for a map [M][3], if it is long; its sites stay."""
     every = EVERY if len(points) > _MOST_DRAWN else 1
     thinned: list[list[float]] = points[::every].round(4).tolist()
     return thinned

@@ -1,4 +1,4 @@
-"""The beginning of a project: a variation, with the insertions and decisions at its seams."""
+"""Begin a project from a variation, with the insertions and decisions at its seams."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ def corpus_of(variation: Variation) -> str | None:
 
 
 def take_in(project: Project, variation: Variation, window: str) -> None:
-    """Make a variation the piece of a project: its stretches, what was inserted between them, and the decisions.
+    """Make a variation the piece of a project: its stretches, insertions and decisions.
 
-    Insertions are the variation's own, to the bit, where the project's corpus is the one that judged it; others are
-    found anew. It is one edit, which undo takes back.
+    Insertions are the variation's own, to the bit, if the project's corpus judged them; the project finds others anew.
+    All of it is one edit, which one undo takes back.
 
     Args:
         project: a project without a piece.
         variation: the variation.
-        window: the window of the edit.
+        window: the window that makes the edit.
 
     Raises:
         MotionMindError: it cannot be written.
@@ -45,7 +45,7 @@ def take_in(project: Project, variation: Variation, window: str) -> None:
         Block(f"b{number}", key, int(frames[start]), int(frames[stop - 1]))
         for number, (start, stop) in enumerate(runs, start=1)
     )
-    ends = {stop - 1: number for number, (_, stop) in enumerate(runs)}  # of runs, by their last posture
+    ends = {stop - 1: number for number, (_, stop) in enumerate(runs)}  # number of each run, by its last posture
     met = {(blocks[ends[seam.at]].id, blocks[ends[seam.at] + 1].id): seam for seam in variation.seams}
     words = f"begin with {displayed(variation.piece.motion.name or 'a variation')}"
     decided = [
@@ -58,7 +58,7 @@ def take_in(project: Project, variation: Variation, window: str) -> None:
         if (judged := met.get(seam.pair)) is None or (transition := judged.transition) is None:
             continue
         if transition.corpus == project.state.corpus and not (transition.is_abrupt and not transition.candidates):
-            # The one that was chosen comes first, for it is the one that is inserted.
+            # The chosen candidate comes first, because the project inserts the first.
             first = judged.chosen - 1
             candidates = transition.candidates
             order = [*candidates[first : first + 1], *candidates[:first], *candidates[first + 1 :]]

@@ -1,4 +1,4 @@
-"""From A to B: the gallery of postures, alternatives between two of them, and taking one into the piece."""
+"""From A to B: the gallery of postures, alternatives between two of them, and adding one to the piece."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from motionmind.studio.studio import Studio
     from motionmind.studio.workers import Report
 
-_KEPT = 8  # searches whose movements are held, the latest
+_KEPT = 8  # latest searches whose movements stay available
 _WORDS = "go from A to B"
 
 
@@ -42,7 +42,7 @@ class Place(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Between(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A request for movement between two postures; `options` are a wish as of a seam."""
+    """A request for movement between two postures; `options` are as for a seam."""
 
     a: Place
     b: Place
@@ -50,7 +50,7 @@ class Between(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Acceptance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A request to take one of a job's alternatives, counted from 1, into the piece."""
+    """A request to add one of a job's alternatives, counted from 1, to the piece."""
 
     job: Annotated[str, msgspec.Meta(max_length=40)]
     alternative: Annotated[int, msgspec.Meta(ge=1, le=COUNT)]
@@ -58,14 +58,14 @@ class Acceptance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def search(report: Report, corpus: str, sides: Sides, options: dict[str, Any], stays: Sequence[Pin]) -> None:
-    """Find alternatives in a worker, and tell each as it is found: a motion and its `Account`.
+    """Find alternatives in a worker, and report each as soon as it is found: a motion and its `Account`.
 
     Args:
-        report: tells it.
+        report: called with the progress and each alternative.
         corpus: name of the corpus.
-        sides: from where, and to where.
-        options: of the engine.
-        stays: hands and feet that stay in their places.
+        sides: both postures.
+        options: options of the engine.
+        stays: hands and feet that stay in place.
     """
     engine = engine_of(corpus)
     own = usual_likelihoods(engine)
@@ -80,12 +80,12 @@ def search(report: Report, corpus: str, sides: Sides, options: dict[str, Any], s
 
 
 class _Search:
-    """A search, and what it has found so far.
+    """A search and its alternatives so far.
 
     Attributes:
-        asked: what was asked, with keys that stay.
-        question: what a seam between the two postures asks.
-        found: the movements and what there is to say of them.
+        asked: the request, with stable keys.
+        question: the question that a seam between the two postures would have.
+        found: the movements and their accounts.
     """
 
     def __init__(self, asked: Between, question: str) -> None:
@@ -93,7 +93,7 @@ class _Search:
         self.found: list[tuple[Motion, Account]] = []
 
     def take(self, found: tuple[Motion, Account]) -> dict[str, Any]:
-        """Take in one that was found, and return it as the page sees it."""
+        """Add an alternative, and return it as the page sees it."""
         self.found.append(found)
         motion, said = found
         shown: dict[str, Any] = msgspec.to_builtins(said)
@@ -101,7 +101,7 @@ class _Search:
 
 
 class _Desk:
-    """The requests that are answered, and the searches that may still be accepted."""
+    """Request handlers, and the searches whose alternatives can still be accepted."""
 
     def __init__(self, studio: Studio) -> None:
         self._studio = studio
@@ -127,13 +127,13 @@ class _Desk:
         return {"name": displayed(name), "postures": postures, "clips": clips}
 
     async def ask(self, request: Request) -> Response:
-        """Begin to search."""
+        """Start a search."""
         asked = await body_of(request, Between)
         project, movements = self._studio.project, self._studio.movements
         a, b = (Place(project.state.stable(place.key), place.frame) for place in (asked.a, asked.b))
         ends = End(a.key, a.frame, moves=False), End(b.key, b.frame, moves=False)
         for place in (a, b):
-            movements.get(place.key).posture(place.frame)  # or says that there is none
+            movements.get(place.key).posture(place.frame)  # raises if there is none
         sides = sides_of(ends, movements.get, movements.facing(project.state.corpus))
         options = options_of(asked.options, sides.a.skeleton, movements.get)
         corpus = project.state.corpus
@@ -147,7 +147,7 @@ class _Desk:
         return json({"job": job.id})
 
     async def movement(self, request: Request) -> Response:
-        """Return one of the movements that a search has found, as the player reads it."""
+        """Return one of a search's movements, in the player's format."""
         found = self._found(request.path_params["job"]).found
         number = request.path_params["number"]
         if not 1 <= number <= len(found):
@@ -155,7 +155,7 @@ class _Desk:
         return json(player_data(found[number - 1][0], 0))
 
     async def accept(self, request: Request) -> Response:
-        """Take an alternative into the piece."""
+        """Add an alternative to the piece."""
         asked = await body_of(request, Acceptance)
         seeking, project = self._found(asked.job), self._studio.project
         if asked.alternative > len(seeking.found):
@@ -180,11 +180,11 @@ class _Desk:
 
 
 def accepted(state: State, asked: Between, alternative: int) -> Edit:
-    """Return the edit that takes an alternative into a piece: A unless the piece ends in it, B, and the choice.
+    """Return the edit that adds an alternative to a piece: A (unless the piece ends with it), B, and the choice.
 
     Args:
         state: the piece.
-        asked: both postures and the wish.
+        asked: both postures and the options.
         alternative: number of the alternative, from 1.
     """
     last = state.blocks[-1] if state.blocks else None
@@ -203,12 +203,12 @@ def accepted(state: State, asked: Between, alternative: int) -> Edit:
 
 
 def words_of(said: Account) -> str:
-    """Return an account in a line."""
+    """Return an account in one line."""
     return "; ".join(part for part in (said.words, said.differs, said.usual) if part)
 
 
 def routes(studio: Studio) -> list[BaseRoute]:
-    """Return the routes of this part."""
+    """Return the routes for the gallery and for searches from A to B."""
     desk = _Desk(studio)
     return [
         Route("/api/gallery", desk.gallery),

@@ -1,4 +1,4 @@
-"""Whether an edit that comes in can be, and what a piece lacks: movements that exist and are long enough."""
+"""Checks of incoming edits, and of a piece: do its movements exist, and are they long enough?"""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from motionmind.studio.placement import Marks
 
 
 def check_movements(state: State, edit: Edit, frames: Callable[[str], int]) -> None:
-    """Check that the movements which an edit names exist and are long enough.
+    """Check that the movements in an edit exist and are long enough.
 
     Args:
         state: the state that the edit leads to.
         edit: the edit.
-        frames: returns the number of frames of the movement of a key; MotionMindError if there is none.
+        frames: returns the number of frames of a movement by its key; raises MotionMindError if there is none.
 
     Raises:
-        MotionMindError: one does not.
+        MotionMindError: a movement is missing or too short.
     """
     for one in each(edit):
         match one:
@@ -43,10 +43,10 @@ def check_movements(state: State, edit: Edit, frames: Callable[[str], int]) -> N
 
 
 def check_names(edit: Edit) -> None:
-    """Check that the postures which an edit saves can be asked for by their names.
+    """Check that the postures which an edit saves have names that can stand in a URL.
 
     Raises:
-        MotionMindError: one cannot: a browser takes it out of an address.
+        MotionMindError: a name has a part "." or "..", which browsers remove.
     """
     for one in each(edit):
         if isinstance(one, SavePosture) and one.posture is not None and {".", ".."} & set(one.name.split("/")):
@@ -54,12 +54,12 @@ def check_names(edit: Edit) -> None:
 
 
 def missing_in(state: State, has_corpus: Callable[[str], bool], marks: Marks) -> list[str]:
-    """Say in a line each what a piece needs that is not there: corpora by name, and what others have no more.
+    """Return a line for each thing that a piece needs and lacks: missing corpora, and frames missing in the others.
 
     Args:
         state: the piece.
-        has_corpus: returns whether there is a corpus of a name.
-        marks: of the movements.
+        has_corpus: returns whether a corpus exists.
+        marks: marks of the movements.
     """
     lines: dict[str, None] = {}
     for name in sorted(corpora_of(state)):
@@ -77,6 +77,6 @@ def corpora_of(state: State) -> set[str]:
 
 
 def corpus_of(source: str) -> str:
-    """Return the name of the corpus that a movement is of; "" if it is of none."""
+    """Return the name of a movement's corpus; "" if it has none."""
     name, slash, _ = source.partition("/")
     return name if slash and f"{name}/" != OWN else ""

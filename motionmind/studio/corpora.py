@@ -1,4 +1,4 @@
-"""Corpora seen from the studio: which there are, sheets of their clips, and learning one of what somebody brought."""
+"""Corpora in the studio: their list, sheets of their clips, and learning one from uploaded clips."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from motionmind.display import displayed
 from motionmind.errors import CorpusError, MotionMindError
 from motionmind.studio.reading import Facts, load_clip
 
-Report = Callable[[int, int, str], None]  # called with how much is done, how much there is, and what comes next
+Report = Callable[[int, int, str], None]  # called with steps done, steps in all, and a description of the next
 
-PICTURES = 6  # of a clip on its sheet, at most
+PICTURES = 6  # pictures of a clip on its sheet, at most
 _LINE = 200  # characters of a title
 
 
@@ -33,22 +33,22 @@ class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Mixed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A corpus to mix in, and how much each of its moves counts."""
+    """A corpus to mix in, and the weight of each of its moves."""
 
     name: str
     weight: Annotated[float, msgspec.Meta(ge=1e-6, le=1e6)] = 1.0
 
 
 class Lesson(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A wish for a new corpus.
+    """A request for a new corpus.
 
     Attributes:
         name: its name.
-        title: what it is, in a line.
-        parts: clips that were brought.
+        title: description in one line.
+        parts: uploaded clips.
         mix: corpora to learn from as well.
-        mirror: whether to learn from all clips with left and right exchanged, too.
-        rate: postures a second; None for what suits each clip.
+        mirror: whether to learn from the mirrored clips, too.
+        rate: postures a second; None to choose automatically.
     """
 
     name: Annotated[str, msgspec.Meta(max_length=200)]
@@ -60,11 +60,11 @@ class Lesson(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Recording(NamedTuple):
-    """A clip to learn from, where a child has put it.
+    """A clip to learn from, where a reader process stored it.
 
     Attributes:
-        folder: of the upload.
-        facts: of the upload.
+        folder: folder of the upload.
+        facts: facts about the upload.
         clip: number of the clip.
         skip: frames to leave out at its beginning.
     """
@@ -76,14 +76,14 @@ class Recording(NamedTuple):
 
 
 def known(name: str, home: Path | None) -> str:
-    """Return the name of a corpus that there is; CorpusError if there is none, also for what is a path."""
+    """Return the name of an existing corpus; raise CorpusError if there is none, or if the name is a path."""
     if name not in store.list_corpora(home):
         raise CorpusError(f"no corpus {displayed(name)}")
     return name
 
 
 def list_all(home: Path | None) -> list[dict[str, Any]]:
-    """List all corpora with what their manifests say; one that cannot be read says why."""
+    """List all corpora with facts from their manifests, or with the error on reading them."""
     found = []
     for name, folder in store.list_corpora(home).items():
         entry: dict[str, Any] = {"name": name, "title": "", "own": _is_own(name, folder, home), "error": ""}
@@ -100,7 +100,7 @@ def list_all(home: Path | None) -> list[dict[str, Any]]:
 
 
 def _rate_of(lesson: Lesson, home: Path | None) -> float | Literal["auto"]:
-    """Return the rate to learn at: what is wished, or the lowest of the corpora mixed in, which have no more frames."""
+    """Return the rate to learn at: the requested one, or the lowest of the mixed corpora, which have no more frames."""
     if lesson.rate is not None:
         return lesson.rate
     folders = store.list_corpora(home)
@@ -109,7 +109,7 @@ def _rate_of(lesson: Lesson, home: Path | None) -> float | Literal["auto"]:
 
 
 def _count_clips(manifest: dict[str, Any]) -> int:
-    """Return the number of clips of a built corpus: earlier versions' manifests list them."""
+    """Return the number of clips of a built corpus; manifests of earlier versions list the clips."""
     if "clips" in manifest:
         return len(manifest["clips"])
     with suppress(LookupError, TypeError):
@@ -125,11 +125,11 @@ def _is_own(name: str, folder: Path, home: Path | None) -> bool:
 
 
 def sheet_of(corpus: Corpus) -> dict[str, Any]:
-    """Return a corpus's clips with the frames that show them, and where it comes from."""
+    """Return a corpus's clips with the frames to show of each, and the corpus's origin."""
     clips = []
     for clip in corpus.clips:
         count = len(clip)
-        step = corpus.detail.shape[1] + 1 if count > 1 else 1  # frames of the recording from one posture to the next
+        step = corpus.detail.shape[1] + 1 if count > 1 else 1  # frames from one posture to the next
         postures = np.unique(np.linspace(0, count - 1, min(PICTURES, count)).round().astype(int))
         times = corpus.times[clip.start : clip.stop]
         clips.append(
@@ -149,10 +149,10 @@ def sheet_of(corpus: Corpus) -> dict[str, Any]:
 
 
 def check_lesson(lesson: Lesson, home: Path | None) -> None:
-    """Check, before any work, that a corpus can be learned under this name.
+    """Check a request for a corpus before any work starts.
 
     Raises:
-        CorpusError: the name is invalid or taken, there is nothing to learn from, or no such corpus to mix.
+        CorpusError: the name is invalid or taken, there is nothing to learn from, or a corpus to mix does not exist.
     """
     store.place_for(lesson.name, home)
     if lesson.name in store.list_corpora(home):
@@ -164,19 +164,19 @@ def check_lesson(lesson: Lesson, home: Path | None) -> None:
 
 
 def learn(report: Report, lesson: Lesson, recordings: list[Recording], home: Path | None) -> dict[str, Any]:
-    """Learn a corpus and keep it; the work of a worker process, which may be ended at any moment.
+    """Learn a corpus and store it, in a worker process that may be killed at any moment.
 
     Args:
         report: called with the progress.
-        lesson: the wish.
-        recordings: the clips that were brought.
-        home: the folder of the user's corpora; None for the usual one.
+        lesson: the request.
+        recordings: the uploaded clips.
+        home: the folder of the user's corpora; None for the default folder.
 
     Returns:
-        Its name, how much it holds, and what is doubtful, for the page.
+        The corpus's name and size, and notes on doubtful points, for the page.
 
     Raises:
-        MotionMindError: it cannot be learned from these.
+        MotionMindError: the clips are unsuitable.
     """
     from motionmind.tween.engine import Engine
 

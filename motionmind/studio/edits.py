@@ -1,6 +1,6 @@
-"""The edits of which a project consists: what a choreographer did, each with all that doing it again needs.
+"""The edits of a project: a choreographer's actions, each with all that is needed to repeat it.
 
-An edit is plain data and says nothing of how it is applied (`motionmind.studio.piece`) or kept (the journal).
+An edit is plain data; `motionmind.studio.piece` applies it and `motionmind.studio.journal` stores it.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 
-MOST_BLOCKS = 10_000  # of a piece
-_MOST_TOGETHER = 2_000  # edits that are taken back at once
+MOST_BLOCKS = 10_000  # in a piece
+_MOST_TOGETHER = 2_000  # edits in one `Several`
 
 Id = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.-]{1,40}\Z")]  # of a block
 Key = Annotated[str, msgspec.Meta(min_length=1, max_length=400)]  # of a movement
@@ -20,7 +20,7 @@ Frame = Annotated[int, msgspec.Meta(ge=0, lt=2**31)]
 Decision = Literal["open", "locked", "discarded"]
 Hold = Literal["start", "end", "throughout", "place"]
 Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
-Place = str | tuple[str, str]  # that an edit touches: a block's id, or the ids on both sides of a seam
+Place = str | tuple[str, str]  # touched by an edit: a block's id, or the ids on both sides of a seam
 
 
 class _Struct(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -28,17 +28,17 @@ class _Struct(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class _Edit(msgspec.Struct, frozen=True, tag_field="edit", tag=str.lower, forbid_unknown_fields=True):
-    """An edit; the field `edit` of its JSON says which."""
+    """An edit; the field `edit` of its JSON gives its kind."""
 
 
 class Block(_Struct, frozen=True):
-    """A stretch of a movement, as it stands in a piece.
+    """A stretch of a movement in a piece.
 
     Attributes:
-        id: its name in the project; no other block has it or ever had it.
+        id: its name in the project, which is never reused.
         source: key of the movement.
-        first: frame of the movement that it begins with.
-        last: frame that it ends with, no less than `first`.
+        first: first frame of the movement.
+        last: last frame of the movement, inclusive, no less than `first`.
         mirrored: whether left and right are exchanged.
     """
 
@@ -57,15 +57,15 @@ class Passing(_Struct, frozen=True):
 
 
 class Pin(_Struct, frozen=True):
-    """A hand or a foot that stays on an insertion's way: as its limb is, or in its place in the room.
+    """A hand or a foot that stays during an insertion: in its limb's posture, or in place in the room.
 
     Attributes:
         joint: the joint at the limb's end.
-        hold: "start" if the limb stays as it is at the start until the end comes, "end" if it takes up what it has at
-            the end at once, "throughout" if both ends agree and it stays all the way; "place" if the hand or foot stays
-            where it is in the room, and the limb makes up for that.
-        begins: share of the insertion's time from which it stays in its place.
-        ends: share until which it does, more than `begins`.
+        hold: "start" if the limb keeps its posture of the start until the end, "end" if it takes its posture of the end
+            at once, "throughout" if both ends agree and it keeps its posture; "place" if the hand or foot keeps its
+            place in the room and the limb compensates.
+        begins: share of the insertion's time at which "place" begins.
+        ends: share at which it ends, more than `begins`.
     """
 
     joint: Name
@@ -74,18 +74,18 @@ class Pin(_Struct, frozen=True):
     ends: Share = 1.0
 
     def __post_init__(self) -> None:
-        """Check that it begins before it ends."""
+        """Check that `begins` is less than `ends`."""
         if self.begins >= self.ends:
             raise ValueError("a hand or foot that stays must begin to before it ends to")
 
 
 class Ask(_Struct, frozen=True):
-    """A wish for a seam's insertion.
+    """A request for a seam's insertion.
 
     Attributes:
-        seconds: its length; None leaves that to the corpus.
+        seconds: its duration; None leaves that to the engine.
         passing: postures to pass through, in this order.
-        pins: limbs to keep as they are.
+        pins: hands and feet that stay.
     """
 
     seconds: Annotated[float, msgspec.Meta(gt=0.0, le=600.0)] | None = None
@@ -117,7 +117,7 @@ class Move(_Edit, frozen=True):
 
 
 class Trim(_Edit, frozen=True):
-    """Let a block begin and end with other frames of its movement."""
+    """Change the first and last frames of a block."""
 
     block: Id
     first: Frame
@@ -125,7 +125,7 @@ class Trim(_Edit, frozen=True):
 
 
 class Split(_Edit, frozen=True):
-    """Cut a block in two; the frame `at` begins the second, which gets the new id."""
+    """Cut a block in two; the second begins with the frame `at` and gets the new id."""
 
     block: Id
     at: Frame
@@ -145,7 +145,7 @@ class Delete(_Edit, frozen=True):
 
 
 class Choose(_Edit, frozen=True):
-    """Insert another of the movements that were found for the seam between two neighbours, counted from 1."""
+    """Choose one of the movements, counted from 1, that were found for the seam between two neighbours."""
 
     left: Id
     right: Id
@@ -161,7 +161,7 @@ class Decide(_Edit, frozen=True):
 
 
 class Wish(_Edit, frozen=True, tag="ask"):
-    """Ask for other movement between two neighbours; the fields are those of `Ask`."""
+    """Request other movement between two neighbours; the fields are those of `Ask`."""
 
     left: Id
     right: Id
@@ -171,16 +171,16 @@ class Wish(_Edit, frozen=True, tag="ask"):
 
     @property
     def ask(self) -> Ask:
-        """The wish alone."""
+        """The request without its seam."""
         return Ask(self.seconds, self.passing, self.pins)
 
 
 class Arrange(_Edit, frozen=True):
-    """Give the piece a whole new order.
+    """Replace all blocks of the piece.
 
     Attributes:
-        blocks: all its blocks; one that was in the piece keeps its id if it is the same stretch.
-        about: how the order came about: `words` for people, and what its maker needs to make it again.
+        blocks: all blocks; one that was in the piece keeps its id if it is the same stretch.
+        about: origin of the new order: `words` for people, and data to make it again.
     """
 
     blocks: Annotated[tuple[Block, ...], msgspec.Meta(max_length=MOST_BLOCKS)]
@@ -191,8 +191,8 @@ class SavePosture(_Edit, frozen=True, tag="posture"):
     """Save a posture by name, or forget it.
 
     Attributes:
-        name: its name; the movement `own/NAME` is it.
-        posture: key of the movement, of one frame, that the project keeps of it; None forgets it.
+        name: its name; its movement is `own/NAME`.
+        posture: key of the project's movement, of one frame, that holds it; None forgets it.
     """
 
     name: Name
@@ -200,13 +200,13 @@ class SavePosture(_Edit, frozen=True, tag="posture"):
 
 
 class SetCorpus(_Edit, frozen=True, tag="corpus"):
-    """Judge and smooth the piece beside another corpus."""
+    """Judge and smooth the piece with another corpus."""
 
     name: Name
 
 
 class SetTitle(_Edit, frozen=True, tag="title"):
-    """Call the piece something else."""
+    """Rename the piece."""
 
     title: Annotated[str, msgspec.Meta(max_length=200)]
 
@@ -229,11 +229,11 @@ Single: TypeAlias = (
 
 
 class Several(_Edit, frozen=True):
-    """Do several edits as one, which is taken back as one; either all of them apply or none.
+    """Apply several edits as one, which one undo takes back; either all of them apply or none.
 
     Attributes:
         edits: the edits, in order.
-        words: what they do together, for people; "" for the words of the last of them.
+        words: description of the whole, for people; "" for that of the last edit.
     """
 
     edits: Annotated[tuple[Single, ...], msgspec.Meta(min_length=1, max_length=_MOST_TOGETHER)]
@@ -266,7 +266,7 @@ def each(edit: Edit) -> Iterator[Single]:
 
 
 def words_of(edit: Edit) -> str:
-    """Say what an edit does in a few words, such as "delete a stretch".
+    """Describe an edit in a few words, such as "delete a stretch".
 
     >>> from motionmind.studio.edits import Delete, words_of
     >>> words_of(Delete("b1"))
@@ -286,9 +286,9 @@ def words_of(edit: Edit) -> str:
 
 
 def touched(edit: Edit) -> frozenset[Place]:
-    """Return the blocks and seams that an edit changes; a later edit that changes one of them rests on it.
+    """Return the blocks and seams that an edit changes; a later edit of one of them depends on it.
 
-    Whatever it does not touch stays as it is, though blocks and seams may come to stand elsewhere.
+    All others stay as they are, though blocks and seams may move.
     """
     places: set[Place] = set()
     for one in each(edit):

@@ -1,6 +1,6 @@
-"""Server-sent events: what every open window is told, as it happens.
+"""Server-sent events to every open window.
 
-A window that reads slowly is told the latest of each thing, not all that came before it.
+A window that reads slowly gets only the latest event about each thing.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import msgspec
 
 from motionmind.errors import MotionMindError
 
-_BEAT = 15.0  # seconds after which a stream says that it is there, so that one without a reader is noticed
+_BEAT = 15.0  # seconds between heartbeats of an idle stream, which reveal that its reader has gone
 _MOST = 32  # streams at once
 
 
@@ -25,22 +25,22 @@ class Events:
         self._is_closed = False
 
     def send(self, event: str, data: Any, about: str = "") -> None:
-        """Tell all windows of something.
+        """Send an event to all windows.
 
         Args:
             event: its kind.
             data: plain values for JSON.
-            about: the thing that it is about; what was told of it before, and has not been read, is left out.
+            about: the subject of the event; it replaces an unread event of the same kind and subject.
         """
         text = b"event: %s\ndata: %s\n\n" % (event.encode(), msgspec.json.encode(data, enc_hook=float))
         for stream in self._streams:
             stream.put((event, about), text)
 
     def open(self, first: dict[tuple[str, str], Any]) -> AsyncGenerator[bytes]:
-        """Open a stream, which begins with some events (see `send`), by their kinds and what they are about.
+        """Open a stream that begins with some events (see `send`), by kind and subject.
 
         Raises:
-            MotionMindError: there are too many streams, or the studio ends.
+            MotionMindError: there are too many streams, or the studio is closing.
         """
         if self._is_closed or len(self._streams) >= _MOST:
             raise MotionMindError(f"{_MOST} windows are open, and no more can be")
@@ -67,7 +67,7 @@ class Events:
 
 
 class _Stream:
-    """The events that a window is still to be told."""
+    """Events that a window has yet to read."""
 
     def __init__(self) -> None:
         self._waiting: dict[tuple[str, str], bytes] = {}
@@ -75,7 +75,7 @@ class _Stream:
         self._has_ended = False
 
     def put(self, what: tuple[str, str], text: bytes) -> None:
-        self._waiting.pop(what, None)  # so that it comes after what came before it
+        self._waiting.pop(what, None)  # keeps the events in order
         self._waiting[what] = text
         self._has_news.set()
 
@@ -84,7 +84,7 @@ class _Stream:
         self._has_news.set()
 
     async def take(self) -> bytes | None:
-        """Return what there is to tell, once there is something; None if the stream has ended."""
+        """Wait for events and return them, or a heartbeat; None if the stream has ended."""
         try:
             async with asyncio.timeout(_BEAT):
                 await self._has_news.wait()

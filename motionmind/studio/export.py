@@ -1,4 +1,4 @@
-"""Take it away: the piece as a file for other programs, as a page that plays by itself, and the project."""
+"""Export the piece as a motion file or as a standalone page, and download the project."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from motionmind.studio.view import layout_of
 if TYPE_CHECKING:
     from motionmind.studio.studio import Studio
 
-_UNSAFE = re.compile(r'[\\/:*?"<>|\x00-\x1f\x7f]+')  # in names of files, on some system
+_UNSAFE = re.compile(r'[\\/:*?"<>|\x00-\x1f\x7f]+')  # in file names, on some system
 _LONGEST = 100  # characters of a name
-_RATE = 30.0  # frames a second where a piece's own are not even
+_RATE = 30.0  # frames a second, for a piece whose frames are unevenly spaced
 _TYPES = {
     "html": "text/html; charset=utf-8",
     "glb": "model/gltf-binary",
@@ -42,10 +42,10 @@ _TYPES = {
 
 
 def composed(studio: Studio) -> Motion:
-    """Return the piece as one movement, with what the engine inserted marked.
+    """Return the piece as one movement; `insertions` marks what the engine inserted.
 
     Raises:
-        MotionMindError: there is nothing in it, or a movement is missing.
+        MotionMindError: the piece is empty, or a movement is missing.
     """
     project = studio.project
     if not project.state.blocks:
@@ -57,12 +57,12 @@ def composed(studio: Studio) -> Motion:
 
 
 def credits_of(studio: Studio) -> tuple[Credit, ...]:
-    """Return whose movement the piece is made of; MotionMindError if a movement is missing."""
+    """Return the credits of the movements in the piece; raise MotionMindError if a movement is missing."""
     return composed(studio).credits if studio.project.state.blocks else ()
 
 
 def file_name(title: str, suffix: str) -> str:
-    """Return a name that every system takes for a file.
+    """Return a file name that is valid on every system.
 
     >>> from motionmind.studio.export import file_name
     >>> file_name("Swan: act 2/3", "bvh")
@@ -73,7 +73,7 @@ def file_name(title: str, suffix: str) -> str:
 
 
 def routes(studio: Studio) -> list[BaseRoute]:
-    """Return the routes of this part."""
+    """Return the routes for exports and credits."""
     makers: dict[str, Callable[[Motion], bytes]] = {
         "html": lambda motion: page(motion).encode(),
         "glb": lambda motion: _written(motion, ".glb"),
@@ -99,18 +99,18 @@ def routes(studio: Studio) -> list[BaseRoute]:
 
 
 def _written(motion: Motion, suffix: str) -> bytes:
-    """Return a motion as a file of a format."""
+    """Return a motion file's content."""
     with tempfile.TemporaryDirectory(prefix="motionmind-") as folder:
         path = Path(folder) / f"piece{suffix}"
         if suffix == ".bvh":
-            write_bvh(path, motion, "m")  # as Blender takes it; the panel says so
+            write_bvh(path, motion, "m")  # Blender's unit; the panel says so
         else:
             write_motion(path, motion)
         return path.read_bytes()
 
 
 def _saved(data: bytes, name: str) -> Response:
-    """Return a file that a browser saves under a name."""
+    """Return a response that a browser saves as a file."""
     disposition = f"attachment; filename*=UTF-8''{quote(name, safe='')}"
     media = _TYPES[name.rpartition(".")[2]]
     return Response(data, media_type=media, headers={"Content-Disposition": disposition, "Cache-Control": "no-store"})

@@ -1,7 +1,7 @@
-"""The guard between the network and the studio: who may ask, what for, how much and how long.
+"""The guard between the network and the studio: it checks the origin, authorisation, size and time of each request.
 
-A page elsewhere that a browser shows cannot ask: after DNS rebinding its requests have a Host that is a name; those
-that it sends across have its Origin, lack the header that asks a browser for leave, and carry no cookie.
+A foreign page in the user's browser cannot reach the studio: after DNS rebinding, its requests have a foreign Host; its
+cross-origin requests have its own Origin, lack the header that requires a CORS preflight, and carry no cookie.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ HEADER, VALUE = "x-motionmind", "studio"
 ENTER, UPLOADS = "/api/enter", "/api/imports"
 _METHODS = {"GET", "HEAD", "POST", "DELETE"}
 _READING = {"GET", "HEAD"}
-_MOST, _MOST_UPLOADED = 4 * 2**20, 64 * 2**20  # bytes of a request's body
-_SECONDS, _SECONDS_UPLOADED = 20.0, 120.0  # in which it must have come
+_MOST, _MOST_UPLOADED = 4 * 2**20, 64 * 2**20  # bytes, at most, of a request's body
+_SECONDS, _SECONDS_UPLOADED = 20.0, 120.0  # time limits to receive it
 _ALWAYS = {
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
@@ -41,7 +41,7 @@ _ALWAYS = {
 
 
 def policy(*scripts: str) -> str:
-    """Return the Content-Security-Policy of a page whose inline scripts have these hashes, and which runs no others."""
+    """Return the Content-Security-Policy of a page that runs only inline scripts with these hashes."""
     inline = "".join(f" '{script}'" for script in scripts)
     return (
         f"default-src 'none'; script-src 'self'{inline}; style-src 'self'; img-src 'self' blob: data:; "
@@ -51,11 +51,11 @@ def policy(*scripts: str) -> str:
 
 
 class TooLargeError(Exception):
-    """The body of a request is larger than it may be."""
+    """The body of a request exceeds the limit."""
 
 
 class Guard:
-    """An ASGI application around another."""
+    """An ASGI application that guards another."""
 
     def __init__(
         self, application: Application, host: str, port: int, keys: Keys, *, seconds: float = _SECONDS
@@ -64,15 +64,15 @@ class Guard:
 
         Args:
             application: the application.
-            host: the name or address at which it listens.
+            host: the name or address that the server listens on.
             port: its port.
-            keys: who is let in.
-            seconds: in which the body of a request must have come.
+            keys: admits requests.
+            seconds: time limit to receive the body of a request.
         """
         self._application, self._port, self._keys, self._seconds = application, port, keys, seconds
         names = {"127.0.0.1", "::1", "localhost", host.lower().strip("[]")}
         self._names = names
-        # Listening at all addresses of this computer, it is asked for by any of them.
+        # A server that listens on all addresses is reached by any of them.
         self._any_address = host in ("0.0.0.0", "::", "")
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
@@ -92,7 +92,7 @@ class Guard:
             await send(message)
 
         async def refuse(status: int, words: str) -> None:
-            if not has_begun:  # otherwise the connection ends amid the answer, and the other side knows
+            if not has_begun:  # otherwise the connection breaks off, which the client notices
                 await _answer(sent, status, words)
 
         if fault := self._fault(scope):
@@ -115,14 +115,14 @@ class Guard:
             await refuse(500, "this cannot be answered; the terminal says why")
 
     def _fault(self, scope: Message) -> tuple[int, str] | None:
-        """Return the status and words for a request that is not to be answered; None for others."""
+        """Return the status and message for a request to refuse; None to accept it."""
         headers: dict[str, list[str]] = {}
         for name, value in scope["headers"]:
             headers.setdefault(name.decode("latin-1").lower(), []).append(value.decode("latin-1"))
         return self._foreign(headers, scope["method"]) or self._unwelcome(headers, scope["path"])
 
     def _foreign(self, headers: Mapping[str, list[str]], method: str) -> tuple[int, str] | None:
-        """Return the fault of a request that another page may have sent."""
+        """Return the fault of a request that may come from another page."""
         hosts, origins = headers.get("host", []), headers.get("origin", [])
         if len(hosts) != 1 or not self._is_own(hosts[0]):
             return 403, "the studio is not at this host"
@@ -136,7 +136,7 @@ class Guard:
         return None
 
     def _unwelcome(self, headers: Mapping[str, list[str]], path: str) -> tuple[int, str] | None:
-        """Return the fault of a request that is too large, or of somebody who has not been let in."""
+        """Return the fault of a request that is too large or not authorised."""
         length = headers.get("content-length", ["0"])[0]
         most = _MOST_UPLOADED if path == UPLOADS else _MOST
         if not length.isascii() or not length.isdigit() or len(length) > 15 or int(length) > most:
@@ -147,7 +147,7 @@ class Guard:
         return None
 
     def _is_own(self, host: str) -> bool:
-        """Whether a request's Host is this server."""
+        """Return whether a Host header names this server."""
         try:
             parts = urlsplit(f"//{host}")
             name, port = parts.hostname or "", parts.port or 80
@@ -162,13 +162,13 @@ class Guard:
 
 
 def _limited(receive: Receive, most: int, seconds: float) -> Receive:
-    """Return `receive`, which raises an error where a body is too large or has not come whole in time."""
+    """Wrap `receive` to raise TooLargeError for a large body, and TimeoutError for one that is incomplete in time."""
     until = asyncio.get_running_loop().time() + seconds
     is_whole, size = False, 0
 
     async def limited() -> Message:
         nonlocal is_whole, size
-        if is_whole:  # what follows is that the other side has gone
+        if is_whole:  # the next message tells of a disconnect
             return await receive()
         async with asyncio.timeout_at(until):
             message = await receive()

@@ -1,4 +1,4 @@
-"""A body's handles, its joints' angles in words, and turning one of them."""
+"""A body's handles, the named angles of its joints, and setting one of them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from motionmind.errors import MotionMindError, suggestion
 from motionmind.geometry import rotations as rot
 from motionmind.studio.joint_angles import JointAngles
 
-# The joints that people drag, by what they call them.
+# Joints to drag, with everyday words for them.
 _HANDLES = {
     "pelvis": "pelvis",
     "thorax": "chest",
@@ -42,7 +42,7 @@ _LABELS = {
     "radial": "to the thumb / little finger",
     "spread": "spread",
 }
-_FREELY = ("bend", "turn", "lean")  # about x, y and z, of a joint whose angles have no names
+_FREELY = ("bend", "turn", "lean")  # rotations about x, y and z, for a joint without named angles
 _WORDS = {"lumbar": "lower back", "thorax": "upper back", "cervical": "neck", "atlantal": "head"}
 
 
@@ -52,8 +52,8 @@ class Handle(NamedTuple):
     Attributes:
         joint: its name, as `motionmind.studio.reach.drag` takes it.
         words: words for it.
-        on: the joint that it is fixed to; itself, unless it is a heel.
-        at: its place in that joint's frame, metres.
+        on: the joint that carries it; itself, unless it is a heel.
+        at: its position in that joint's frame, metres.
     """
 
     joint: str
@@ -92,7 +92,7 @@ def words_of(joint: str) -> str:
 
 
 def handles_of(skeleton: Skeleton) -> list[Handle]:
-    """Return a body's handles: a person's by name, with heels; of others the root, limbs' ends and their middles."""
+    """Return handles: a person's joints by name, with heels; else the root, limbs' ends and those ends' parents."""
     if anatomy_of(skeleton) is not None:
         out = []
         for name in skeleton.names:
@@ -111,7 +111,7 @@ def handles_of(skeleton: Skeleton) -> list[Handle]:
 
 
 def turns_of(posture: Posture) -> list[Turn]:
-    """Return all angles of a posture's joints that can be turned."""
+    """Return all adjustable joint angles of a posture."""
     skeleton, out = posture.skeleton, []
     anatomy = anatomy_of(skeleton)
     if anatomy is None:
@@ -159,7 +159,7 @@ def turned(posture: Posture, joint: str, angle: str, degrees: float) -> Posture:
 
 
 def mirror(posture: Posture) -> Posture:
-    """Return the posture with left and right exchanged, about where it is, on the same body.
+    """Return the posture mirrored in place, on the same body.
 
     Raises:
         SkeletonError: the body is not symmetric.

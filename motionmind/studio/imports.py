@@ -1,4 +1,4 @@
-"""One's own movement for the page: files that somebody brings, and the corpora that are learned of them."""
+"""Routes for the user's own movement: uploaded files, and corpora learned from them."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 
 def routes(studio: Studio) -> list[BaseRoute]:
-    """Return what the page asks of files and corpora."""
+    """Return the routes for uploads and corpora."""
     uploads = Uploads()
     return [*_upload_routes(studio, uploads), *_corpus_routes(studio, uploads)]
 
 
 def view(upload: Upload) -> dict[str, Any]:
-    """Return an upload as the page sees it: without its body's measures."""
+    """Return an upload as the page sees it, without the body's measurements."""
     found: dict[str, Any] = msgspec.to_builtins(upload)
     if upload.facts is not None:
         found["facts"].pop("body")
@@ -93,7 +93,7 @@ def _corpus_routes(studio: Studio, uploads: Uploads) -> list[BaseRoute]:
         return api.json({"job": job.id})
 
     def learned(result: dict[str, Any]) -> dict[str, Any]:
-        """Show the page all of a result; a corpus that was missing is there again."""
+        """Return the result unchanged, after dropping cached data of the corpus, which may have been missing."""
         studio.forget(result["name"])
         return result
 

@@ -1,8 +1,8 @@
-"""The angles by which a posture is changed: a body's own, with its anatomy's limits, or turns from where joints were.
+"""Joint angles for editing a posture: anatomical angles within limits, or free rotations from the given posture.
 
-A body with an anatomy has the angles that people describe it by (`motionmind.body.anatomy`): a knee bends and does
-nothing else, so it keeps its side. Limits are widened to the posture that is changed, for dancers go further than
-tables say. The joints of any other body turn freely about three axes.
+A body with an anatomy has anatomical angles (`motionmind.body.anatomy`): a knee only bends, so it never turns aside.
+Limits are widened to the edited posture, because dancers exceed the tables. The joints of any other body turn freely
+about three axes.
 """
 
 from __future__ import annotations
@@ -16,29 +16,29 @@ from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 
-_STEP = 1e-6  # radians by which angles are changed to see where they lead
-_HALF = np.pi - 1e-6  # radians of a swing, which is no more than half round
-_ROUND = 2.0 * np.pi - 1e-9  # radians of a range that is no limit, for it leads all the way round
+_STEP = 1e-6  # radians of the finite differences
+_HALF = np.pi - 1e-6  # radians of a swing, at most: half a turn
+_ROUND = 2.0 * np.pi - 1e-9  # radians of a range that is a full turn, thus no limit
 
 
 class JointAngles:
-    """The angles of a body's joints, radians, and how far they go around one posture.
+    """The angles of a body's joints, radians, and their limits around given postures.
 
     Attributes:
         skeleton: the body.
         free: which angles can change [J, 3].
         least, most: their limits [J, 3].
-        swings: which of them are a swing's, not a twist [J, 3].
+        swings: which angles belong to the swing, not the twist [J, 3].
         frames: the joint in whose frame each joint's angles are measured [J]; -1 for the world.
     """
 
     def __init__(self, skeleton: Skeleton, given: Floats) -> None:
-        """Find the angles around postures.
+        """Set up the angles around postures.
 
         Args:
             skeleton: the body.
-            given: local rotations of postures that are within the limits whatever they are [G, J, 4]; joints without
-                an anatomy turn from where they are in the first.
+            given: local rotations [G, J, 4] of postures, to which the limits are widened; joints without an anatomy
+                turn from their rotations in the first.
         """
         self.skeleton = skeleton
         self._anatomy, self._rest = anatomy_of(skeleton), given[0]
@@ -67,7 +67,7 @@ class JointAngles:
         return np.radians(self._anatomy.degrees(rotations))
 
     def within(self, angles: Floats) -> Floats:
-        """Return angles [J, 3] within their limits; swings beyond half round, which are others, stop there."""
+        """Clip angles [J, 3] to their limits, and swings to half a turn, beyond which they mean another rotation."""
         angles = np.clip(angles, self.least, self.most)
         swing = rot.norm(np.where(self.swings, angles, 0.0))[:, None]
         return np.where(self.swings & (swing > _HALF), angles * (_HALF / np.maximum(swing, _HALF)), angles)
@@ -81,9 +81,9 @@ class JointAngles:
         return self._anatomy.rotations(named).reshape(*angles.shape[:-1], 4)
 
     def turns(self, angles: Floats) -> tuple[Floats, Floats]:
-        """Return the global rotations [J, 4] of angles [J, 3], and the axes that each angle turns about [J, 3, 3].
+        """Return the global rotations [J, 4] of angles [J, 3], and the axis of each angle [J, 3, 3].
 
-        An axis is that of the world, times the radians that the joint turns by for a radian of the angle.
+        Axes are in world coordinates; their length is the joint's rotation in radians per radian of the angle.
         """
         steps = np.concatenate([np.zeros((1, 3)), _STEP * np.eye(3)])
         turned = self.skeleton.global_rotations(self.rotations(angles + steps[:, None, :]))
@@ -94,7 +94,7 @@ class JointAngles:
 
     @cached_property
     def carries(self) -> Bools:
-        """Whether a joint's turn turns the frame of another [J, J]: carries[j, i] for i and all that hangs from it."""
+        """Whether joint i's rotation turns joint j [J, J]: `carries[j, i]` for i itself and all that hangs from it."""
         count = len(self.skeleton)
         out = np.eye(count, dtype=np.bool_)
         for joint in range(1, count):

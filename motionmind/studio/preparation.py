@@ -1,4 +1,4 @@
-"""Preparation: how far it is with what makes searches fast the first time, and how long it will take, in words."""
+"""Progress of the preparation that makes the first searches fast, with an estimate of the remaining time."""
 
 from __future__ import annotations
 
@@ -6,26 +6,25 @@ import time
 from collections.abc import Callable, Generator
 from math import ceil
 
-Steps = Generator[tuple[int, int, bool]]  # how far it is, of how much, and whether searches may begin
-Told = Generator[tuple[int, int, str, bool]]  # the same, with what is going on
+Steps = Generator[tuple[int, int, bool]]  # steps done, steps in all, and whether searches may begin
+Told = Generator[tuple[int, int, str, bool]]  # the same, with a description before the last
 
 _FIRST, _REST = "getting ready, once", "getting the rest ready"
-_SOON = 10  # steps before which nobody knows how long it will take: the first functions compile many others
-_LATELY = 15  # steps by which the pace is told
+_SOON = 10  # steps before the first estimate: the first functions compile many others
+_LATELY = 15  # last steps that the pace is measured over
 
 
 def told(steps: Steps, now: Callable[[], float] = time.monotonic) -> Told:
-    """Say of each step what is going on, and how long it will take as fast as it has gone lately.
+    """Describe each step, with the remaining time at the pace of the last few steps.
 
-    How fast that is hangs on what else the computer does, so no usual time is promised. To close the iterator closes
-    `steps`.
+    The pace depends on the load of the computer, so there is no fixed estimate. Closing the iterator closes `steps`.
 
     Args:
-        steps: the steps, whose measure may change when searches may begin.
+        steps: the steps; their counts may start anew once searches may begin.
         now: returns the time in seconds.
     """
     try:
-        gone: list[tuple[float, int]] = []  # when how many were done
+        gone: list[tuple[float, int]] = []  # time, and steps done by then
         was_ready = False
         for done, of, is_ready in steps:
             if is_ready != was_ready:
@@ -41,7 +40,7 @@ def told(steps: Steps, now: Callable[[], float] = time.monotonic) -> Told:
 
 
 def _duration(seconds: float) -> str:
-    """Return a duration as people say it who do not know it exactly."""
+    """Return a rough duration in words."""
     if seconds < 10:
         return "a few seconds"
     if seconds <= 60:

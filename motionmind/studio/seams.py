@@ -1,6 +1,6 @@
-"""The seams of a piece, judged and smoothed in the background: after each edit, the newest seams first.
+"""Judge and smooth the seams of a piece in the background: after each edit, the newest seams first.
 
-What is found is a fact, kept under its question: nothing is asked twice, whatever is taken back and done again.
+The project keeps each finding under the hash of its question, so undo and redo never repeat a search.
 """
 
 from __future__ import annotations
@@ -35,20 +35,20 @@ if TYPE_CHECKING:
     from motionmind.studio.workers import Job, Report
 
 MOST_ALTERNATIVES = 4
-_SETTLE = 0.15  # seconds without another edit before the seams are looked at
+_SETTLE = 0.15  # seconds without another edit before the seams are judged
 _NO_WAY = "no way found that does all that is wished: let go of a posture, a hand or a foot"
-_NAMED = 3  # joints that are named in words
+_NAMED = 3  # joints that a message names, at most
 
 
 class Question(NamedTuple):
-    """A question at a seam, with all that a worker needs for its answer.
+    """A question about a seam, with all that a worker needs to answer it.
 
     Attributes:
         name: its hash (`question_of`).
         sides: the movement on both sides.
-        options: the wish, as options of the engine.
+        options: the user's request, as options of the engine.
         wished: whether movement is to be inserted even where the transition is not abrupt.
-        stays: hands and feet that stay in their places.
+        stays: hands and feet that stay in place.
     """
 
     name: str
@@ -59,10 +59,12 @@ class Question(NamedTuple):
 
 
 def judge(report: Report, corpus: str, questions: Sequence[Question]) -> list[Finding]:
-    """Judge transitions beside a corpus; those that need an insertion are left open (`Finding.insertions` is None).
+    """Judge transitions against a corpus.
+
+    `Finding.insertions` is None for a transition that needs an insertion.
 
     Args:
-        report: is told what goes on.
+        report: called with the progress.
         corpus: name of the corpus.
         questions: the questions.
     """
@@ -89,12 +91,12 @@ def smooth(report: Report, corpus: str, question: Question) -> tuple[list[tuple[
     """Find movement for a seam.
 
     Args:
-        report: is told how many alternatives are found.
+        report: called with the number of alternatives found.
         corpus: name of the corpus.
         question: the question.
 
     Returns:
-        Each alternative with words on it, the best first; and why there is none, "" if there is one.
+        The alternatives with their descriptions, the best first; and the reason if there are none, otherwise "".
     """
     engine = engine_of(corpus)
     a, b, before, after, _ = question.sides
@@ -102,7 +104,7 @@ def smooth(report: Report, corpus: str, question: Question) -> tuple[list[tuple[
     distinct: dict[bytes, tuple[Motion, str]] = {}
     first: Motion | None = None
     report(0, MOST_ALTERNATIVES, "smoothing a seam")
-    warnings.simplefilter("ignore", MotionMindWarning)  # the words say what goes beyond the corpus
+    warnings.simplefilter("ignore", MotionMindWarning)  # the description says what goes beyond the corpus
     try:
         tweens = find(engine, a, b, MOST_ALTERNATIVES, before=before, after=after, **question.options)
         for number, tween in enumerate(tweens, start=1):
@@ -111,7 +113,7 @@ def smooth(report: Report, corpus: str, question: Question) -> tuple[list[tuple[
                 distinct[tween.path.tobytes()] = motion, _words(account(tween, engine.corpus, own, first), missed)
                 first = first or tween.motion
             report(number, MOST_ALTERNATIVES, "smoothing a seam")
-    except MotionMindError as error:  # after the first, nothing else differs enough
+    except MotionMindError as error:  # after the first: no other differs enough
         if not distinct:
             wished = question.options.keys() - {"duration"}
             return [], _NO_WAY if wished else f"no way found: {_line(error)}"
@@ -119,7 +121,7 @@ def smooth(report: Report, corpus: str, question: Question) -> tuple[list[tuple[
 
 
 def why_abrupt(joints: tuple[AbruptJoint, ...], corpus: str) -> str:
-    """Say in a choreographer's words what makes a transition abrupt."""
+    """Describe, for a choreographer, what makes a transition abrupt."""
     if not joints:
         return f"known in {displayed(corpus)}"
     worst = sorted(joints, key=lambda one: -one.degrees)
@@ -130,7 +132,7 @@ def why_abrupt(joints: tuple[AbruptJoint, ...], corpus: str) -> str:
 
 
 def _words(found: Account, missed: Sequence[str]) -> str:
-    """Say in a line what there is to know of an insertion."""
+    """Describe an insertion in one line."""
     return "; ".join(said for said in (found.usual, found.words, found.differs, *missed, *found.beyond) if said)
 
 
@@ -142,7 +144,7 @@ class Smoother:
     """Keeps a project's seams judged and smoothed.
 
     Args:
-        studio: the studio whose project it is.
+        studio: the studio that owns the project.
     """
 
     def __init__(self, studio: Studio) -> None:
@@ -151,23 +153,23 @@ class Smoother:
         self._changed.set()
         self._state = studio.project.state
         self._seen: dict[str, int] = {}  # when each question first came up
-        self._lost: set[str] = set()  # questions on which a worker ended
+        self._lost: set[str] = set()  # questions on which a worker process died
         self._job: Job | None = None
         studio.project.subscribe(self._look)
 
     def _look(self) -> None:
-        """Note an edit; what was found is none."""
+        """Note an edit; a new finding is not an edit."""
         if self._studio.project.state is not self._state:
             self._state = self._studio.project.state
             self.go_on()
 
     def go_on(self) -> None:
-        """Judge and smooth what is open."""
+        """Resume judging and smoothing."""
         self._studio.tell_of_smoothing(has_stopped=False)
         self._changed.set()
 
     def stop(self) -> None:
-        """Stop until the next edit; what was found stays."""
+        """Stop until the next edit; findings stay."""
         self._studio.tell_of_smoothing(has_stopped=True)
         if self._job is not None:
             self._job.cancel()
@@ -184,7 +186,7 @@ class Smoother:
                     pass
 
     async def _step(self) -> bool:
-        """Judge all seams that are new, or else smooth the newest that is abrupt; return whether there was any."""
+        """Judge all new seams of one corpus, or else smooth the newest abrupt one; return whether there was any."""
         project = self._studio.project
         open_seams: dict[str, tuple[Seam, Finding | None]] = {}
         for seam in project.state.seams:
@@ -212,7 +214,7 @@ class Smoother:
         for name, seam in seams.items():
             try:
                 questions.append(self._asked(name, seam))
-            except MotionMindError as error:  # two bodies, or a joint that there is not
+            except MotionMindError as error:  # different bodies, or an unknown joint
                 self._studio.project.keep_finding(Finding(name, True, f"cannot be joined: {_line(error)}", ()))
         if not questions:
             return
@@ -221,7 +223,7 @@ class Smoother:
                 self._studio.project.keep_finding(finding)
         except JobCancelledError:
             raise
-        except MotionMindError:  # which the job's state tells
+        except MotionMindError:  # the job's state carries the error
             self._studio.tell_of_smoothing(has_stopped=True)
 
     async def _smooth(self, corpus: str, question: Question, judged: Finding) -> None:
@@ -230,7 +232,7 @@ class Smoother:
         except JobCancelledError:
             raise
         except WorkerLostError as error:
-            if question.name not in self._lost:  # which says nothing of the seam: it is tried once more
+            if question.name not in self._lost:  # the seam may not be at fault: try it once more
                 self._lost.add(question.name)
                 return
             alternatives, failure = [], _line(error)
@@ -250,7 +252,7 @@ class Smoother:
         return Question(name, sides, options_of(ask, skeleton, movement), ask != Ask(), stays_of(ask, skeleton))
 
     async def _result(self, kind: str, function: Callable[..., Any], *arguments: Any) -> Any:
-        """The result of a job; JobCancelledError if it was cancelled, MotionMindError if it failed."""
+        """Return the result of a job; raise JobCancelledError if it was cancelled, MotionMindError if it failed."""
         self._job = self._studio.workers.submit(kind, function, *arguments)
         try:
             return await self._job.result()
@@ -274,7 +276,7 @@ async def keep_smooth(studio: Studio) -> None:
 
 
 def routes(studio: Studio) -> list[BaseRoute]:
-    """Return the routes by which a page stops smoothing, and lets it go on."""
+    """Return the routes that stop and resume smoothing."""
 
     async def go_on(_: Request) -> Response:
         smoother_of(studio).go_on()

@@ -1,8 +1,8 @@
-"""The movement on both sides of a seam, as the engine is asked for what lies between: postures, speeds, passing ones.
+"""Movement on both sides of a seam, and the user's request, as input for the engine.
 
-It goes by the variation's own rules (`motionmind.variation.piece`): both ends stand above the origin and face ahead, or
-keep their own headings where the corpus's dancers face the audience. They show how fast the body moves there, as far as
-the recording does. A held posture does not move.
+The rules are those of variations (`motionmind.variation.piece`): both ends stand above the origin and face ahead, or
+keep their own headings if the corpus's dancers face the audience. Frames beside each end show its speed, as far as the
+recording has them. A held posture does not move.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from motionmind.studio.piece import End
 from motionmind.studio.placement import Marks, Movements, check_body
 from motionmind.variation.piece import Piece
 
-_LEAD = 1.0  # seconds of movement beside a seam that are looked at; `Piece.around` takes what it needs of them
+_LEAD = 1.0  # seconds of movement on each side of a seam; `Piece.around` takes what it needs of them
 _OPTIONS = {"start": "A", "end": "B"}
 
 
 class Sides(NamedTuple):
-    """A question to the engine at a seam, as it is asked.
+    """The input for the engine at a seam.
 
     Attributes:
         a: the posture that the seam leads from.
         b: the posture that it leads to.
-        before: frames that lead up to `a`; None where the body is held there, or the recording does not show it.
-        after: frames that follow `b`, in the same way.
-        seconds: from `a` to `b` where nothing is inserted.
+        before: frames that lead up to `a`; None if the body is held there or the recording begins there.
+        after: frames that follow `b`; None likewise.
+        seconds: time from `a` to `b` without an insertion.
     """
 
     a: Posture
@@ -47,13 +47,13 @@ def sides_of(ends: tuple[End, End], movement: Movements, facing: Facing) -> Side
     """Return the movement on both sides of a seam.
 
     Args:
-        ends: where the seam leads from, and to.
+        ends: start and end of the seam.
         movement: returns movements by key.
-        facing: of the corpus that is asked; where it is "stage", the postures keep their own headings.
+        facing: the corpus's; with "stage", the postures keep their own headings.
 
     Raises:
         MotionMindError: there is no such movement.
-        SkeletonError: the two are on different skeletons.
+        SkeletonError: the two ends have different skeletons.
     """
     one, other = (movement(end.key) for end in ends)
     check_body(ends[0].key, one, ends[1].key, other)
@@ -78,10 +78,10 @@ def sides_of(ends: tuple[End, End], movement: Movements, facing: Facing) -> Side
 
 
 def options_of(ask: Ask, skeleton: Skeleton, movement: Movements) -> dict[str, Any]:
-    """Return a wish as options of the engine.
+    """Convert a request to options of the engine.
 
     Args:
-        ask: the wish.
+        ask: the request.
         skeleton: the body.
         movement: returns movements by key.
 
@@ -111,7 +111,7 @@ def options_of(ask: Ask, skeleton: Skeleton, movement: Movements) -> dict[str, A
 
 
 def _limb(skeleton: Skeleton, joint: str) -> list[str]:
-    """Names of the joints that carry a hand or a foot: those of its limb, down to it."""
+    """Return the names of the joints of a limb, down to a hand or a foot."""
     wanted = skeleton.index(joint)
     for limb in limbs_of(skeleton):
         if wanted in limb:

@@ -1,4 +1,4 @@
-"""The studio: what its parts share."""
+"""The studio: the state that its parts share."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from motionmind.studio.workers import Job, Workers
 if TYPE_CHECKING:
     from motionmind.tween.engine import Engine
 
-_ENGINES = 2  # that the server keeps loaded
-_FIRST = 2.0  # seconds in which the page comes first, and workers that start would keep it waiting
+_ENGINES = 2  # engines that the server keeps loaded
+_FIRST = 2.0  # seconds before workers start, so that they do not slow down the loading of the page
 
 
 class Studio:
-    """An open project with all that works on it.
+    """An open project, its workers and its event streams.
 
     Attributes:
         project: the project.
-        home: the folder of the user's corpora; None for the usual one.
-        events: what the windows are told.
-        thumbnails: small pictures.
-        workers: the worker processes, once the server runs.
-        has_stopped: whether seams stay as they are until somebody lets smoothing go on.
+        home: the folder of the user's corpora; None for the default folder.
+        events: events sent to the open windows.
+        thumbnails: cache of small pictures.
+        workers: the worker processes, set once the server runs.
+        has_stopped: whether smoothing of seams is paused.
     """
 
     workers: Workers
@@ -52,9 +52,9 @@ class Studio:
 
         Args:
             project: the project.
-            home: the folder of the user's corpora; None for the usual one.
+            home: the folder of the user's corpora; None for the default folder.
             processes: the number of workers; by default as many as this computer has room for.
-            first: what makes jobs fast, for which they wait.
+            first: preparation that makes jobs fast; jobs wait for it.
         """
         self.project, self.home = project, home
         self.events, self.thumbnails = Events(), Thumbnails()
@@ -65,7 +65,7 @@ class Studio:
 
     @property
     def movements(self) -> Movements:
-        """All movement by key."""
+        """All movements, by key."""
         return self.project.movements
 
     def start(self) -> None:
@@ -78,7 +78,7 @@ class Studio:
             self._preparing = asyncio.create_task(self.workers.prepare("getting ready", told(self._first)))
 
     def _draw_first(self) -> None:
-        """Read what the gallery lists, and draw its first picture, while the browser is yet to open the page."""
+        """Load the gallery and draw its first picture before the browser opens the page."""
         with suppress(MotionMindError):
             collection = self.movements.collection(self.project.state.corpus)
             name = next(iter([*collection.postures, *collection.clips]))
@@ -87,14 +87,14 @@ class Studio:
             self.thumbnails.hold(f"{collection.word}/{name}", 0, HEIGHT, thumbnail(motion, 0, HEIGHT))
 
     def close(self) -> None:
-        """End the workers, and let others open the project."""
+        """End the workers and release the project."""
         if self._first is not None:
             self._first.close()
         self.workers.close()
         self.project.close()
 
     def engine(self, name: str) -> Engine:
-        """Return the engine of a corpus in this process, for questions that take no longer than a blink.
+        """Return the engine of a corpus in this process, for questions that take a fraction of a second.
 
         Raises:
             MotionMindError: there is no such corpus.
@@ -109,7 +109,7 @@ class Studio:
         return self._engines[name]
 
     def forget(self, corpus: str) -> None:
-        """Forget what is known of a corpus that was made anew or deleted."""
+        """Drop cached data of a corpus that was rebuilt or deleted."""
         self._engines.pop(corpus, None)
         self.project.look_again(corpus)
 
@@ -132,7 +132,7 @@ class Studio:
         }
 
     def tell_of_smoothing(self, has_stopped: bool) -> None:
-        """Tell the windows when smoothing stops, and when it goes on."""
+        """Tell the windows when smoothing stops or resumes."""
         if has_stopped != self.has_stopped:
             self.has_stopped = has_stopped
             self.events.send("smoothing", {"stopped": has_stopped})
