@@ -1,4 +1,4 @@
-"""A project's file: JSON lines that are only ever appended to, each on disk before anybody hears of it.
+"""A project's file: append-only JSON lines, each written to disk before its effect becomes visible.
 
     {"format": "motionmind studio", "version": 1, "title": "nutcracker", "corpus": "ballet", "corpora": {"ballet": "…"}}
     {"movement": "m-0123456789abcdef", "title": "solo.bvh", "motion": {…}}
@@ -6,8 +6,8 @@
     {"edit": {"edit": "delete", "block": "b1"}, "number": 7, "window": "w3f…"}
     {"undo": 7, "number": 8, "window": "w3f…"}
 
-A process that is killed while it writes leaves a torn last line, which is dropped when the file is opened again. One
-process at a time holds a project, by a lock that ends with it.
+A process that is killed while it writes leaves an incomplete last line, which the next opening drops. A lock lets only
+one process at a time open a project; it ends with the process.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Journal:
     Attributes:
         path: the file.
         count: the number of its lines.
-        dropped: whether a torn last line was dropped when it was opened.
+        dropped: whether opening it dropped an incomplete last line.
     """
 
     def __init__(self, path: Path, descriptor: int, end: int, count: int, dropped: bool) -> None:
@@ -56,7 +56,7 @@ class Journal:
 
     @classmethod
     def create(cls, path: Path, **head: Any) -> Self:
-        """Make a new project's file; MotionMindError if there is a file already, or it cannot be written.
+        """Create a project's file; raise MotionMindError if the file exists or cannot be written.
 
         Args:
             path: the file.
@@ -79,11 +79,11 @@ class Journal:
 
     @classmethod
     def open(cls, path: Path) -> Self:
-        """Open and lock a project's file; a torn last line is dropped.
+        """Open and lock a project's file, and drop an incomplete last line.
 
         Raises:
-            FormatError: it is no project's file, or of another version.
-            MotionMindError: it cannot be read, or another process holds it; the message says at which address.
+            FormatError: it is not a project's file, or of another version.
+            MotionMindError: it cannot be read, or another process has it open; the message gives that studio's address.
         """
         _check_head(path)
         try:
@@ -95,7 +95,7 @@ class Journal:
                 raise MotionMindError(f"{path}: is open{_elsewhere(path)}; end that studio, or work there")
             data = read_bytes(path)
             end, dropped = _whole(data), False
-            if end == len(data) and not data.endswith(b"\n"):  # all of a line but its end
+            if end == len(data) and not data.endswith(b"\n"):  # the last line lacks only its newline
                 _write(descriptor, end, b"\n")
                 data, end = data + b"\n", end + 1
             elif end < len(data):
@@ -117,7 +117,7 @@ class Journal:
             start = end + 1
 
     def read(self, start: int, length: int) -> bytes:
-        """Read some bytes of the file again; MotionMindError if that fails."""
+        """Read a range of bytes; raise MotionMindError if that fails."""
         try:
             with self.path.open("rb") as file:
                 file.seek(start)
@@ -126,14 +126,14 @@ class Journal:
             raise MotionMindError(f"{self.path}: cannot be read: {error.strerror or error}") from error
 
     def append(self, record: Any) -> Line:
-        """Append a record, and return its line once it is on disk.
+        """Append a record, sync it to disk and return its line.
 
         Raises:
-            MotionMindError: it cannot be written; the file is as it was.
+            MotionMindError: it cannot be written; the file is unchanged.
         """
         data = msgspec.json.encode(record)
         try:
-            os.ftruncate(self._descriptor, self._end)  # what an append that failed may have left
+            os.ftruncate(self._descriptor, self._end)  # remove what a failed append may have left
             _write(self._descriptor, self._end, data + b"\n")
         except OSError as error:
             with suppress(OSError):
@@ -146,12 +146,12 @@ class Journal:
         return line
 
     def tell(self, address: str) -> None:
-        """Note at which address the project is open, for those who try to open it elsewhere."""
+        """Write down the address of this studio, for another one that tries to open the project."""
         with suppress(OSError):
             replace_file(_note(self.path), address.encode())
 
     def close(self) -> None:
-        """Unlock and close the file; nothing happens if it is closed."""
+        """Unlock and close the file, unless it is closed."""
         if self._descriptor >= 0:
             with suppress(OSError):
                 _note(self.path).unlink()
@@ -168,7 +168,7 @@ def _write(descriptor: int, start: int, data: bytes) -> None:
 
 
 def _whole(data: bytes) -> int:
-    """Return the number of bytes up to the end of the last line that is whole."""
+    """Return the number of bytes up to the end of the last complete line."""
     start = data.rfind(b"\n", 0, len(data) - 1) + 1
     try:
         msgspec.json.decode(data[start:], type=dict[str, msgspec.Raw])

@@ -1,4 +1,4 @@
-"""The measure of how well a corpus knows a posture, joint by joint, and the nearest to it that it knows."""
+"""Measure how well a corpus knows a posture, joint by joint, and find the nearest posture that it knows."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from motionmind.learned.learning import Learned
 
 Known = Literal["seen", "near", "unseen"]
-NEAR = 2.0  # tolerances of a joint's states within which an orientation is near one that was seen
-_COUNTED = 1e-9  # degrees by which rounding may lead over a tolerance
+NEAR = 2.0  # an orientation within this many tolerances of a seen one is near
+_COUNTED = 1e-9  # degrees of rounding error that a tolerance allows
 
 
 class Memory:
-    """The orientations that a corpus has seen, joint by joint."""
+    """The orientations of each joint that occur in a corpus."""
 
     def __init__(self, learned: Learned) -> None:
         self.corpus, self.space = learned.corpus, learned.space
@@ -31,7 +31,7 @@ class Memory:
         self._orientations = []
         for chain in range(chains):
             centres = self.space.of(chain)[np.unique(np.asarray(learned.states[:, chain]))]
-            # A library that somebody made need not have a state for everything that was recorded.
+            # A user's own state library need not cover everything that was recorded.
             _, cosines = nearest(recorded[:, chain], centres)
             lacking = cosines < np.cos(0.5 * np.radians(self.space.tolerances[chain]))
             self._orientations.append(np.concatenate([centres, recorded[lacking, chain]]))
@@ -43,7 +43,7 @@ class Memory:
     def known(self, posture: Posture) -> list[Known]:
         """Return how well the corpus knows each joint's orientation [J].
 
-        It is seen where an orientation that was observed stands for it, near where one does within twice as much.
+        It is "seen" within the tolerance of a recorded orientation, "near" within `NEAR` tolerances.
         """
         degrees, _ = self._nearest(posture.rotations)
         limits = self.space.tolerances[: len(degrees)] + _COUNTED
@@ -53,14 +53,13 @@ class Memory:
         ]
 
     def bring_joints(self, posture: Posture, kept: str | None = None) -> Posture:
-        """Return the posture with each joint that was not seen turned to where it was seen nearest to that.
+        """Return the posture with each joint that is not "seen" turned to its nearest seen orientation.
 
-        Standing feet are put back where they stood, and `kept` where it was, as long as that leaves no joint further
-        than near to what was seen.
+        Standing feet return to their places, and `kept` to its own, as long as no joint becomes "unseen".
 
         Args:
             posture: the posture.
-            kept: a joint or a heel whose place is kept if that can be.
+            kept: a joint or a heel that keeps its place if possible.
         """
         _, numbers = self._nearest(posture.rotations)
         chains = self.corpus.to_chains(posture.rotations).copy()
@@ -75,7 +74,7 @@ class Memory:
         return next((one for one in (held, planted) if "unseen" not in self.known(one)), found)
 
     def bring_whole(self, posture: Posture) -> tuple[Posture, str, float]:
-        """Return the corpus's nearest whole posture, where this one stands and faces; its clip, and seconds into it."""
+        """Return the corpus's nearest posture, placed and facing like this one, its clip, and seconds into the clip."""
         corpus, count = self.corpus, len(self.corpus.skeleton)
         mine, theirs = corpus.to_chains(posture.rotations)[:count], corpus.to_chains(corpus.rotations)[:, :count]
         number = int(np.argmin(np.sum(rot.angle(theirs, mine) ** 2, axis=1)))
@@ -87,7 +86,7 @@ class Memory:
         return settle(Posture(posture.skeleton, rot.normalise(rotations), posture.root), posture), clip.label, seconds
 
     def _nearest(self, rotations: Floats) -> tuple[Floats, Ints]:
-        """Return the degrees from each joint's nearest orientation that was seen [J], and the number of that [J]."""
+        """Return the degrees to each joint's nearest seen orientation [J], and that orientation's index [J]."""
         chains = self.corpus.to_chains(rotations)
         cosines = np.empty(len(self._orientations))
         numbers = np.empty(len(self._orientations), dtype=np.int64)
@@ -99,9 +98,9 @@ class Memory:
 
 
 def settle(posture: Posture, before: Posture) -> Posture:
-    """Return a posture put where another stood: its soles over the places of those that stood, and as high.
+    """Move a posture to where another one stands: its soles to the place and height of the other's standing soles.
 
-    Where none stood, the root stays.
+    Without standing soles, the root stays.
     """
     soles = standing_soles(before)
     if len(soles) == 0:

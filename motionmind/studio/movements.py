@@ -1,10 +1,10 @@
-"""Movement by its key: clips and postures of corpora, saved postures, and what the project keeps.
+"""Movements by key: clips and postures of corpora, saved postures, and movements stored in the project.
 
 ballet/adagio    a clip of a corpus
-ballet/arabesque    a posture that a corpus names: a movement of one frame
-own/bow    a posture that is saved in the project
-m-0123456789abcdef    a movement that the project keeps; the hash of its content
-~KEY    the same with left and right exchanged
+ballet/arabesque    a named posture of a corpus: a movement of one frame
+own/bow    a posture saved in the project
+m-0123456789abcdef    a movement stored in the project, by the hash of its content
+~KEY    the mirrored movement
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from motionmind.names.spelling import Source
 from motionmind.studio.journal import Journal, Line
 
 _MIRRORED, _KEPT, _OWN = "~", "m-", "own"
-_HELD = 64 * 2**20  # bytes of movement that are kept in memory
+_HELD = 64 * 2**20  # bytes of movement in the cache
 
 
 class Packed(msgspec.Struct, frozen=True):
-    """Numbers as bytes.
+    """An array in base64.
 
     Attributes:
-        type: "<f4" if that is exact, else "<f8".
+        type: "<f4" if that is exact, otherwise "<f8".
         shape: the array's shape.
         data: the numbers in base64.
     """
@@ -58,7 +58,7 @@ class Packed(msgspec.Struct, frozen=True):
         return cls(kept.dtype.str, kept.shape, b64encode(np.ascontiguousarray(kept).tobytes()).decode("ascii"))
 
     def array(self) -> Floats:
-        """Return the array; ValueError if it is none."""
+        """Return the array; raise ValueError if it is damaged."""
         if self.type not in ("<f4", "<f8"):
             raise ValueError(f"numbers of type {self.type!r:.20}")
         data = b64decode(self.data, validate=True)
@@ -78,7 +78,7 @@ class MotionRecord(msgspec.Struct, frozen=True):
     times: Packed
     insertions: tuple[tuple[tuple[float, ...], tuple[tuple[str, int], ...]], ...] = ()
     keyframed: bool = False
-    credits: tuple[tuple[Credit, ...], ...] = ()  # of each insertion, where they are known
+    credits: tuple[tuple[Credit, ...], ...] = ()  # of each insertion, if known
     recorded: tuple[Credit, ...] = ()
 
     @classmethod
@@ -101,7 +101,7 @@ class MotionRecord(msgspec.Struct, frozen=True):
         )
 
     def motion(self, name: str) -> Motion:
-        """Return the motion; MotionMindError if it is none."""
+        """Return the motion; raise MotionMindError if the record is damaged."""
         try:
             offsets, tips, rotations, root, times = (
                 packed.array() for packed in (self.offsets, self.tips, self.rotations, self.root, self.times)
@@ -109,7 +109,7 @@ class MotionRecord(msgspec.Struct, frozen=True):
         except ValueError as error:
             raise MotionMindError(f"{displayed(name)}: its numbers cannot be read: {error}") from error
         skeleton = Skeleton(self.body, self.names, self.parents, offsets, tips)
-        credited = self.credits or ((),) * len(self.insertions)  # none in projects of 0.2 and before
+        credited = self.credits or ((),) * len(self.insertions)  # projects of 0.2 and before have none
         insertions = tuple(
             Insertion(np.array(times), bridged, shares)
             for (times, bridged), shares in zip(self.insertions, credited, strict=False)
@@ -126,10 +126,10 @@ class MovementLine(msgspec.Struct, frozen=True):
 
 
 class Movements:
-    """All movement that there is, by key.
+    """All movements, by key.
 
     Attributes:
-        saved: returns the key of the movement that a saved posture is; MotionMindError if there is none.
+        saved: returns the key of a saved posture's movement by its name; raises MotionMindError if there is none.
     """
 
     def __init__(self, journal: Journal, home: Path | None) -> None:
@@ -137,7 +137,7 @@ class Movements:
 
         Args:
             journal: its file.
-            home: the folder of the user's corpora; None for the usual one.
+            home: the folder of the user's corpora; None for the default folder.
         """
         self._journal, self._home = journal, home
         self._kept: dict[str, tuple[str, int, int]] = {}  # title, first byte and length of its line
@@ -147,7 +147,7 @@ class Movements:
         self.saved: Callable[[str], str] = _no_posture
 
     def take_in(self, line: Line) -> None:
-        """Take in a line of the file that holds a movement; FormatError if it is damaged."""
+        """Register a line of the file that holds a movement; raise FormatError if it is damaged."""
         try:
             found = msgspec.json.decode(line.data, type=MovementLine)
         except (ValueError, RecursionError) as error:
@@ -155,11 +155,11 @@ class Movements:
         self._kept[found.movement] = found.title, line.start, len(line.data)
 
     def get(self, key: str) -> Motion:
-        """Return the movement of a key; MotionMindError if there is none."""
+        """Return the movement of a key; raise MotionMindError if there is none."""
         if (known := self._held.get(key)) is not None:
             self._held.move_to_end(key)
             return known
-        if key.lstrip(_MIRRORED).startswith(f"{_OWN}/"):  # which may be saved anew
+        if key.lstrip(_MIRRORED).startswith(f"{_OWN}/"):  # not cached: the name may be saved anew
             motion = self.get(self.saved(key.lstrip(_MIRRORED).partition("/")[2]))
             return mirrored(motion) if key.startswith(_MIRRORED) else motion
         if key.startswith(_MIRRORED):
@@ -173,7 +173,7 @@ class Movements:
         return motion
 
     def title(self, key: str) -> str:
-        """Return the words for a movement."""
+        """Return a movement's title."""
         if key.startswith(_MIRRORED):
             return f"{self.title(key[1:])} (mirrored)"
         if key in self._kept:
@@ -181,11 +181,11 @@ class Movements:
         return displayed(key.partition("/")[2] or key)
 
     def keep(self, motion: Motion, title: str = "") -> str:
-        """Keep a movement in the project, once, and return its key.
+        """Store a movement in the project, unless it is there, and return its key.
 
         Args:
             motion: the movement.
-            title: words for it; its name by default.
+            title: its title; its name by default.
 
         Raises:
             MotionMindError: it cannot be written.
@@ -198,19 +198,19 @@ class Movements:
         return key
 
     def has(self, corpus: str) -> bool:
-        """Return whether there is such a corpus."""
+        """Return whether a corpus exists."""
         return corpus in self._collections or corpus in store.list_corpora(self._home)
 
     def collection(self, corpus: str) -> Collection:
-        """Return a corpus's clips and postures by name; MotionMindError if there is no such corpus."""
+        """Return a corpus's clips and postures by name; raise MotionMindError if there is no such corpus."""
         return self._corpus(corpus).collection
 
     def facing(self, corpus: str) -> Facing:
-        """Return which way a corpus's dancers may face; any if there is no such corpus."""
+        """Return which way a corpus's dancers may face; "free" if there is no such corpus."""
         return self._corpus(corpus).facing if self.has(corpus) else "free"
 
     def forget(self, corpus: str) -> None:
-        """Forget what is known of a corpus, which has changed."""
+        """Drop cached data of a corpus that has changed."""
         self._collections.pop(corpus, None)
         for key in [key for key in self._held if key.lstrip(_MIRRORED).startswith(f"{corpus}/")]:
             self._size -= _bytes(self._held.pop(key))
@@ -245,7 +245,7 @@ class Movements:
 
 
 class _Corpus:
-    """The clips and postures of a corpus, opened when one of them is asked for."""
+    """The clips and postures of a corpus, loaded on first use."""
 
     def __init__(self, name: str, home: Path | None) -> None:
         self.collection = open_collection(Source(name, "corpus", name), home)
@@ -264,7 +264,7 @@ class _Corpus:
         return found
 
     def motion(self, name: str) -> Motion:
-        """Return a clip as it was recorded, else a posture, whose credit is that of the whole corpus."""
+        """Return a clip as recorded, or else a posture, credited to the corpus."""
         try:
             clip = self._corpus.clip_labelled(name)
         except KeyError:
@@ -274,13 +274,13 @@ class _Corpus:
 
 
 def version_of(corpus: str, home: Path | None) -> str:
-    """Return a hash of all that a corpus consists of; MotionMindError if there is no such corpus or it is damaged."""
+    """Return a hash of a corpus's content; raise MotionMindError if there is no such corpus or it is damaged."""
     folder = store.locate(corpus, home)
     stored = store.load(folder)
     digest = hashlib.sha256()
     manifest = {name: value for name, value in stored.manifest.items() if name != "folder"}
     digest.update(msgspec.json.encode(manifest))
-    # What is written by hand lies beside its manifest.
+    # A corpus written by hand has its files beside its manifest.
     files = stored.files or [path for path in sorted(folder.rglob("*")) if path.is_file() and path.name[:1] != "."]
     for path in files:
         with path.open("rb") as file:

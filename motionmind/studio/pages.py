@@ -1,4 +1,4 @@
-"""The files of the page: its own modules and the player's, each read once and known by its path."""
+"""The files of the page: its own modules and the player's, each read once, by path."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ _THREE = {"three": "three.module.min.js", "three/OrbitControls": "OrbitControls.
 
 
 class File(NamedTuple):
-    """A file that anybody may have who reaches the server; it holds nothing of anybody.
+    """A public file, without user data.
 
     Attributes:
         data: its bytes.
         type: its media type.
-        tag: changes with its bytes.
+        tag: its ETag, which changes with its bytes.
     """
 
     data: bytes
@@ -43,9 +43,9 @@ class Page(NamedTuple):
     """The page.
 
     Attributes:
-        files: all files by the path that they are asked for by. All but the page itself, "/", have the page's version
-            in their path, so that a browser may keep them for good and loads the page again without asking for one.
-        script: hash of the import map, the only inline script, as the page's policy names it.
+        files: all files by URL path. All paths but "/", the page itself, contain the page's version, so that a browser
+            can cache the files forever.
+        script: hash of the import map, the only inline script, for the page's Content-Security-Policy.
     """
 
     files: dict[str, File]
@@ -68,7 +68,7 @@ def read_page() -> Page:
     modules = msgspec.json.encode({"imports": names}).decode().replace("<", "\\u003c")
     first = _loaded(files, names, f"{page}/begin.js")
     later = [path for path in _loaded(files, names, f"{page}/main.js") if path not in first]
-    # A browser asks for six files at a time: what `begin.js` asks for would wait for all others.
+    # A browser loads six files at a time: requests by `begin.js` would wait for all others.
     links = [f'<link rel="modulepreload" href="{path}">' for path in first]
     links += [f'<link rel="modulepreload" fetchpriority="low" href="{path}">' for path in later]
     preloads = "\n".join(links)
@@ -79,7 +79,7 @@ def read_page() -> Page:
 
 
 def _read(folder: Path) -> dict[str, File]:
-    """Return a folder's files for browsers by their paths within it."""
+    """Return a folder's files for browsers, by relative path."""
     return {
         path.relative_to(folder).as_posix(): _file(path.read_bytes(), _TYPES[path.suffix])
         for path in sorted(folder.rglob("*"))
@@ -88,7 +88,7 @@ def _read(folder: Path) -> dict[str, File]:
 
 
 def _loaded(files: Mapping[str, File], names: Mapping[str, str], start: str) -> list[str]:
-    """Return the paths of a module and of all that it needs, so that the page loads them at once, not in turn."""
+    """Return the paths of a module and all its imports, which the page then loads in parallel."""
     text = {path: file.data.decode() for path, file in files.items() if path.endswith(".js")}
     found, new = set[str](), {start}
     while new:

@@ -1,8 +1,8 @@
-"""The state of a project that its edits lead to: blocks in their order, and what is wished and decided at the seams.
+"""The state of a project after its edits: blocks in order, and requests and decisions at the seams.
 
-Everything here is pure: `apply` leads from one state to the next and changes nothing, so the state is that of the edits
-that are not undone, applied in their order. Whether movements exist and are long enough is asked once, when an edit
-comes in (`motionmind.studio.checks`).
+Everything here is pure: `apply` returns a new state, and a project's state follows from its edits, without the undone
+ones, applied in order. `motionmind.studio.checks` checks once, when an edit comes in, that movements exist and are long
+enough.
 """
 
 from __future__ import annotations
@@ -40,20 +40,20 @@ from motionmind.studio.edits import (
     each,
 )
 
-OWN = "own/"  # keys of saved postures
+OWN = "own/"  # prefix of keys of saved postures
 MIRRORED = "~"
 
-Pair = tuple[str, str]  # ids of two blocks, the one before and the one after a seam
+Pair = tuple[str, str]  # ids of the blocks before and after a seam
 
 
 class Verdict(msgspec.Struct, frozen=True):
-    """A choreographer's word on a seam.
+    """A choreographer's requests and decision at a seam.
 
     Attributes:
-        ask: the wish for its insertion.
-        chosen: number of the insertion chosen of those found, counted from 1.
-        decision: "locked" insertions change only when they are opened again; "discarded" ones are left out.
-        corpus: the corpus that a locked insertion was found in, whatever the piece's is now; "" of one that is not.
+        ask: the request for its insertion.
+        chosen: number of the chosen insertion, counted from 1.
+        decision: a "locked" insertion does not change until it is unlocked; a "discarded" one is left out.
+        corpus: the corpus of a locked insertion, whatever the piece's is now; "" unless it is locked.
     """
 
     ask: Ask = Ask()
@@ -66,9 +66,9 @@ class End(msgspec.Struct, frozen=True):
     """One side of a seam.
 
     Attributes:
-        key: the movement, its key with `~` if it is mirrored.
+        key: key of the movement, with `~` if it is mirrored.
         frame: the frame at the seam.
-        moves: whether the movement goes on there; a block of one frame is a posture, held.
+        moves: whether the body moves there; a block of one frame is a held posture.
     """
 
     key: str
@@ -80,9 +80,9 @@ class Found(msgspec.Struct, frozen=True):
     """A movement that was found for a seam.
 
     Attributes:
-        key: the movement.
-        seconds: its length.
-        words: what there is to know of it, in a choreographer's words.
+        key: key of the movement.
+        seconds: its duration.
+        words: a description for choreographers.
     """
 
     key: str
@@ -91,13 +91,13 @@ class Found(msgspec.Struct, frozen=True):
 
 
 class Finding(msgspec.Struct, frozen=True):
-    """The engine's answer at a seam: a fact, which no undo takes back.
+    """The engine's answer at a seam: a fact, which undo never removes.
 
     Attributes:
-        finding: the question that it answers (`question_of`).
-        abrupt: whether the corpus does not know the transition.
-        words: why, or why nothing was found.
-        insertions: what can be inserted, the best first; None as long as nobody has searched.
+        finding: the hash of its question (`question_of`).
+        abrupt: whether the transition is abrupt for the corpus.
+        words: the reason, or the reason why nothing was found.
+        insertions: movements to insert, the best first; None before the search.
     """
 
     finding: str
@@ -112,7 +112,7 @@ class Seam(NamedTuple):
     Attributes:
         left: the block before it.
         right: the block after it.
-        verdict: the word on it.
+        verdict: requests and decision.
     """
 
     left: Block
@@ -126,13 +126,13 @@ class Seam(NamedTuple):
 
     @property
     def goes_on(self) -> bool:
-        """Whether the movement goes on as recorded, or stays in its posture: nothing is to be judged."""
+        """Whether the movement continues as recorded or holds its posture, so that there is nothing to judge."""
         one, other = self.left, self.right
         return key_of(one) == key_of(other) and other.first - one.last in (0, 1)
 
     @property
     def ends(self) -> tuple[End, End]:
-        """Both sides: where the left block ends and where the right one begins."""
+        """Both sides: the end of the left block and the beginning of the right one."""
         one, other = self.left, self.right
         return (
             End(key_of(one), one.last, one.last > one.first),
@@ -142,16 +142,16 @@ class Seam(NamedTuple):
 
 @dataclass(frozen=True)
 class State:
-    """A project as it stands.
+    """The state of a project.
 
     Attributes:
         title: the piece's title.
         corpus: name of the corpus that judges and smooths it.
-        blocks: the blocks in their order; their ids differ.
-        verdicts: words on seams by the ids of their two blocks, also of seams that were and may be again.
-        postures: keys of the movements that saved postures are, by name.
-        used: ids of all blocks that there ever were.
-        about: how the present order came about, if it was given as a whole.
+        blocks: the blocks in order; their ids differ.
+        verdicts: verdicts on seams by the ids of their two blocks, also of past seams, which may come back.
+        postures: keys of saved postures' movements, by name.
+        used: ids of all blocks, past and present.
+        about: origin of the present order, from `Arrange`.
     """
 
     title: str = ""
@@ -164,7 +164,7 @@ class State:
 
     @cached_property
     def seams(self) -> tuple[Seam, ...]:
-        """The seams, in order; one fewer than there are blocks."""
+        """The seams in order, one fewer than blocks."""
         return tuple(
             Seam(one, other, self.verdicts.get((one.id, other.id), Verdict())) for one, other in pairwise(self.blocks)
         )
@@ -174,25 +174,25 @@ class State:
         return {block.id: place for place, block in enumerate(self.blocks)}
 
     def place(self, block: str) -> int:
-        """Return the place of a block among the others; MotionMindError if there is no such block."""
+        """Return the index of a block; raise MotionMindError if there is no such block."""
         try:
             return self._places[block]
         except KeyError:
             raise MotionMindError("this stretch is not in the piece any more") from None
 
     def block(self, block: str) -> Block:
-        """Return the block of that id; MotionMindError if there is none."""
+        """Return the block with an id; raise MotionMindError if there is none."""
         return self.blocks[self.place(block)]
 
     def seam(self, left: str, right: str) -> Seam:
-        """Return the seam between two neighbours; MotionMindError if they are not neighbours."""
+        """Return the seam between two neighbours; raise MotionMindError if they are not neighbours."""
         place = self.place(left)
         if self.place(right) != place + 1:
             raise MotionMindError("these two stretches do not follow each other any more")
         return self.seams[place]
 
     def stable(self, key: str) -> str:
-        """Return the key of the movement that a saved posture is now; other keys as they are.
+        """Return the key of the movement that now holds a saved posture; other keys unchanged.
 
         Raises:
             MotionMindError: there is no such posture.
@@ -215,7 +215,7 @@ def apply(state: State, edit: Edit) -> State:
     """Return the state after an edit.
 
     Raises:
-        MotionMindError: the edit does not fit the state; the message says why.
+        MotionMindError: the edit does not apply to the state; the message says why.
 
     >>> from motionmind.studio.edits import Insert, Split
     >>> from motionmind.studio.piece import State, apply
@@ -227,7 +227,7 @@ def apply(state: State, edit: Edit) -> State:
 
 
 def apply_all(edits: Iterable[Edit], state: State | None = None) -> State:
-    """Return the state after several edits, from the empty project on or from `state`; errors as of `apply`."""
+    """Return the state after several edits of `state` or of the empty project; raise the errors of `apply`."""
     return reduce(apply, edits, state or State())
 
 
@@ -284,7 +284,7 @@ def _apply(state: State, edit: Single) -> State:  # noqa: PLR0911 (one case an e
 
 
 def arranged(state: State, blocks: tuple[Block, ...]) -> State:
-    """Return a piece with its blocks in another order, or cut into others: a word on a seam goes with the seam's ends.
+    """Return a piece with other blocks; a new seam with the same ends as an old one inherits its verdict.
 
     Args:
         state: the piece.
@@ -301,7 +301,7 @@ def arranged(state: State, blocks: tuple[Block, ...]) -> State:
 
 
 def _checked(state: State, block: Block) -> Block:
-    """The block, its source a movement that stays; MotionMindError if it ends before it begins."""
+    """Return the block with a stable source; raise MotionMindError if it ends before it begins."""
     if block.first > block.last:
         raise MotionMindError(f"a stretch cannot go from frame {block.first} back to frame {block.last}")
     source, mirrored = state.stable(block.source), block.mirrored
@@ -344,7 +344,7 @@ def _split(state: State, edit: Split) -> State:
     one = msgspec.structs.replace(block, last=edit.at - 1)
     other = msgspec.structs.replace(block, first=edit.at, id=edit.id)
     blocks = _countable((*state.blocks[:place], one, other, *state.blocks[place + 1 :]))
-    # The word on the seam at the block's end goes with that end.
+    # The verdict on the seam at the block's end moves with that end.
     verdicts = {
         (edit.id if left == block.id else left, right): verdict for (left, right), verdict in state.verdicts.items()
     }
@@ -352,13 +352,13 @@ def _split(state: State, edit: Split) -> State:
 
 
 def _put(state: State, block: Block) -> State:
-    """The state with a block in the place of the one that has its id."""
+    """Replace the block that has the same id."""
     place = state.place(block.id)
     return replace(state, blocks=(*state.blocks[:place], block, *state.blocks[place + 1 :]))
 
 
 def _forget_ends(state: State, block: Block, *, begins: bool, ends: bool) -> State:
-    """The state with no decision at the ends of a block that change: nobody has seen what will be found there.
+    """Reset the decisions at a block's changed ends, because they concern other insertions than will be found.
 
     Raises:
         MotionMindError: an insertion is locked there.
@@ -374,7 +374,7 @@ def _forget_ends(state: State, block: Block, *, begins: bool, ends: bool) -> Sta
 
 
 def _open(seam: Seam) -> Verdict:
-    """The word on a seam; MotionMindError if it is locked."""
+    """Return the verdict on a seam; raise MotionMindError if it is locked."""
     if seam.verdict.decision == "locked":
         raise MotionMindError("an insertion that this changes is locked: unlock it first")
     return seam.verdict

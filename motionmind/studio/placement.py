@@ -1,9 +1,9 @@
-"""The piece in time and on the floor: when each of its parts begins, where it is set down and which way it faces.
+"""Place a piece in time and on the floor: when each part begins, where it stands and which way it faces.
 
-A part is a stretch of a movement: a block, or the insertion at a seam. Each is set down where the one before it ends,
-level place and heading; a block that goes on as recorded stays where the recording has it. Where the corpus's dancers
-face the audience, facing "stage", nothing is turned. The page plays the parts so, and `performance` makes them one
-movement.
+A part is a stretch of a movement: a block, or the insertion at a seam. Each part begins at the floor position and
+heading where the previous one ends; a block that continues a recording keeps the recording's placement. If the
+corpus's dancers face the audience (facing "stage"), no part is turned. The page plays the parts with this placement,
+and `performance` joins them into one movement.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from motionmind.geometry import rotations as rot
 from motionmind.studio.piece import Seam, State, key_of
 from motionmind.variation.piece import ALONE, Parts, Placement
 
-_STILL = 30.0  # frames a second of what is missing
-_LEAST = 1e-9  # seconds that a part counts for, so that a posture alone is somebody's
+_STILL = 30.0  # frames a second of a missing movement
+_LEAST = 1e-9  # seconds that a part counts for in credits, at least: a single posture is credited too
 
-Movements = Callable[[str], Motion]  # returns the movement of a key; MotionMindError if there is none
+Movements = Callable[[str], Motion]  # returns a movement by key; raises MotionMindError if there is none
 
 
 def check_body(key: str, motion: Motion, other_key: str, other: Motion) -> None:
-    """Check that two movements can be one; the keys are for the message.
+    """Check that two movements share a body; the keys are for the message.
 
     Raises:
-        SkeletonError: they are on different skeletons.
+        SkeletonError: their skeletons differ.
     """
     difference = motion.skeleton.difference(other.skeleton)
     if difference is None and motion.skeleton.names != other.skeleton.names:
@@ -47,13 +47,13 @@ class Part(msgspec.Struct, frozen=True):
     """A stretch of a movement, placed.
 
     Attributes:
-        key: the movement.
-        first: the frame that it begins with.
-        last: the frame that it ends with.
+        key: key of the movement.
+        first: its first frame.
+        last: its last frame, inclusive.
         at: when it begins in the piece, seconds.
-        seconds: how long it lasts.
-        place: x and z of the shift that comes after the turn, metres.
-        turn: angle about the vertical, radians.
+        seconds: its duration.
+        place: x and z of the shift after the turn, metres.
+        turn: rotation about the vertical, radians.
         inserted: whether it is an insertion.
     """
 
@@ -68,7 +68,7 @@ class Part(msgspec.Struct, frozen=True):
 
 
 class Mark(NamedTuple):
-    """A body at a frame of a movement: its level place, metres, its heading, radians, and the time, seconds."""
+    """A body at a frame of a movement: its floor position, metres, its heading, radians, and the time, seconds."""
 
     x: float
     z: float
@@ -77,16 +77,16 @@ class Mark(NamedTuple):
 
 
 class Marks:
-    """Marks of movements' frames, each remembered: a piece asks for the same ones at every edit.
+    """Cached marks of movements' frames: a piece needs the same ones after every edit.
 
-    What is missing, a movement or a frame of it, stands still in the middle of the floor, `_STILL` frames a second.
+    A missing movement or frame stands still at the origin, with `_STILL` frames a second.
 
     Attributes:
         facing: returns which way a corpus's dancers may face, by its name.
     """
 
     def __init__(self, movement: Movements, facing: Callable[[str], Facing] = lambda _: "free") -> None:
-        """Remember nothing yet.
+        """Begin with an empty cache.
 
         Args:
             movement: returns movements by key.
@@ -98,12 +98,12 @@ class Marks:
         self._lengths: dict[str, int] = {}
 
     def forget(self) -> None:
-        """Forget all marks: movements have changed, or come to be there."""
+        """Empty the cache, after movements have changed or appeared."""
         self._marks.clear()
         self._lengths.clear()
 
     def has(self, key: str, frame: int) -> bool:
-        """Return whether there is such a movement, and such a frame of it."""
+        """Return whether a movement and its frame exist."""
         return frame < self._count(key)
 
     def at(self, key: str, frame: int) -> Mark:
@@ -118,11 +118,11 @@ class Marks:
         return known
 
     def length(self, key: str) -> int:
-        """Return the number of frames of a movement; MotionMindError if there is none."""
+        """Return the number of frames of a movement; raise MotionMindError if there is none."""
         return self._count(key) or len(self._movement(key))
 
     def _count(self, key: str) -> int:
-        """The number of frames of a movement; 0 if there is none."""
+        """Return the number of frames of a movement; 0 if there is none."""
         if key not in self._lengths:
             try:
                 self._lengths[key] = len(self._movement(key))
@@ -144,8 +144,8 @@ class Layout(NamedTuple):
 
     Attributes:
         blocks: one for each block, in order.
-        insertions: one for each seam, in order; None where nothing is inserted.
-        seconds: length of the piece.
+        insertions: one for each seam, in order; None if nothing is inserted.
+        seconds: duration of the piece.
     """
 
     blocks: tuple[Part, ...]
@@ -154,7 +154,7 @@ class Layout(NamedTuple):
 
     @property
     def parts(self) -> Iterator[Part]:
-        """All of them in the order in which they come."""
+        """All parts in order of time."""
         for place, block in enumerate(self.blocks):
             yield block
             if place < len(self.insertions) and (insertion := self.insertions[place]) is not None:
@@ -166,8 +166,8 @@ def lay_out(state: State, insertion: Callable[[Seam], str | None], marks: Marks)
 
     Args:
         state: the piece.
-        insertion: returns the key of the movement that is inserted at a seam; None for none.
-        marks: of the movements.
+        insertion: returns the key of the movement to insert at a seam; None for none.
+        marks: marks of the movements.
     """
     turns = bool(state.blocks) and marks.facing(state.corpus) == "free"
     blocks: list[Part] = []
@@ -204,7 +204,7 @@ def _part(marks: Marks, key: str, first: int, last: int, at: float, place: tuple
 def _following(
     marks: Marks, before: Part, key: str, frames: tuple[int, int], at: float, turns: bool, *, inserted: bool = False
 ) -> Part:
-    """A part, set down where another one ends, and turned as it is if it may be."""
+    """Place a part where another one ends, turned to its heading if `turns`."""
     first, last = frames
     end, begin = marks.at(before.key, before.last), marks.at(key, first)
     turn = before.turn + end.heading - begin.heading if turns else 0.0
@@ -216,20 +216,20 @@ def _following(
 
 
 def _turned(x: float, z: float, angle: float) -> tuple[float, float]:
-    """A level place, turned about the vertical."""
+    """Rotate a floor position about the vertical."""
     return x * cos(angle) + z * sin(angle), z * cos(angle) - x * sin(angle)
 
 
 def performance(parts: Sequence[Part], movement: Movements) -> Motion:
-    """Return a piece's parts as one movement, its insertions marked, and whose the rest is by how long parts last.
+    """Join a piece's parts into one movement, with insertions marked and credits weighted by the parts' durations.
 
     Args:
         parts: the parts, in order, at least one.
         movement: returns movements by key.
 
     Raises:
-        MotionMindError: there is nothing, or a movement or a frame of it is missing.
-        SkeletonError: the parts are on different skeletons.
+        MotionMindError: there are no parts, or a movement or a frame is missing.
+        SkeletonError: the parts have different skeletons.
     """
     if not parts:
         raise MotionMindError("the piece is empty: put a posture or a stretch of movement into it first")
@@ -250,7 +250,7 @@ def performance(parts: Sequence[Part], movement: Movements) -> Motion:
         check_body(parts[0].key, whole, part.key, motion)
         begin, stop = part.first, part.last + 1
         if part.inserted:
-            begin, stop = begin + 1, stop - 1  # its ends are the postures beside it
+            begin, stop = begin + 1, stop - 1  # its end frames repeat the neighbours' postures
         elif place and _repeats(parts[place - 1], part):
             begin += 1
         clock = part.at - float(motion.times[part.first])
@@ -265,5 +265,5 @@ def performance(parts: Sequence[Part], movement: Movements) -> Motion:
 
 
 def _repeats(before: Part, part: Part) -> bool:
-    """Whether a part begins with the posture, at the moment, with which the one before it ended."""
+    """Return whether a part begins with the frame that the previous one ended with."""
     return not before.inserted and before.key == part.key and before.last == part.first

@@ -1,4 +1,4 @@
-"""The pose editor's routes: open a posture, drag it, turn a joint of it, bring it to what the corpus knows, keep it."""
+"""Routes of the pose editor: open a posture, drag it, turn a joint, bring it closer to the corpus, store it."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from motionmind.studio.score_lines import score_lines
 if TYPE_CHECKING:
     from motionmind.studio.studio import Studio
 
-_UNIT = 1e-3  # by which a rotation's length may differ from 1: pages round
-_REACH = 1e4  # metres from the middle of the floor at which nothing is posed
+_UNIT = 1e-3  # tolerance of a quaternion's length: the page rounds
+_REACH = 1e4  # metres from the origin, at most
 
 Name = Annotated[str, msgspec.Meta(max_length=200)]
 Metres = Annotated[float, msgspec.Meta(ge=-_REACH, le=_REACH)]
@@ -36,12 +36,12 @@ Coefficient = Annotated[float, msgspec.Meta(ge=-2.0, le=2.0)]
 
 
 class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A posture as the page holds it.
+    """A posture as the page sends it.
 
     Attributes:
-        key: a movement on the same body.
+        key: key of a movement of the same body.
         rotations: x, y, z, w of each joint in turn, local to the parent [4 J].
-        root: place of the root, metres.
+        root: position of the root, metres.
     """
 
     key: Key
@@ -57,13 +57,13 @@ class Opening(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Dragging(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A request to drag a joint to a place.
+    """A request to drag a joint to a position.
 
     Attributes:
-        pose: where the body is.
-        start: where it was when the drag began.
-        joint: the joint or the heel that is dragged.
-        place: where to, metres.
+        pose: the posture.
+        start: the posture when the drag began.
+        joint: the joint or heel to drag.
+        place: target position, metres.
         standing: the last joints of the feet that stay.
     """
 
@@ -90,13 +90,13 @@ class Telling(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Changing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A request for another posture, made of one.
+    """A request to change a posture.
 
     Attributes:
         pose: the posture.
-        to: "mirror" exchanges left and right, "floor" puts it on the floor, "known" brings it joint by joint to what
-            the corpus knows, "whole" to the corpus's nearest posture.
-        kept: the joint or the heel that stays in its place, if that can be.
+        to: "mirror" exchanges left and right, "floor" puts it on the floor, "known" turns each joint to an orientation
+            in the corpus, "whole" takes the corpus's nearest posture.
+        kept: the joint or heel that keeps its place, if possible.
     """
 
     pose: Pose
@@ -105,21 +105,21 @@ class Changing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Keeping(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A request to keep a posture in the project, or to write it as lines of a score."""
+    """A request to store a posture in the project, or to write it as lines of a score."""
 
     pose: Pose
     name: Annotated[str, msgspec.Meta(min_length=1, max_length=80)]
 
 
 class Poser:
-    """Answers to what the editor asks."""
+    """Answers to the editor's requests."""
 
     def __init__(self, studio: Studio) -> None:
         self._studio = studio
         self._memories: dict[str, tuple[object, Memory]] = {}
 
     def opened(self, asked: Opening) -> dict[str, Any]:
-        """Return a frame of a movement, and all that the editor shows of its body."""
+        """Return a frame of a movement, with what the editor shows of its body."""
         motion = self._studio.movements.get(asked.key)
         if asked.frame >= len(motion):
             raise MotionMindError(f"{asked.key} has frames 0 to {len(motion) - 1}, no frame {asked.frame}")
@@ -139,7 +139,7 @@ class Poser:
         }
 
     def dragged(self, asked: Dragging) -> dict[str, Any]:
-        """Return the posture that a drag leads to."""
+        """Return the posture after a drag."""
         posture, start = self.posture(asked.pose), self.posture(asked.start)
         found = drag(posture, asked.joint, np.array(asked.place), start=start, standing=asked.standing)
         return self.told(found, turns=False)
@@ -149,7 +149,7 @@ class Poser:
         return self.told(turned(self.posture(asked.pose), asked.joint, asked.angle, asked.degrees))
 
     def changed(self, asked: Changing) -> dict[str, Any]:
-        """Return another posture made of one."""
+        """Return a changed posture."""
         posture = self.posture(asked.pose)
         if asked.to == "mirror":
             return self.told(mirror(posture))
@@ -164,7 +164,7 @@ class Poser:
         return self.told(found) | {"words": f"as in {clip} at {int(seconds // 60)}:{seconds % 60:04.1f}"}
 
     def kept(self, asked: Keeping) -> dict[str, Any]:
-        """Keep the posture in the project, and return the key of it."""
+        """Store the posture in the project, and return its key."""
         return {"key": self._studio.movements.keep(self.posture(asked.pose).as_motion(), asked.name)}
 
     def scored(self, asked: Keeping) -> dict[str, Any]:
@@ -172,7 +172,7 @@ class Poser:
         return {"lines": score_lines(self.posture(asked.pose), asked.name)}
 
     def told(self, posture: Posture, *, turns: bool = True) -> dict[str, Any]:
-        """Return what the editor shows of a posture; of the angles without `turns` only the degrees."""
+        """Return what the editor shows of a posture; without `turns`, only the degrees of its angles."""
         out: dict[str, Any] = {
             "rotations": posture.rotations.reshape(-1).tolist(),
             "root": posture.root.tolist(),
@@ -194,7 +194,7 @@ class Poser:
         return self._memories[name][1]
 
     def posture(self, pose: Pose) -> Posture:
-        """Return the posture that the page holds; MotionMindError if it is none."""
+        """Return the posture that the page sent; raise MotionMindError if it is invalid."""
         skeleton = self._skeleton(pose.key)
         rotations = np.array(pose.rotations)
         if len(rotations) != 4 * len(skeleton):
@@ -211,7 +211,7 @@ class Poser:
 def routes(studio: Studio) -> list[BaseRoute]:
     """Return the routes of the editor."""
     poser = Poser(studio)
-    one = asyncio.Lock()  # at a time: they share what is known of the corpus
+    one = asyncio.Lock()  # one request at a time: all share the corpus's memory
 
     def route(path: str, schema: type[Any], answer: Callable[[Any], dict[str, Any]]) -> Route:
         async def respond(request: Request) -> Response:

@@ -1,7 +1,7 @@
-"""Modules and compiled code that every worker starts with: loaded once, by the process that workers are forked from.
+"""Modules and compiled code for all workers, loaded once by the process that workers are forked from.
 
-Importing the engine and its compiled code takes more than a second, which each worker that takes the place of a
-cancelled one would spend again.
+Importing the engine and its compiled code takes more than a second, which every replacement of a cancelled worker would
+otherwise spend again.
 """
 
 from contextlib import suppress
@@ -11,8 +11,8 @@ from motionmind.codecache import is_all_compiled
 from motionmind.errors import MotionMindError
 from motionmind.tween.engine import Engine
 
-for name in ("alternatives", "seams", "varied", "worker_loop"):  # where jobs are
+for name in ("alternatives", "seams", "varied", "worker_loop"):  # they define the jobs
     import_module(f"motionmind.studio.{name}")
-if is_all_compiled():  # or else it would be compiled here, beside the process that does so
+if is_all_compiled():  # otherwise another process is compiling it
     with suppress(MotionMindError):
         Engine.load("ballet").tween("ballet/arabesque", "ballet/fifth")

@@ -1,4 +1,4 @@
-"""An open project: its facts, its edits, and the state that those of them lead to that are not undone."""
+"""An open project: its findings, its edits, and the state that they lead to."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from motionmind.studio.questions import question_of
 from motionmind.studio.records import Corpora, EditLine, Head, RedoLine, UndoLine, decode_line
 from motionmind.studio.view import chosen_at
 
-_EVERY = 16  # edits after which the state is remembered, so that an undo need not apply all of them again
+_EVERY = 16  # edits between remembered states, so that an undo need not replay all edits
 
 
 class RefusedError(MotionMindError):
-    """Nothing was done, for as things stand it cannot be."""
+    """An edit cannot be applied to the present state; nothing has changed."""
 
 
 @dataclass
@@ -32,10 +32,10 @@ class Change:
     """An edit of the project.
 
     Attributes:
-        number: its number; later edits have greater ones.
+        number: its number; numbers increase.
         edit: the edit.
-        window: the window in which it was done.
-        undone: whether it is taken back.
+        window: the window that made it.
+        undone: whether it is undone.
     """
 
     number: int
@@ -45,18 +45,18 @@ class Change:
 
 
 class Project:
-    """A project that this process holds.
+    """A project that is open in this process.
 
     Attributes:
-        movements: all movement by key.
+        movements: all movements, by key.
         marks: marks of the movements.
-        state: what the edits lead to.
-        versions: the version of each corpus that it names.
-        words: what there is to say of it since it was opened, such as that a corpus has changed.
+        state: the state after its edits.
+        versions: the version of each corpus that it uses.
+        words: notices from its opening, such as that a corpus has changed.
     """
 
     def __init__(self, journal: Journal, home: Path | None = None) -> None:
-        """Read a project's file; errors as of `open`."""
+        """Read a project's file; raise the errors of `open`."""
         self._journal, self._home = journal, home
         self.movements = Movements(journal, home)
         self.marks = Marks(self.movements.get, self.movements.facing)
@@ -64,12 +64,12 @@ class Project:
         self.versions: dict[str, str] = {}
         self.words: list[str] = []
         self._changes: list[Change] = []
-        self._redoable: dict[str, list[Change]] = {}  # by window, the last to be redone first
+        self._redoable: dict[str, list[Change]] = {}  # by window; the last is redone first
         self._findings: dict[str, Finding] = {}
-        self._stood: dict[Pair, tuple[tuple[End, End], Found]] = {}  # what was inserted before it was asked anew
+        self._stood: dict[Pair, tuple[tuple[End, End], Found]] = {}  # insertions from before a new request
         self._subscribers: list[Callable[[], None]] = []
-        self._windows: set[str] = set()  # that were seen since it was opened
-        self._states: list[State] = []  # before the first change, and after each `_EVERY` changes more
+        self._windows: set[str] = set()  # windows seen since the project was opened
+        self._states: list[State] = []  # before the first change, and after every `_EVERY` changes
         self.state = State()
         if journal.dropped:
             self.words.append("the last edit was not written whole when the studio ended, and is gone")
@@ -77,12 +77,12 @@ class Project:
 
     @classmethod
     def create(cls, path: Path, corpus: str, home: Path | None = None, title: str = "") -> Self:
-        """Make a new project with no edits.
+        """Create a project with no edits.
 
         Args:
-            path: its file, which is not there yet.
+            path: its file, which must not exist.
             corpus: the corpus that judges and smooths.
-            home: the folder of the user's corpora; None for the usual one.
+            home: the folder of the user's corpora; None for the default folder.
             title: its title; the file's name by default.
 
         Raises:
@@ -97,7 +97,7 @@ class Project:
         """Open a project.
 
         Raises:
-            FormatError: it is no project, or damaged.
+            FormatError: the file is not a project, or damaged.
             MotionMindError: it is open elsewhere.
         """
         journal = Journal.open(path)
@@ -108,7 +108,7 @@ class Project:
             raise
 
     def close(self) -> None:
-        """Let others open it."""
+        """Close the file and release its lock."""
         self._journal.close()
 
     @property
@@ -118,12 +118,12 @@ class Project:
 
     @property
     def sequence(self) -> int:
-        """A number that grows with whatever the project comes to hold."""
+        """A number that grows with each line of the file."""
         return self._journal.count
 
     @property
     def changes(self) -> tuple[Change, ...]:
-        """All edits in order, those that are undone too."""
+        """All edits in order, with the undone ones."""
         return tuple(self._changes)
 
     def tell(self, address: str) -> None:
@@ -131,50 +131,50 @@ class Project:
         self._journal.tell(address)
 
     def subscribe(self, callback: Callable[[], None]) -> None:
-        """Have a function called after each edit, undo, redo and finding."""
+        """Call a function after each edit, undo, redo and finding."""
         self._subscribers.append(callback)
 
     @property
     def missing(self) -> list[str]:
-        """Corpora, clips and files that the piece needs and that are not there, a line each."""
+        """Corpora and frames that the piece needs and lacks, a line each."""
         return missing_in(self.state, self.movements.has, self.marks)
 
     def look_again(self, corpus: str) -> None:
-        """Look at a corpus again that was made anew or deleted."""
+        """Reload a corpus that was rebuilt or deleted."""
         self.movements.forget(corpus)
         self.marks.forget()
         self._check_corpora(dict(self.versions))
-        self.state = replace(self.state)  # for whoever looks at each state once
+        self.state = replace(self.state)  # a new object, which subscribers treat as a new state
         self._changed()
 
     # --- findings ---------------------------------------------------------------------------------------------------
 
     def question(self, seam: Seam) -> str:
-        """Return the question that a seam asks."""
+        """Return the hash of a seam's question."""
         return question_of(seam.ends, seam.verdict.ask, self.corpus_at(seam), self.versions)
 
     def corpus_at(self, seam: Seam) -> str:
-        """Return the name of the corpus that judges a seam: the piece's, or that of an insertion that is locked."""
+        """Return the name of the corpus that judges a seam: the locked insertion's, or else the piece's."""
         return seam.verdict.corpus or self.state.corpus
 
     def finding(self, seam: Seam) -> Finding | None:
-        """Return what is known of a seam."""
+        """Return the finding at a seam, if there is one."""
         return self._findings.get(self.question(seam))
 
     def standing(self, seam: Seam) -> Found | None:
-        """Return what was inserted at a seam before it was asked anew, to stand there until that is answered; None if
-        nothing was, or it is discarded, or its sides are others now."""
+        """Return the insertion from before a new request at a seam, which stays until the request is answered; None if
+        there was none, it is discarded, or the seam's sides have changed."""
         ends, found = self._stood.get(seam.pair, (None, None))
         return found if ends == seam.ends and seam.verdict.decision != "discarded" else None
 
     def lacks(self, seam: Seam) -> bool:
-        """Return whether something is missing without which a seam can be neither judged nor smoothed."""
+        """Return whether a corpus or a frame is missing that is needed to judge and smooth a seam."""
         ends = [(end.key, end.frame) for end in seam.ends]
         passed = [(one.posture, one.frame) for one in seam.verdict.ask.passing]
         return not (self.movements.has(self.corpus_at(seam)) and all(self.marks.has(*at) for at in ends + passed))
 
     def keep_finding(self, finding: Finding) -> None:
-        """Keep what was found at a seam; MotionMindError if it cannot be written."""
+        """Store a finding; raise MotionMindError if it cannot be written."""
         if self._findings.get(finding.finding) != finding:
             self._journal.append(finding)
             self._findings[finding.finding] = finding
@@ -186,7 +186,7 @@ class Project:
         """Apply an edit.
 
         Raises:
-            RefusedError: it cannot be applied as things stand.
+            RefusedError: it cannot be applied to the present state.
             MotionMindError: it cannot be written.
         """
         self.greet(window)
@@ -211,10 +211,10 @@ class Project:
         self._changed()
 
     def undo(self, window: str) -> None:
-        """Take back a window's last edit.
+        """Undo a window's last edit.
 
         Raises:
-            RefusedError: there is none, or a later edit of another window rests on it.
+            RefusedError: there is none, or a later edit of another window depends on it.
             MotionMindError: it cannot be written.
         """
         self.greet(window)
@@ -228,7 +228,7 @@ class Project:
         self._changed()
 
     def redo(self, window: str) -> None:
-        """Do again what a window took back last; errors as of `undo`."""
+        """Redo the edit that a window undid last; raise the errors of `undo`."""
         self.greet(window)
         if not (stack := self._redoable.get(window)):
             raise RefusedError("this window has nothing to do again")
@@ -240,32 +240,32 @@ class Project:
         self._changed()
 
     def undoable(self, window: str) -> str | None:
-        """Say what `undo` would take back; None if there is nothing."""
+        """Describe the edit that `undo` would undo; None if there is none."""
         change = self._last(window)
         return words_of(change.edit) if change else None
 
     def redoable(self, window: str) -> str | None:
-        """Say what `redo` would do again; None if there is nothing."""
+        """Describe the edit that `redo` would redo; None if there is none."""
         stack = self._redoable.get(window)
         return words_of(stack[-1].edit) if stack else None
 
     def forget(self, window: str) -> bool:
-        """Note that a window is gone for good: what it did, all others may take back; returns whether it was there."""
+        """Note that a window is gone, so that all others may undo its edits; return whether it was known."""
         was_there = window in self._windows
         self._windows.discard(window)
         return was_there
 
     def greet(self, window: str) -> None:
-        """Note that a window is there: what it did, it alone takes back."""
+        """Note that a window is open, so that it alone may undo its edits."""
         self._windows.add(window)
 
     def _last(self, window: str) -> Change | None:
-        """The last change that a window may take back: its own, or one from before the project was opened."""
+        """Return the last change that a window may undo: its own, or one of a window that is not open."""
         mine = (one for one in reversed(self._changes) if not one.undone)
         return next((one for one in mine if one.window == window or one.window not in self._windows), None)
 
     def _without_conflict(self, change: Change, *, undone: bool) -> State:
-        """Return the state with a change undone or redone; RefusedError if a later one rests on what it changes."""
+        """Return the state with a change undone or redone; raise RefusedError if a later one depends on it."""
         place = self._changes.index(change)
         later = [one for one in self._changes[place + 1 :] if not one.undone]
         places, words = touched(change.edit), words_of(change.edit)
@@ -295,7 +295,7 @@ class Project:
         self._remember(state)
 
     def _remember(self, state: State) -> None:
-        """Set the state, and remember it or those before it that are to be remembered."""
+        """Set the state, and remember the states due after every `_EVERY` changes."""
         self.state = state
         while len(self._states) * _EVERY <= len(self._changes):
             place, reached = len(self._states) * _EVERY, self._states[-1]
@@ -310,7 +310,7 @@ class Project:
     # --- the file ---------------------------------------------------------------------------------------------------
 
     def _read(self) -> None:
-        """Read all lines, and see whether everything is there that the state needs."""
+        """Read all lines, apply the edits, and compare the corpora with those on record."""
         changes: dict[int, Change] = {}
         written: dict[str, str] = {}
         start = State()
@@ -358,14 +358,14 @@ class Project:
         self.state = state
 
     def _check_corpora(self, written: Mapping[str, str]) -> None:
-        """Compare the corpora that there are with those that the project was made with."""
+        """Compare the existing corpora with the versions on record."""
         changed = []
         used = corpora_of(self.state) | {self.corpus_at(seam) for seam in self.state.seams}
         for name in sorted(used | set(written)):
             try:
                 version = version_of(name, self._home)
             except MotionMindError:
-                if name in used and name in written:  # what was found beside it stays found
+                if name in used and name in written:  # its findings stay valid
                     self.versions[name] = written[name]
                 continue
             if version != written.get(name, version):
@@ -377,7 +377,7 @@ class Project:
             self._journal.append(Corpora({name: self.versions[name] for name in changed}))
 
     def _note_versions(self, state: State) -> None:
-        """Write down the versions of corpora that a state uses for the first time."""
+        """Record the versions of corpora that a state uses for the first time."""
         new = {name: version_of(name, self._home) for name in sorted(corpora_of(state) - self.versions.keys())}
         if new:
             self._journal.append(Corpora(new))

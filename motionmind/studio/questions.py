@@ -1,4 +1,4 @@
-"""Questions at the seams, each by a name under which its answer is kept."""
+"""Hashes of the questions at seams; the project stores answers under them."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from motionmind.studio.piece import MIRRORED, End
 
 
 def question_of(ends: tuple[End, End], ask: Ask, corpus: str, versions: Mapping[str, str]) -> str:
-    """Return the hash of all that the answer at a seam depends on, in hexadecimal.
+    """Return the hash, in hexadecimal, of everything that the answer at a seam depends on.
 
     Args:
         ends: both sides of the seam.
-        ask: the wish.
+        ask: the request.
         corpus: name of the corpus that judges.
         versions: the version of each corpus that the project uses, by name.
     """

@@ -1,12 +1,12 @@
-"""Inverse kinematics: the posture nearest to one that is, in which a joint is where somebody drags it.
+"""Inverse kinematics: find the posture closest to a given one in which a joint is where the user drags it.
 
-Feet that stand stay, and nothing sinks into the floor; the dragged joint goes to its place as far as that leaves
-room; all joints stay near where they were when the drag began. Each step is a damped least-squares step on the joints'
-angles, and an angle that would leave its limits stops there while the others make up for it. Sources: Wampler,
+Standing feet stay, and nothing sinks into the floor; the dragged joint reaches its target as far as these allow; all
+joints stay close to their angles at the start of the drag. Each step is a damped least-squares step on joint angles;
+an angle that would exceed its limit stops there, and the others compensate. Sources: Wampler,
 "Manipulator inverse kinematic solutions based on vector formulations and damped least-squares methods", IEEE
 Transactions on Systems, Man and Cybernetics 16 (1986); for limits Baerlocher and Boulic, "An inverse kinematics
-architecture enforcing an arbitrary number of strict priority levels", The Visual Computer 20 (2004). Their strict order
-of wishes was tried: where a standing foot and limits leave no room it is unstable, and weights are not.
+architecture enforcing an arbitrary number of strict priority levels", The Visual Computer 20 (2004). Unlike theirs,
+our targets have weights, not strict priorities, which are unstable if a standing foot and limits leave no freedom.
 """
 
 from __future__ import annotations
@@ -24,32 +24,32 @@ from motionmind.body.support import size_of
 from motionmind.geometry import rotations as rot
 from motionmind.studio.joint_angles import JointAngles
 
-STANDS = 0.04  # metres above the floor below which a foot's sole stands, of a body as large as a person
-SNAPS = 0.04  # metres above its height in a foot that is flat within which a dragged joint puts its foot on the floor
-FOOT = 0.12  # metres above the sole at rest up to which a joint is a part of the foot
-LEVEL = 0.02  # metres by which heels that rise together differ in height at most
-SOLE = 0.03  # metres above a foot's lowest point at rest of what is its sole
-# Of a miss of a metre: feet and floor count most, at the end even more, then the dragged joint, then where joints were.
+STANDS = 0.04  # metres: a sole point stands on the floor below this height, for a body of human size
+SNAPS = 0.04  # metres: a joint dragged to within this of its height in a flat foot snaps the foot to the floor
+FOOT = 0.12  # metres above the sole at rest, up to which a joint belongs to the foot
+LEVEL = 0.02  # metres: heels that differ less in height rise together
+SOLE = 0.03  # metres above a foot's lowest point at rest, up to which points belong to its sole
+# Weights relative to the dragged joint: feet and floor, the same at the end, the pull back to the start.
 _KEPT, _KEPT_AT_LAST, _PULL = 10.0, 100.0, 0.02
-_JUDGED = 0.1  # how much less feet count where a step is judged: a foot that a step lifts a little, the next puts back
-_DAMPING = 0.01  # metres for a radian of a step: a bone stretched straight does not jerk
-_ROUNDS, _SETTLING = 14, 14  # steps at most with the pull to where joints were, then without it
-_TRIES = 6  # to find the angles that stop at their limits in a step
-_AT_REST, _SLOW, _SMALL = 1e-6, 1e-3, 1e-9  # radians of a step, share and square metres of a gain, at which steps end
-_CLEAR = 1e-4  # metres by which a point may be under the floor
-_STRIDE = 0.25  # metres that a step goes at most, of a body as large as a person
-_FURTHEST = 0.4  # radians that an angle changes in a step at most
-_TRUNK, _ROOT, _TRAVEL = 0.4, 0.25, 0.15  # how readily trunk and root turn beside limbs, and metres to a radian
-_RISE = 2.0  # metres to a radian by which the body rises with its heels
+_JUDGED = 0.1  # factor of the feet's weight in the cost that accepts a step: the next step corrects a slight lift
+_DAMPING = 0.01  # metres a radian: keeps a stretched limb from jerking
+_ROUNDS, _SETTLING = 14, 14  # steps, at most, with the pull back to the start, then without
+_TRIES = 6  # rounds, at most, to find the angles that stop at their limits in a step
+_AT_REST, _SLOW, _SMALL = 1e-6, 1e-3, 1e-9  # end of steps: radians of a step, relative gain, gain in square metres
+_CLEAR = 1e-4  # metres that a point may be below the floor
+_STRIDE = 0.25  # metres of a step, at most, for a body of human size
+_FURTHEST = 0.4  # radians of an angle in a step, at most
+_TRUNK, _ROOT, _TRAVEL = 0.4, 0.25, 0.15  # mobility of trunk and root relative to limbs; of travel, metres a radian
+_RISE = 2.0  # mobility of the body's rise with its heels, metres a radian
 
 
 class Wishes(NamedTuple):
-    """Wished places of points, each along one direction.
+    """Target positions of points, each along one direction.
 
     Attributes:
-        points: numbers of the points [R].
+        points: indices of the points [R].
         directions: unit vectors [R, 3].
-        places: along these, metres [R].
+        places: targets along these, metres [R].
     """
 
     points: Ints
@@ -57,12 +57,12 @@ class Wishes(NamedTuple):
     places: Floats
 
     def and_also(self, other: Wishes) -> Wishes:
-        """Return these and other wishes."""
+        """Concatenate two sets of targets."""
         return Wishes(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
 
 class _Problem(NamedTuple):
-    """The weighted sum of squares of a drag: what is kept, what is wished, and the way back to where joints were."""
+    """The least-squares problem of a drag: targets of feet and of the dragged joint, and the weights."""
 
     kept: Wishes
     wished: Wishes
@@ -73,16 +73,16 @@ class _Problem(NamedTuple):
 def drag(
     posture: Posture, joint: str, place: Floats, *, start: Posture | None = None, standing: Sequence[str] | None = None
 ) -> Posture:
-    """Return the posture with a joint at a place, or as near to it as the body reaches.
+    """Return the posture with a joint at a target position, or as close to it as the body reaches.
 
     Args:
-        posture: where the body is.
-        joint: the joint that is dragged, or a heel, "left_heel". Heels of feet that stand rise and sink over the
-            balls, which stay; others go along that were as high.
-        place: where to [3], metres.
-        start: the posture in which the drag began, near which joints stay; `posture` by default.
-        standing: the last joints of the feet that stay where they are in `start`; None for all that stand there. The
-            foot that the dragged joint is a part of never stays.
+        posture: the posture to begin with.
+        joint: the joint to drag, or a heel, "left_heel". The heel of a standing foot rises and sinks over the ball,
+            which stays; other heels at the same height follow.
+        place: target position [3], metres.
+        start: the posture when the drag began, which joints stay close to; `posture` by default.
+        standing: the last joints of the feet that stay as in `start`; None for all feet that stand there. The foot of
+            the dragged joint never stays.
 
     Raises:
         SkeletonError: there is no such joint or heel.
@@ -98,7 +98,7 @@ def drag(
 
 
 def place_of(posture: Posture, joint: str) -> Floats:
-    """Return the place of a joint or a heel [3], metres; SkeletonError if there is none."""
+    """Return the position of a joint or a heel [3], metres; raise SkeletonError if there is none."""
     points, heels = contact_points(posture.skeleton, posture.rotations, posture.root)[0], [*heels_of(posture.skeleton)]
     number = 2 * len(posture.skeleton) + heels.index(joint) if joint in heels else posture.skeleton.index(joint)
     return np.asarray(points[number])
@@ -111,19 +111,19 @@ def standing_feet(posture: Posture) -> list[str]:
 
 
 def standing_soles(posture: Posture) -> Ints:
-    """Return the points of soles that stand on the floor, as numbers in `motionmind.body.contact.contact_points`."""
+    """Return the sole points that stand on the floor, as indices into `motionmind.body.contact.contact_points`."""
     return _Body(posture).kept(None, None).points[::3]
 
 
 def plant(posture: Posture, before: Posture) -> Posture:
-    """Return the posture with the soles where they stand in another, on the same body."""
+    """Return the posture with the soles where they stand in another posture of the same body."""
     kept, body = _Body(before).kept(None, None), _Body(posture)
     nothing = _heights(kept.points[:0], np.zeros(0))
     return body.solve(posture, kept, nothing, travels=True)
 
 
 def put_on_floor(posture: Posture) -> Posture:
-    """Return the posture with its lowest point on the floor, and flat on it the feet that are near it then."""
+    """Return the posture lowered or raised to the floor, with the feet near the floor flat on it."""
     lowest = float(contact_points(posture.skeleton, posture.rotations, posture.root)[0][:, 1].min())
     down = Posture(posture.skeleton, posture.rotations, posture.root - np.array([0.0, lowest, 0.0]))
     body = _Body(down)
@@ -137,7 +137,7 @@ def put_on_floor(posture: Posture) -> Posture:
 
 
 class _Body:
-    """A body where a drag begins: its angles, the points that it touches the floor with, and how they move."""
+    """A body at the start of a drag: its angles, its contact points, and their derivatives."""
 
     def __init__(self, start: Posture) -> None:
         self.skeleton = skeleton = start.skeleton
@@ -148,11 +148,11 @@ class _Body:
         upright = np.tile(rot.IDENTITY, (count, 1))
         at_rest, joints = contact_points(skeleton, upright, np.zeros(3))
         self.began = contact_points(skeleton, start.rotations, start.root)[0]
-        # Segments lead from each joint's parent to it, then from joints to their points.
+        # Segments: from each joint's parent to the joint, then from joints to their contact points.
         self.segments = np.concatenate([skeleton.offsets, at_rest[count:] - at_rest[joints[count:]]])
         self.above = np.concatenate([skeleton.parents, joints[count:]])
         carries = self.angles.carries
-        # The last point on the way to each point [P] that goes round a joint [J] as it turns; the joint if none does.
+        # The last point on the path to each point [P] that rotates around a joint [J]; the joint itself if none does.
         self.last = np.tile(np.arange(count), (len(joints), 1))
         for point, above in enumerate(self.above[1:], start=1):
             self.last[point] = np.where(carries[above], point, self.last[above])
@@ -175,11 +175,11 @@ class _Body:
         return out
 
     def low(self, points: Ints) -> Bools:
-        """Return which points stood on the floor when the drag began."""
+        """Return which points stood on the floor at the start of the drag."""
         return np.asarray(self.began[points, 1] <= STANDS * self.size)
 
     def _foot_of(self, joint: int) -> int | None:
-        """Return the last joint of the foot that a joint is a part of; None if it is of none."""
+        """Return the last joint of a joint's foot; None if the joint is in no foot."""
         for limb in self.limbs:
             for leaf in set(limb) & set(self.soles):
                 if joint in limb and self.above_sole(joint, leaf) <= FOOT * self.size:
@@ -187,13 +187,13 @@ class _Body:
         return None
 
     def above_sole(self, joint: int, leaf: int) -> float:
-        """Return how high a joint is above the sole of its foot at rest, metres."""
+        """Return the height of a joint above the sole of its foot at rest, metres."""
         return float(self.heights[joint] - self.heights[self.soles[leaf]].min())
 
     # --- wishes ---------------------------------------------------------------------------------------------------
 
     def kept(self, standing: Sequence[str] | None, dragged: int | None) -> Wishes:
-        """Return the wish that feet stay where they stand."""
+        """Return the targets that hold standing feet in place."""
         own = None if dragged is None else self._foot_of(dragged)
         names = self.skeleton.names
         feet = [leaf for leaf in self.soles if leaf != own and (standing is None or names[leaf] in standing)]
@@ -204,10 +204,10 @@ class _Body:
         return self._where_they_were(chosen)
 
     def rise(self, standing: Sequence[str] | None, heel: int, place: Floats) -> tuple[Wishes, Wishes]:
-        """Return the wishes that balls of feet stay where they stand, and for the height of a heel over its ball.
+        """Return the targets that hold the balls of feet in place, and those for the height of a heel.
 
-        Other heels go along that were as high, and the body rises rather than bend its knees, unless another foot is on
-        the floor that does not go along. Of a foot that does not stand the heel is dragged like any other point.
+        Other heels at the same height follow, and the body rises rather than bend its knees, unless another foot stays
+        flat on the floor. The heel of a foot that does not stand is dragged like any other point.
         """
         soles = self.kept(standing, None).points[::3]
         high = self.began[heel, 1]
@@ -222,11 +222,11 @@ class _Body:
         return kept, _heights(np.array(heels), np.full(len(heels), place[1]))
 
     def _where_they_were(self, points: Ints) -> Wishes:
-        """Return the wish that points stay where they were when the drag began."""
+        """Return the targets that hold points where they were at the start of the drag."""
         return Wishes(np.repeat(points, 3), np.tile(np.eye(3), (len(points), 1)), self.began[points].reshape(-1))
 
     def wished(self, dragged: int, place: Floats) -> Wishes:
-        """Return the wish for a joint's place; near the floor a foot is put down flat."""
+        """Return the targets for a dragged joint; near the floor, its foot is put down flat."""
         leaf = self._foot_of(dragged)
         whole = Wishes(np.full(3, dragged), np.eye(3), np.asarray(place, dtype=np.float64))
         if leaf is None:
@@ -240,13 +240,13 @@ class _Body:
     # --- steps ----------------------------------------------------------------------------------------------------
 
     def solve(self, posture: Posture, kept: Wishes, wished: Wishes, *, travels: bool) -> Posture:
-        """Return the posture in which both wishes are met, the first before the second.
+        """Return the posture that meets two sets of targets.
 
         Args:
-            posture: where to begin.
-            kept: the wish that comes first.
-            wished: the wish that comes second.
-            travels: whether the root's place may change.
+            posture: the posture to begin with.
+            kept: targets with the greater weight.
+            wished: targets with the smaller weight.
+            travels: whether the root may move.
         """
         here = np.append(self.angles.of(posture.rotations).reshape(-1), posture.root)
         self.mobile = np.append(self.angles.free.reshape(-1), np.full(3, travels))
@@ -256,7 +256,7 @@ class _Body:
         return Posture(self.skeleton, rot.normalise(self.angles.rotations(here[:-3].reshape(-1, 3))), here[-3:])
 
     def _descend(self, here: Floats, problem: _Problem, rounds: int) -> Floats:
-        """Return angles and root [D] that make the weighted sum of squares less in some rounds, from `here` [D] on."""
+        """Reduce the weighted sum of squares from the angles and root `here` [D]; return new ones [D]."""
         damping, moving = _DAMPING, self._slopes(here)
         cost = self._cost(here, moving[0], problem)
         for _ in range(rounds):
@@ -274,7 +274,7 @@ class _Body:
         return here
 
     def _cost(self, here: Floats, places: Floats, problem: _Problem) -> float:
-        """Return the weighted sum of squares that is to be small."""
+        """Return the weighted sum of squares."""
         sunk = np.minimum(places[:, 1] - self.bottom, 0.0)
         kept = float(np.sum(_missed(problem.kept, places) ** 2) + sunk @ sunk)
         back = self._back(here) * self.mobile
@@ -282,16 +282,16 @@ class _Body:
         return float((_JUDGED * problem.keeping) ** 2 * kept + wished + problem.pull**2 * (back @ back))
 
     def _back(self, here: Floats) -> Floats:
-        """Return the way back to where angles and root were [D], as readily as they go.
+        """Return the displacement back to the starting angles and root [D], divided by their mobility.
 
-        A body that turned goes back the short way round.
+        An unlimited angle goes back the short way round.
         """
         way = self.home - here[:-3].reshape(-1, 3)
         way = np.where(np.isfinite(self.angles.least), way, np.angle(np.exp(1j * way)))
         return np.asarray(np.append(way.reshape(-1), self.start.root - here[-3:]) / self.readily)
 
     def _slopes(self, here: Floats) -> tuple[Floats, Floats]:
-        """Return the places of all points [P, 3], and how far they go for each angle and along each axis [P, 3, D]."""
+        """Return the positions of all points [P, 3] and their derivatives by angles and root [P, 3, D]."""
         angles, root = here[:-3].reshape(-1, 3), here[-3:]
         turned, axes = self.angles.turns(angles)
         bones = rot.mul_vec(turned[np.maximum(self.above, 0)], self.segments)
@@ -307,7 +307,7 @@ class _Body:
         return places, slopes
 
     def _step(self, here: Floats, moving: tuple[Floats, Floats], problem: _Problem, damping: float) -> Floats:
-        """Return the step [D] of angles and root: those at their limits stop, and nothing sinks into the floor."""
+        """Return the step [D] of angles and root; angles stop at limits, and points do not sink into the floor."""
         (places, slopes), (kept, wished, keeping, pull) = moving, problem
         angles = here[:-3].reshape(-1, 3)
         least = np.append((self.angles.least - angles).reshape(-1), np.full(3, -np.inf))
@@ -337,7 +337,7 @@ class _Body:
         return np.clip(step, least, most)
 
     def _rows(self, wishes: Wishes, places: Floats, slopes: Floats) -> tuple[Floats, Floats]:
-        """Return what is missed of wishes [R], a stride at most, and how far each angle brings it [R, D]."""
+        """Return the residuals of targets [R], at most `_STRIDE`, and their derivatives [R, D]."""
         missed = _missed(wishes, places)
         far = np.abs(missed).max(initial=0.0)
         missed = missed * min(1.0, _STRIDE * self.size / max(far, 1e-12))
@@ -345,10 +345,10 @@ class _Body:
 
 
 def _heights(points: Ints, heights: Floats) -> Wishes:
-    """Return the wish that points [R] are as high as said [R]."""
+    """Return targets for the heights [R] of points [R]."""
     return Wishes(points, np.tile([0.0, 1.0, 0.0], (len(points), 1)), heights)
 
 
 def _missed(wishes: Wishes, places: Floats) -> Floats:
-    """Return by how much wishes are missed [R], metres, by points at places [P, 3]."""
+    """Return the residuals of targets [R], metres, for points at `places` [P, 3]."""
     return np.asarray(wishes.places - np.sum(wishes.directions * places[wishes.points], axis=-1))

@@ -1,8 +1,7 @@
-"""Reads a file of movement from a stranger, in a process of its own whose memory and time are limited.
+"""Read an untrusted motion file in a child process with limited memory and time.
 
 The parent puts the file and an order into an empty folder and starts `python -m motionmind.studio.reading` there. The
-child answers with `facts.json`, and each clip's arrays in a file of its own; whatever goes wrong is a line of the
-answer.
+child answers with `facts.json`, which holds any error as one line, and with a file of arrays for each clip.
 """
 
 from __future__ import annotations
@@ -29,19 +28,19 @@ if TYPE_CHECKING:
     from motionmind.body.motion import Motion
     from motionmind.corpus.clip import JointFlip
 
-SUFFIXES = (".bvh", ".glb", ".vrm", ".vrma", ".amc", ".npz", ".json", ".score")  # that can be read alone
-SECONDS = 60.0  # in which a file must be read
-MEMORY = 2 * 2**30  # bytes of addresses; Python's libraries take some hundred million of them
+SUFFIXES = (".bvh", ".glb", ".vrm", ".vrma", ".amc", ".npz", ".json", ".score")  # of files that need no second file
+SECONDS = 60.0  # time limit for a file
+MEMORY = 2 * 2**30  # bytes of address space, of which Python's libraries take a few hundred million
 ORDER, FACTS = "order.json", "facts.json"
-_MOST_FILE = 2**30  # bytes of a file that the child writes
+_MOST_FILE = 2**30  # bytes of a file that the child writes, at most
 _MOST_CLIPS = 500
-_MOST_SHOWN = 12  # faults, and joints, that the facts list
+_MOST_SHOWN = 12  # faults and notes in the facts, at most
 _LINE = 400  # characters
-_ZERO = 1e-3  # radians within which a joint is not turned
-_LEAP = 4.0  # times as far as in any of the next frames: an added first frame lies so far from the second
+_ZERO = 1e-3  # radians: a joint with a smaller rotation counts as not rotated
+_LEAP = 4.0  # an added first pose is this many times as far from the second frame as the next frames from each other
 _LEAST_LEAP = np.radians(10.0)
-_NEXT = 10  # frames
-_ARM_SLOPE = 0.35  # of an arm that is stretched out level; 1 is upright
+_NEXT = 10  # frames that are compared
+_ARM_SLOPE = 0.35  # of a level arm, at most: height over length; 1 is upright
 
 
 class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -49,11 +48,11 @@ class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         file: name of the file in the folder.
-        name: its name where it came from.
+        name: its original name.
         unit: its unit of length; None guesses it.
-        fps: its frames a second; None takes what it states.
+        fps: its frames a second; None takes the file's own.
         asf: name of the file with an AMC's skeleton.
-        scores: files of other scores that were brought, by their names where they came from.
+        scores: files of other uploaded scores, by their original names.
     """
 
     file: str
@@ -65,13 +64,13 @@ class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Fault(msgspec.Struct, frozen=True):
-    """A joint that jumps, as no body can.
+    """A joint that jumps farther than a body can.
 
     Attributes:
         joint: its name.
-        times: how often it does.
-        seconds: when it does first, in the clip.
-        degrees: how far at most.
+        times: number of jumps.
+        seconds: time of the first jump in the clip.
+        degrees: largest jump.
         clip: number of the clip.
     """
 
@@ -88,9 +87,9 @@ class ClipFacts(msgspec.Struct, frozen=True):
     Attributes:
         name: its name.
         frames: number of its frames.
-        seconds: its length.
+        seconds: its duration.
         fps: its frames a second; None for keyframes, which have times of their own.
-        posed_first: whether its first frame seems to be a pose that was put before the recording.
+        posed_first: whether its first frame seems to be a pose, such as a T-pose, added before the recording.
     """
 
     name: str
@@ -104,11 +103,11 @@ class Body(msgspec.Struct, frozen=True):
     """A body that was read.
 
     Attributes:
-        names: of its joints [J].
-        parents: of its joints [J].
-        offsets: of its joints [J][3], metres.
-        tips: of its joints [J][3], metres.
-        name: of the skeleton.
+        names: names of joints [J].
+        parents: parents of joints [J].
+        offsets: offsets of joints [J][3], metres.
+        tips: tips of joints [J][3], metres.
+        name: name of the skeleton.
     """
 
     name: str
@@ -123,17 +122,17 @@ class Facts(msgspec.Struct, frozen=True):
 
     Attributes:
         clips: its clips.
-        body: the body that they move, the corpora's where the file's joints map to it.
+        body: their body; the corpora's body if the file's joints map to it.
         joints: number of the file's own joints.
-        rig: name of the rig that its joints are known as; "" if they are not.
-        people: whether the body is that of corpora of people.
-        filled: joints of the corpora's body that it lacks.
-        height: of a person with such bones, metres: it shows whether the unit is right.
-        unit: the unit that was taken; "" where the format states it.
+        rig: name of the rig, if its joints are known; otherwise "".
+        people: whether the body is human23 or human44.
+        filled: joints of the corpora's body that the file lacks.
+        height: height of a person with such bones, metres, as a check of the unit.
+        unit: the unit in use; "" if the format defines it.
         is_guessed: whether the unit was guessed.
         doubt: how the movement contradicts the clock; "" if it does not.
-        faults: the joints that jump, those first that do so most often; not onto or off a first frame that was added.
-        notes: what was repaired while it was read.
+        faults: joints that jump, the most frequent first, without jumps from an added first frame.
+        notes: warnings and repairs from reading.
     """
 
     clips: tuple[ClipFacts, ...] = ()
@@ -151,7 +150,7 @@ class Facts(msgspec.Struct, frozen=True):
 
 
 class Answer(msgspec.Struct, frozen=True):
-    """The child's answer: facts, or why there are none."""
+    """The child's answer: facts, or an error."""
 
     facts: Facts | None = None
     error: str = ""
@@ -163,7 +162,7 @@ def clip_file(number: int) -> str:
 
 
 def load_clip(folder: Path, facts: Facts, number: int) -> Motion:
-    """Return a clip that the child has read.
+    """Load a clip that the child has read.
 
     Raises:
         MotionMindError: there is no such clip.
@@ -188,7 +187,7 @@ def load_clip(folder: Path, facts: Facts, number: int) -> Motion:
 
 
 def main() -> None:
-    """Read the file of the order in this folder, and answer."""
+    """Read the file of the order in this folder, and write the answer."""
     _limit()
     order = msgspec.json.decode(Path(ORDER).read_bytes(), type=Order)
     try:
@@ -206,7 +205,7 @@ def main() -> None:
 
 
 def _limit() -> None:
-    """Limit this process, where the system can."""
+    """Limit the resources of this process, if the system can."""
     if sys.platform == "win32":
         return
     import resource
@@ -222,14 +221,14 @@ def _limit() -> None:
 
 
 def _worded(message: str, order: Order) -> str:
-    """A message that names the file as its owner knows it, in one line."""
+    """Return a message in one line, with the file's original name."""
     for file, name in ((order.file, order.name), (order.asf or "", "the .asf")):
         message = message.replace(file, name) if file else message
     return displayed(message.replace(f"{Path.cwd()}{os.sep}", ""), _LINE)
 
 
 def _read(order: Order) -> list[Motion]:
-    """Read the clips of a file, each as it is: on the file's own joints."""
+    """Read the clips of a file, on the file's own joints."""
     from motionmind.formats import read_motion
 
     path, stem = Path(order.file), displayed(Path(order.name).stem)
@@ -252,7 +251,7 @@ def _read(order: Order) -> list[Motion]:
 
 
 def _understand(order: Order, motions: list[Motion]) -> Facts:
-    """Write the clips, on the corpora's body where their joints map to it, and say what was understood."""
+    """Write the clips, on the corpora's body if their joints map to it, and return the facts."""
     from motionmind.body.human import human23, human44
     from motionmind.body.tempo import question_tempo
     from motionmind.corpus.flips import find_flips
@@ -303,7 +302,7 @@ def _faults(flips: Sequence[JointFlip], motion: Motion, clip: int) -> Iterator[F
 
 
 def _unit(order: Order) -> tuple[str, bool]:
-    """The unit of a file that does not state its own, and whether it was guessed."""
+    """Return the unit of a file, "" if its format defines one, and whether it was guessed."""
     if order.unit is not None:
         return order.unit, False
     if not order.file.endswith(".bvh"):
@@ -314,9 +313,9 @@ def _unit(order: Order) -> tuple[str, bool]:
 
 
 def is_posed_first(motion: Motion) -> bool:
-    """Tell whether the first frame of a recording seems to be a pose that a program put before it, such as a T-pose.
+    """Return whether the first frame of a recording seems to be a pose that a program added, such as a T-pose.
 
-    It is one from which the body leaps, and in which no joint is turned or both arms are stretched out level.
+    The body leaps away from such a frame, and either no joint is rotated in it or both arms are stretched out level.
     """
     from motionmind.geometry import rotations as rot
 
@@ -330,7 +329,7 @@ def is_posed_first(motion: Motion) -> bool:
 
 
 def _has_level_arms(motion: Motion) -> bool:
-    """Whether both arms are stretched out level in the first frame; never of a body without human arms."""
+    """Return whether both arms are level in the first frame; False for a body without human arms."""
     names = motion.skeleton.names
     if not {"left_shoulder", "left_wrist", "right_shoulder", "right_wrist"} <= set(names):
         return False
@@ -340,5 +339,5 @@ def _has_level_arms(motion: Motion) -> bool:
 
 
 if __name__ == "__main__":
-    atexit.register(gc.freeze)  # at the end Python would look for garbage among all that was imported
+    atexit.register(gc.freeze)  # skips the garbage collection at exit, which is slow
     main()

@@ -1,4 +1,4 @@
-"""Lines of a project's file: what each of them says."""
+"""The kinds of lines in a project's file."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class Head(msgspec.Struct, frozen=True):
 
 
 class Corpora(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """From here on the project uses these versions of corpora, beside those named before."""
+    """Versions of corpora that the project uses from here on, besides those of earlier lines."""
 
     corpora: dict[str, str]
 
 
 class EditLine(msgspec.Struct, frozen=True):
-    """An edit, the number of its line, and the window in which it was done."""
+    """An edit, the number of its line, and the window that made it."""
 
     edit: Edit
     number: int
@@ -37,7 +37,7 @@ class EditLine(msgspec.Struct, frozen=True):
 
 
 class UndoLine(msgspec.Struct, frozen=True):
-    """The number of an edit that is taken back."""
+    """The number of an edit that is undone."""
 
     undo: int
     number: int
@@ -45,7 +45,7 @@ class UndoLine(msgspec.Struct, frozen=True):
 
 
 class RedoLine(msgspec.Struct, frozen=True):
-    """The number of an edit that is done again."""
+    """The number of an edit that is redone."""
 
     redo: int
     number: int
@@ -63,7 +63,7 @@ _KINDS: Mapping[str, Any] = {
 
 
 def decode_line(data: bytes) -> Any:
-    """Decode a line; None if it holds a movement, which is read when it is needed. ValueError if it is damaged."""
+    """Decode a line; None for a movement, which is read on demand; raise ValueError if the line is damaged."""
     fields = msgspec.json.decode(data, type=dict[str, msgspec.Raw])
     if "movement" in fields:
         return None

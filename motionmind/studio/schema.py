@@ -1,6 +1,6 @@
-"""The API in a schema: what each route takes and answers, as types, and as a document of OpenAPI.
+"""The schema of the API: the types of each route's request and answer, and an OpenAPI document.
 
-The page relies on it; tests check every answer that they get against it.
+The page relies on it, and tests check every answer against it.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ class Call(NamedTuple):
     Attributes:
         method: its method.
         path: its path, with parameters in braces.
-        takes: the type of its body; None if it takes none, or a file.
-        answers: the type of its answer; a media type if that is no JSON.
+        takes: the type of its body; None for no body or a file.
+        answers: the type of its answer, or its media type if it is not JSON.
     """
 
     method: str
@@ -99,7 +99,7 @@ CALLS = (
 
 
 def document() -> dict[str, Any]:
-    """Return the API as a document of OpenAPI 3.1."""
+    """Return the API as an OpenAPI 3.1 document."""
     types = [
         kind for call in CALLS for kind in (call.takes, call.answers) if kind is not None and kind.__class__ is not str
     ]

@@ -1,4 +1,4 @@
-"""Scores that take in one another, as somebody brought them: by name among those that were brought, never by a path."""
+"""Resolve `include` lines between uploaded scores: by name among the uploads, never by path."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from unicodedata import normalize
 
 from motionmind.errors import FormatError
 
-_MOST = 100  # scores that one takes in, with theirs
+_MOST = 100  # scores, at most, with all that they include
 
 
 def take_together(file: str, name: str, others: Mapping[str, str]) -> dict[str, str]:
-    """Put a score and those that it takes in into this folder, under names of our own.
+    """Copy a score and the scores that it includes into this folder, under new names.
 
     Args:
         file: the score.
-        name: its name where it came from.
-        others: the files of other scores that were brought, by their names there.
+        name: its original name.
+        others: files of other uploaded scores, by their original names.
 
     Returns:
-        The names where they came from, by those here; the score itself is the first.
+        Original names by new names, that of the score itself first.
 
     Raises:
-        FormatError: it takes in what was not brought, or a body of its own; names the file and the line.
+        FormatError: it includes a score that was not uploaded, or a body file; names the file and the line.
     """
-    here = {name: "score-0.score"}  # by their own names
+    here = {name: "score-0.score"}  # new names by original names
     files = {name: file, **{other: path for other, path in others.items() if other != name}}
     waiting = [name]
     while waiting:
@@ -36,7 +36,7 @@ def take_together(file: str, name: str, others: Mapping[str, str]) -> dict[str, 
             word, *rest = _heading(line).split(maxsplit=1) or [""]
             if word == "include" and rest:
                 wanted, mark, alias = rest[0].partition(" as ")
-                # A path within its owner's folders: what was brought has but a name.
+                # The path is on the user's computer: uploads have only a name.
                 included = PurePosixPath(wanted.strip().replace("\\", "/")).name
                 if included not in files:
                     raise FormatError(f"takes in {included:.60}: bring that score, too", path=Path(own), line=number)
@@ -60,6 +60,6 @@ def _lines(path: Path) -> list[str]:
 
 
 def _heading(line: str) -> str:
-    """A line as the reader of scores sees it, if it is a heading; else ""."""
+    """Return a line as the score reader sees it, if it is a heading; otherwise ""."""
     text = normalize("NFC", line).replace("\t", " ").partition("#")[0].rstrip()
     return "" if text[:1].isspace() else text

@@ -1,4 +1,4 @@
-"""A posture as lines of a score: a position for each layer, and the posture that is made of them."""
+"""Write a posture as lines of a score: a position for each layer, and the posture that combines them."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from motionmind.body.motion import Posture
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 
-_ZERO = 0.5  # degrees: angles that are rounded to 0 are not written
+_ZERO = 0.5  # degrees: angles that round to 0 are not written
 
 
 def score_lines(posture: Posture, name: str) -> str:
-    """Return a posture as it can stand in a score on its body.
+    """Return a posture as lines for a score on the same body.
 
     Angles are in whole degrees, and the body faces the audience. Legs are given by their angles, not as standing.
 
     Args:
         posture: the posture.
-        name: what to call it.
+        name: its name in the score.
 
     Raises:
-        MotionMindError: scores are not written on such a body.
+        MotionMindError: the body is neither human23 nor human44.
     """
     anatomy = anatomy_of(posture.skeleton)
     if anatomy is None:

@@ -1,4 +1,4 @@
-"""The server of the studio: listens at a socket until Ctrl-C, and then ends at once."""
+"""The server of the studio: it listens on a socket until Ctrl-C, and then stops at once."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from motionmind.studio.app import app
 from motionmind.studio.studio import Studio
 from motionmind.studio.token import Keys
 
-_AT_ONCE = 100  # connections
-_IDLE = 30  # seconds that a connection without a request stays open
-_LAST = 2  # seconds for answers that are on their way when the server ends
+_AT_ONCE = 100  # connections, at most
+_IDLE = 30  # seconds that an idle connection stays open
+_LAST = 2  # seconds for answers in progress when the server stops
 
 
 class Server(uvicorn.Server):
-    """A server that ends the streams of events when it is to end, for they would never end by themselves."""
+    """A server that closes the event streams when it stops, because they never end by themselves."""
 
     def __init__(self, studio: Studio, keys: Keys, host: str, port: int, ready: Callable[[], None]) -> None:
         """Set up the server of a studio.
 
         Args:
             studio: the studio.
-            keys: who is let in.
-            host: the name or address at which it listens.
+            keys: admits requests.
+            host: the name or address to listen on.
             port: its port.
-            ready: called once it answers.
+            ready: called once the server answers.
         """
         config = uvicorn.Config(
             app(studio, keys, host, port),
-            http="h11",  # which limits the headers of a request
+            http="h11",  # limits the size of request headers
             log_level="error",
             access_log=False,
             ws="none",
@@ -44,11 +44,11 @@ class Server(uvicorn.Server):
         self._studio, self._ready = studio, ready
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Begin to listen."""
+        """Start to listen."""
         await super().startup(sockets)
         self._ready()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """End the streams, then the server."""
+        """Close the streams, then stop the server."""
         self._studio.events.close()
         await super().shutdown(sockets)

@@ -1,7 +1,7 @@
-"""Hands and feet that stay in their place in the room for a part of an insertion's way.
+"""Hold hands and feet in place in the room during a part of an insertion.
 
-The limb that they hang from makes up for what the rest of the body does, after the movement has been found: states are
-many degrees wide, and a search that held one would leave the hand some centimetres off.
+The limb compensates for the rest of the body after the search: states are many degrees wide, and a search that held
+one would leave the hand some centimetres off.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from motionmind.display import displayed
 from motionmind.geometry import rotations as rot
 from motionmind.studio.edits import Ask, Pin
 
-_EASES = 0.3  # seconds at least in which a limb comes to its place, and leaves it
-_HASTE = 0.6  # body heights a second by which it is faster then, at most where there is time
-_MISSED = 0.01  # metres by which a place may be missed without a word
+_EASES = 0.3  # seconds, at least, in which a limb reaches or leaves its place
+_HASTE = 0.6  # body heights a second that this adds to its speed, at most, if time allows
+_MISSED = 0.01  # metres: a greater miss is reported
 
 
 def stays_of(ask: Ask, skeleton: Skeleton) -> list[Pin]:
-    """Return those of a wish's pins that stay in a place; SkeletonError if the body has no such joint."""
+    """Return a request's pins with hold "place"; raise SkeletonError if the body lacks a joint."""
     found = [pin for pin in ask.pins if pin.hold == "place"]
     for pin in found:
         skeleton.index(pin.joint)
@@ -33,14 +33,14 @@ def stays_of(ask: Ask, skeleton: Skeleton) -> list[Pin]:
 
 
 def in_place(motion: Motion, pins: Sequence[Pin]) -> tuple[Motion, list[str]]:
-    """Return a movement in which hands and feet stay in their places, and words on what is missed.
+    """Return a movement in which hands and feet stay in place, and messages about misses.
 
-    A place is where the hand or foot is as the pin begins; or as the movement ends, where the pin ends with it and does
-    not begin with it. The first and the last frame are not changed.
+    The place is where the hand or foot is when the pin begins; for a pin that lasts until the end but begins later than
+    the movement, where it is at the end. The first and the last frame do not change.
 
     Args:
         motion: the movement.
-        pins: what stays, each from `begins` to `ends`.
+        pins: the hands and feet, each held from `begins` to `ends`.
     """
     rotations, words = motion.rotations.copy(), []
     for pin in pins:
@@ -56,24 +56,24 @@ def in_place(motion: Motion, pins: Sequence[Pin]) -> tuple[Motion, list[str]]:
 
 
 def _limb(joint: str) -> str:
-    """Return what hangs from a joint, in words."""
+    """Return a hand or a foot in words, by its joint."""
     return displayed(joint).replace("wrist", "hand").replace("ankle", "foot").replace("_", " ")
 
 
 def _weights(motion: Motion, pin: Pin, away: Floats) -> Floats:
-    """Return how far a joint is in its place in each frame [T], from 0 to 1.
+    """Return the weight of a joint's place in each frame [T], from 0 to 1.
 
-    It eases in and out, unless it is there as the movement begins or ends.
+    It eases in and out, except at an end of the movement where the joint is in place.
 
     Args:
         motion: the movement.
-        pin: from when to when it stays.
-        away: the joint's way from its place in each frame [T, 3], metres.
+        pin: the joint, and when it stays.
+        away: the joint's displacement from its place in each frame [T, 3], metres.
     """
     seconds = motion.times - motion.times[0]
     long = float(seconds[-1])
     first, last = pin.begins * long, pin.ends * long
-    # The steepest of an ease is half as steep again as the whole.
+    # The greatest slope of the ease is 1.5 times its mean.
     ways = np.linalg.norm([away[np.searchsorted(seconds, at - 1e-9)] for at in (first, last)], axis=1)
     eases = np.maximum(1.5 * ways / (_HASTE * motion.skeleton.height), _EASES)
     ramps = np.ones((2, len(seconds)))
@@ -81,7 +81,7 @@ def _weights(motion: Motion, pin: Pin, away: Floats) -> Floats:
         first = max(first, min(_EASES, 0.25 * long))
         ramps[0] = 1.0 - (first - seconds) / min(float(eases[0]), first)
     if pin.ends < 1.0 or pin.begins == 0.0:
-        room = float(eases[1]) if pin.ends == 1.0 else _EASES  # to get away from there
+        room = float(eases[1]) if pin.ends == 1.0 else _EASES  # seconds to leave the place
         last = min(last, max(long - room, 0.5 * (first + last)))
         ramps[1] = 1.0 - (seconds - last) / min(float(eases[1]), long - last)
     ramp = np.clip(ramps.min(axis=0), 0.0, 1.0)
@@ -90,7 +90,7 @@ def _weights(motion: Motion, pin: Pin, away: Floats) -> Floats:
 
 
 def _hold(motion: Motion, rotations: Floats, joint: int, weights: Floats, anchor: int) -> float:
-    """Turn a limb in `rotations` so that its joint stays where it is in a frame; return the farthest miss, metres."""
+    """Turn a limb in `rotations` to hold its joint where it is in frame `anchor`; return the largest miss, metres."""
     skeleton, missed = motion.skeleton, 0.0
     place = skeleton.positions(rotations[anchor], motion.root[anchor])[joint]
     facing = skeleton.global_rotations(rotations[anchor])[joint]

@@ -1,4 +1,4 @@
-"""Small pictures of postures, on transparent paper, so that they stand on light and dark pages alike."""
+"""Small pictures of postures with a transparent background, for light and dark pages alike."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ from motionmind.render.solids import posture_solids
 from motionmind.render.view import VIEWS, to_view
 
 SMALLEST, LARGEST = 32, 480  # pixels of a picture's height
-HEIGHT = 96  # of one in the gallery, as movements.js has it
-_WIDE = 0.9  # of its height
-_ROOM = 1.32  # of the body's height that a picture shows, for raised arms
-_HELD = 16 * 2**20  # bytes of pictures that are kept in memory
+HEIGHT = 96  # pixels of a picture in the gallery, as in movements.js
+_WIDE = 0.9  # width over height
+_ROOM = 1.32  # body heights that a picture shows: leaves room for raised arms
+_HELD = 16 * 2**20  # bytes of pictures in the cache
 
 
 class Thumbnails:
-    """Pictures that were drawn, the latest of them kept."""
+    """A cache of pictures, which drops the least recently used."""
 
     def __init__(self) -> None:
         self._held: OrderedDict[tuple[str, int, int], bytes] = OrderedDict()
         self._size = 0
 
     def find(self, key: str, frame: int, height: int) -> bytes | None:
-        """Return the picture of a movement's frame; None if it is yet to be drawn."""
+        """Return the picture of a movement's frame; None if it is not in the cache."""
         if (known := self._held.get((key, frame, height))) is not None:
             self._held.move_to_end((key, frame, height))
         return known
 
     def hold(self, key: str, frame: int, height: int, picture: bytes) -> None:
-        """Keep a picture."""
+        """Add a picture to the cache."""
         if (key, frame, height) not in self._held:
             self._held[key, frame, height] = picture
             self._size += len(picture)
@@ -49,12 +49,12 @@ class Thumbnails:
 
 
 def thumbnail(motion: Motion, frame: int, height: int) -> bytes:
-    """Draw a frame of a motion as PNG, three quarters from the front.
+    """Draw a frame of a motion as PNG, in three-quarter view.
 
     Args:
         motion: the motion, on any skeleton.
         frame: the frame.
-        height: of the picture, pixels.
+        height: height of the picture, pixels.
 
     Raises:
         MotionMindError: there is no such frame, or the height is out of range.
@@ -71,7 +71,7 @@ def thumbnail(motion: Motion, frame: int, height: int) -> bytes:
     tall = max(_ROOM * body.height, 1.08 * (top - bottom), 1.08 * (right - left) / _WIDE)
     wide = ceil(_WIDE * height)
     scale = height / tall
-    # Whoever stands stands at the bottom; whoever leaps is above it.
+    # A standing body stands at the bottom of the picture; a leaping body is above it.
     floor = min(bottom, max(0.0, top - 0.96 * tall)) - 0.04 * tall
     corner = 0.5 * (left + right) - 0.5 * wide / scale, floor + tall
     buffer = DepthBuffer(*corner, SMOOTH * wide, SMOOTH * height, SMOOTH * scale)

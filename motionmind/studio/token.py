@@ -1,7 +1,8 @@
-"""The keys of the studio: a token in the URL that the terminal prints, and the cookie that it is exchanged for.
+"""The keys of the studio: a token in the URL that the terminal prints, and the cookie that the page gets for it.
 
-The token stands in the URL's fragment, which browsers send to no server. The cookie is another secret, so neither gives
-the other away; it is named by the port, since cookies know no ports, and ends with the browser or this process.
+The token is in the URL's fragment, which browsers never send to a server. The cookie is another secret, so neither
+reveals the other; its name contains the port, because browsers share cookies between ports. It expires with the
+browser session or this process.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ class Keys:
     """The secrets of one process.
 
     Attributes:
-        token: the one in the URL.
+        token: the secret in the URL.
     """
 
     def __init__(self) -> None:
@@ -23,20 +24,20 @@ class Keys:
         self._cookie = secrets.token_urlsafe(_BYTES)
 
     def __repr__(self) -> str:
-        return "<Keys>"  # which no log shows
+        return "<Keys>"  # keeps the secrets out of logs
 
     def admits(self, token: str) -> bool:
-        """Whether this is the token."""
+        """Return whether a text is the token."""
         return secrets.compare_digest(token.encode("utf-8", "replace"), self.token.encode())
 
     def is_let_in(self, cookies: str, port: int) -> bool:
-        """Whether the header Cookie of a request holds the cookie."""
+        """Return whether the Cookie header of a request contains the cookie."""
         pairs = (part.strip().partition("=") for part in cookies.split(";"))
         own = [value for name, _, value in pairs if name == _name(port)]
         return len(own) == 1 and secrets.compare_digest(own[0].encode("utf-8", "replace"), self._cookie.encode())
 
     def cookie(self, port: int) -> str:
-        """Return the header Set-Cookie."""
+        """Return the value of the Set-Cookie header."""
         return f"{_name(port)}={self._cookie}; HttpOnly; SameSite=Strict; Path=/"
 
 

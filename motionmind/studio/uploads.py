@@ -1,6 +1,6 @@
-"""Files that somebody brought: kept in a folder of this process, each read by a child (`motionmind.studio.reading`).
+"""Uploaded files: stored in a temporary folder, and each read by a child process (`motionmind.studio.reading`).
 
-Names that come with files are shown and never used as paths: a file gets a name of our own in a folder of its own.
+Original file names are shown but never used as paths: each file gets a new name in a folder of its own.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from motionmind.files import make_room
 from motionmind.formats.units import UNITS
 from motionmind.studio.reading import FACTS, ORDER, SECONDS, SUFFIXES, Answer, Facts, Order, load_clip
 
-MOST_BYTES = 64 * 2**20  # of a file
-_MOST_ALL = 2**30  # bytes of all files
+MOST_BYTES = 64 * 2**20  # of a file, at most
+_MOST_ALL = 2**30  # bytes of all files, at most
 _MOST_FILES = 300
-_AT_ONCE = 2  # files that are read
-_GRACE = 5.0  # seconds that starting a child may take besides
-_SKELETON = ".asf"  # is not read alone
+_AT_ONCE = 2  # files that are read at the same time
+_GRACE = 5.0  # seconds, in addition, to start a child
+_SKELETON = ".asf"  # read only together with an AMC
 _REFUSED = {
     ".fbx": "FBX is not read: open it in Blender (File, Import, FBX) and export glTF (.glb), or BVH",
     ".c3d": "C3D holds markers on the skin, not joints: solve a skeleton from them, and export that as BVH",
@@ -39,13 +39,13 @@ _REFUSED = {
 
 
 class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Answers to what a file leaves open.
+    """The user's choices on how to read a file.
 
     Attributes:
         unit: its unit of length; None guesses it.
-        fps: its frames a second; None takes what it states.
-        asf: id of the upload that is an AMC's skeleton.
-        skip: frames to leave out at the beginning of each clip; None leaves out a pose that was put there.
+        fps: its frames a second; None takes the file's own.
+        asf: id of the upload with an AMC's skeleton.
+        skip: frames to leave out at the beginning of each clip; None leaves out an added first pose.
     """
 
     unit: Annotated[str, msgspec.Meta(max_length=20)] | None = None
@@ -55,16 +55,16 @@ class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Upload(msgspec.Struct, frozen=True):
-    """A file that somebody brought.
+    """An uploaded file.
 
     Attributes:
-        id: its name here.
-        name: its name where it came from, as it is shown.
-        size: bytes.
+        id: its id.
+        name: its original name, for display.
+        size: its size in bytes.
         kind: its suffix, without the dot.
-        choices: the answers with which it was read.
-        facts: what was understood; None if it was not read, or is an AMC's skeleton.
-        error: why it was not read; "" if it was.
+        choices: the choices that it was read with.
+        facts: facts about it; None if it was not read, or is an AMC's skeleton.
+        error: the reason why it was not read; "" if it was.
     """
 
     id: str
@@ -76,14 +76,14 @@ class Upload(msgspec.Struct, frozen=True):
     error: str = ""
 
     def skip(self, clip: int) -> int:
-        """Return the frames that are left out at the beginning of a clip."""
+        """Return the number of frames to leave out at the beginning of a clip."""
         if self.choices.skip is not None:
             return self.choices.skip
         return int(self.facts is not None and self.facts.clips[clip].posed_first)
 
 
 class Uploads:
-    """The files that were brought since the studio was started; they go with it."""
+    """All uploads since the studio started; they are deleted when it ends."""
 
     def __init__(self) -> None:
         self._folder = make_room("studio")
@@ -92,24 +92,24 @@ class Uploads:
         self._reading = asyncio.Semaphore(_AT_ONCE)
 
     def list(self) -> tuple[Upload, ...]:
-        """Return all of them, the earliest first."""
+        """Return all uploads, the earliest first."""
         return tuple(self._uploads.values())
 
     def get(self, upload: str) -> Upload:
-        """Return an upload; MotionMindError if there is none of this id."""
+        """Return an upload; raise MotionMindError if there is none with this id."""
         if upload not in self._uploads:
             raise MotionMindError("this file is no longer here: bring it again")
         return self._uploads[upload]
 
     async def take(self, name: str, chunks: AsyncIterator[bytes]) -> Upload:
-        """Keep a file and read it.
+        """Store a file and read it.
 
         Args:
-            name: its name where it comes from.
+            name: its original name.
             chunks: its content.
 
         Raises:
-            MotionMindError: it is of no kind that can be read, too large, or too much was brought already.
+            MotionMindError: its format is unknown, it is too large, or there are too many uploads.
         """
         shown, suffix = displayed(name), Path(name).suffix.lower()
         if suffix not in (*SUFFIXES, _SKELETON):
@@ -145,10 +145,10 @@ class Uploads:
         return size
 
     async def read(self, upload: str, choices: Choices) -> Upload:
-        """Read an upload, anew if it was read before.
+        """Read an upload, or read it again with other choices.
 
         Raises:
-            MotionMindError: there is no such upload, or a choice is out of its range.
+            MotionMindError: there is no such upload, or a choice is invalid.
         """
         own = self.get(upload)
         if choices.unit is not None and choices.unit not in UNITS:
@@ -172,15 +172,15 @@ class Uploads:
         facts = answer.facts
         error = answer.error if facts is None else ""
         new = msgspec.structs.replace(own, choices=choices, facts=facts, error=error)
-        if upload in self._uploads:  # nobody took it away meanwhile
+        if upload in self._uploads:  # unless it was deleted meanwhile
             self._uploads[upload] = new
         return new
 
     def motion(self, upload: str, clip: int) -> Motion:
-        """Return a clip of an upload, without the frames that are left out.
+        """Return a clip of an upload, without the frames to leave out.
 
         Raises:
-            MotionMindError: there is no such clip, or all of it is left out.
+            MotionMindError: there is no such clip, or no frame is left.
         """
         own = self.get(upload)
         if own.facts is None:
@@ -192,17 +192,17 @@ class Uploads:
         return motion.slice(skip, len(motion)) if skip else motion
 
     def folder(self, upload: str) -> Path:
-        """Return the folder of an upload; MotionMindError if there is none of this id."""
+        """Return the folder of an upload; raise MotionMindError if there is none with this id."""
         return self._place(self.get(upload).id)
 
     def forget(self, upload: str) -> None:
-        """Take an upload away; MotionMindError if there is none of this id."""
+        """Delete an upload; raise MotionMindError if there is none with this id."""
         folder = self.folder(upload)
         del self._uploads[upload]
         shutil.rmtree(folder, ignore_errors=True)
 
     def close(self) -> None:
-        """Take all of them away."""
+        """Delete all uploads."""
         self._uploads.clear()
         self._goes()
 
@@ -211,7 +211,7 @@ class Uploads:
 
 
 async def _read(folder: Path, order: Order) -> Answer:
-    """Have a child read a file, and end it when its time is over."""
+    """Let a child process read a file, within the time limit."""
     shown = displayed(order.name)
     (folder / FACTS).unlink(missing_ok=True)
     (folder / ORDER).write_bytes(msgspec.json.encode(order))

@@ -1,4 +1,4 @@
-"""Variations for the page: the map of an attractor, and what a wish makes of the project's piece."""
+"""Variations for the page: the map of an attractor, and variations of the project's piece."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ if TYPE_CHECKING:
     from motionmind.studio.studio import Studio
 
 _WORDS = "vary the piece"
-_ANOTHER = 412  # the status "precondition failed"
-_MOST_ESTIMATED = 800  # units between each two of which insertions are estimated, in a second and a half
+_ANOTHER = 412  # status "precondition failed"
+_MOST_ESTIMATED = 800  # units, at most, to estimate insertions between every two of them; takes 1.5 s
 
 
 class Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A wish of the page: the fields of `Wanted`, and stretches of the piece that stay, by their ids."""
+    """The page's request: the fields of `Wanted`, and ids of stretches of the piece that stay."""
 
     flow: str = "lorenz"
     depart: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.25
@@ -60,12 +60,12 @@ class Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     stay: Annotated[tuple[str, ...], msgspec.Meta(max_length=1_000)] = ()
 
     def wanted(self, kept: tuple[Kept, ...]) -> Wanted:
-        """Return the wish with all that is kept."""
+        """Return the request with all stretches that stay."""
         return Wanted(self.flow, self.depart, self.nudge, self.start, self.stretch, self.inserted, kept)
 
 
 class Ordering(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """An order that becomes the piece, and the `basis` that it was proposed with."""
+    """A proposed order to make the piece, and the `basis` of the proposal."""
 
     edit: Arrange
     basis: Annotated[str, msgspec.Meta(max_length=64)]
@@ -73,7 +73,7 @@ class Ordering(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def routes(studio: Studio) -> list[BaseRoute]:
-    """Return what the page asks of variations."""
+    """Return the routes for variations."""
 
     async def attractor(request: Request) -> Response:
         found = await run_in_threadpool(map_of, request.query_params.get("flow", "lorenz"))
@@ -83,7 +83,7 @@ def routes(studio: Studio) -> list[BaseRoute]:
         return api.json(await propose(studio, await api.body_of(request, Wish)))
 
     async def accept(request: Request) -> Response:
-        """Make an order the piece, unless the piece is another than it was proposed for."""
+        """Make a proposed order the piece, unless the piece has changed since."""
         given = await api.body_of(request, Ordering)
         if given.basis != basis_of(studio.project.state):
             return api.error("the piece has become another meanwhile: look at its variation again", _ANOTHER)
@@ -101,10 +101,10 @@ def routes(studio: Studio) -> list[BaseRoute]:
 
 
 async def propose(studio: Studio, wish: Wish) -> dict[str, Any]:
-    """Return the variation that a wish makes of the piece, as the page sees it.
+    """Return a variation of the piece, as the page sees it.
 
     Raises:
-        MotionMindError: there is nothing to vary, or the wish cannot be met.
+        MotionMindError: there is nothing to vary, or the request cannot be met.
     """
     project = studio.project
     state = project.state
@@ -122,7 +122,7 @@ async def propose(studio: Studio, wish: Wish) -> dict[str, Any]:
     staying = (locked | set(wish.stay)) - {one.block.id for one in asked}
     total, standing = standing_in(state, clocks.__getitem__)
     kept = (*asked, *(one for one in standing if one.block.id in staying))
-    # In a thread: long pieces take some seconds the first time, in which the page is not to wait for other things.
+    # In a thread: a long piece first takes some seconds, and the server must answer meanwhile.
     found = await run_in_threadpool(
         vary_blocks,
         base,
@@ -137,7 +137,7 @@ async def propose(studio: Studio, wish: Wish) -> dict[str, Any]:
 
 
 def _estimates(studio: Studio, units: Sequence[Unit], clocks: Clocks) -> Estimates:
-    """Estimate what seams between units insert."""
+    """Estimate the insertions between units."""
     from motionmind.variation.insertion_times import estimate_insertions
     from motionmind.variation.piece import Piece
     from motionmind.variation.seams import TransitionTest
@@ -208,8 +208,8 @@ def _shown(
 
 
 def basis_of(state: State) -> str:
-    """Return the hash of all of a piece that a variation of it rests on, in hexadecimal: two pieces have the same
-    variations if it is the same.
+    """Return the hash, in hexadecimal, of all that variations of a piece depend on: pieces with the same hash have
+    the same variations.
 
     >>> from motionmind.studio.edits import Insert, SetTitle, Trim
     >>> from motionmind.studio.piece import State, apply
@@ -222,12 +222,12 @@ def basis_of(state: State) -> str:
 
 
 def encoded(points: list[list[float]]) -> str:
-    """Return points as the page reads them: float32 in base64."""
+    """Encode points for the page: float32 in base64."""
     return base64_of(np.array(points, dtype="<f4").tobytes())
 
 
 def base_of(state: State) -> tuple[Block, ...]:
-    """Return what is varied: what the piece was before it was varied, or the piece if it has become another since."""
+    """Return the stretches to vary: the original of a varied piece, or the piece itself if it has other frames."""
     given = state.about.get("original")
     try:
         base = msgspec.convert(given, type=tuple[Block, ...])
@@ -243,9 +243,9 @@ def _holds(one: Block, block: Block) -> bool:
 
 
 def standing_in(state: State, clocks: Clocks) -> tuple[int, tuple[Kept, ...]]:
-    """Return the number of units that the piece has, and its stretches where they stand.
+    """Return the number of units of the piece, and its stretches with their places.
 
-    A variation has left out its stays; as long as its order is as it was made, they count.
+    A variation leaves out repeated units; they count as long as its order has not changed.
     """
     places, count = state.about.get("places"), state.about.get("count")
     if isinstance(places, dict) and isinstance(count, int) and list(places) == [block.id for block in state.blocks]:
@@ -255,18 +255,18 @@ def standing_in(state: State, clocks: Clocks) -> tuple[int, tuple[Kept, ...]]:
 
 
 def locked_in(state: State) -> set[str]:
-    """Return the ids of the stretches on both sides of seams whose insertion is locked: it stays as long as they do."""
+    """Return the ids of the stretches beside locked insertions, which must stay for the insertion to stay."""
     return {name for seam in state.seams if seam.verdict.decision == "locked" for name in seam.pair}
 
 
 def clock_of(motion: Motion, rate: float) -> Clock:
-    """Return the clock of a movement, whose units are postures at a rate if it is recorded, else its frames."""
+    """Return the clock of a movement: a recording has units at `rate`, any other movement has a unit for each frame."""
     recorded = len(motion) > 1 and not motion.keyframed and motion.fps >= FILM_RATE
     return Clock(motion.times, rate if recorded else None)
 
 
 def _rate_of(corpus: str, studio: Studio) -> float:
-    """Postures a second that a corpus takes of recordings."""
+    """Return a corpus's rate, postures a second."""
     folder = store.list_corpora(studio.home).get(corpus)
     rate = store.read_manifest(folder).get("rate") if folder else None
     return float(rate) if isinstance(rate, int | float) and rate > 0.0 else RECORDED_RATE

@@ -1,9 +1,9 @@
-"""Varies a piece of stretches: its postures in the order of a trajectory, but for what is kept where it is.
+"""Vary a piece of stretches: reorder its postures along a trajectory, except the stretches to keep.
 
-A *unit* is a posture of the piece with the frames up to the next one, at the corpus's rate: so units in their own order
-are the piece again, frame by frame. The units that are not kept are laid out along a trajectory; another one, begun
-nearby, says which of them comes at each place that is free (`motionmind.chaos.reorder`). Kept stretches stand where
-they stood. To stay in a unit is no stretch of its own: it is left out.
+A *unit* is a posture of the piece with the frames up to the next one, at the corpus's rate; all units in order are the
+piece, frame by frame. The units that may move are laid out along a trajectory; a second trajectory that begins nearby
+selects the unit for each free place (`motionmind.chaos.reorder`). Kept stretches keep their places. A unit that
+repeats at consecutive places appears only once.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from motionmind.variation.limits import Limits, check_departure, check_limits, k
 from motionmind.variation.stretches import cheapest_order
 from motionmind.variation.variation import SKIP
 
-MOST = 4_000  # units of a piece: stretches of more than one unit hold the square of them in memory
-EVERY = SKIP + 1  # steps of a trajectory from one place to the next
-_COARSELY = 5  # each of so many nudges is tried where stretches are long
+MOST = 4_000  # units of a piece: with a minimum stretch above 1, memory grows with their square
+EVERY = SKIP + 1  # trajectory steps from one place to the next
+_COARSELY = 5  # every fifth nudge is tried if stretches have a minimum length
 
 
 class Clock(NamedTuple):
     """The time of a movement.
 
     Attributes:
-        times: of its frames [T], seconds.
-        rate: units a second; None if each frame is one, as of keyframes.
+        times: times of its frames [T], seconds.
+        rate: units a second; None if each frame is a unit, as with keyframes.
     """
 
     times: Floats
@@ -53,7 +53,7 @@ class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         block: the stretch.
-        place: the place of its first unit among all units, from 0 on.
+        place: index of its first unit among all units, from 0.
     """
 
     block: Block
@@ -61,16 +61,16 @@ class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Wanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A wish for a variation.
+    """A request for a variation.
 
     Attributes:
         flow: name of the flow.
-        depart: share of the steps that are to leave the piece's order.
-        nudge: the offset of the variation's trajectory, in place of `depart`, in the flow's first coordinate.
-        start: where the piece's trajectory begins, on the attractor [3]; None for the flow's own start.
-        stretch: units that each stretch has at least, but for those beside kept ones.
-        inserted: the greatest share of the time that insertions are to take, as they are estimated; None for no limit.
-        kept: the stretches that stay, in their order.
+        depart: share of steps that leave the piece's order.
+        nudge: offset of the variation's trajectory in the flow's first coordinate, instead of `depart`.
+        start: start of the piece's trajectory, on the attractor [3]; None for the flow's own start.
+        stretch: units in each stretch, at least, except beside kept ones.
+        inserted: largest share of time for insertions, by estimate; None for no limit.
+        kept: the stretches that stay, in order.
     """
 
     flow: str = "lorenz"
@@ -86,7 +86,7 @@ class Unit(NamedTuple):
     """A posture of a piece and the frames up to the next one.
 
     Attributes:
-        block: number of the stretch that it is in.
+        block: index of its stretch.
         source: key of the movement.
         mirrored: whether left and right are exchanged.
         first: its first frame.
@@ -101,10 +101,10 @@ class Unit(NamedTuple):
 
 
 class Estimates(NamedTuple):
-    """Estimates of what seams between N units insert.
+    """Estimates of the insertions between N units.
 
     Attributes:
-        seconds: of the insertion from each unit to each [N, N].
+        seconds: duration of the insertion from each unit to each [N, N].
         durations: seconds from each unit to the next one [N].
     """
 
@@ -117,11 +117,11 @@ Insertions = Callable[[Sequence[Unit]], Estimates]
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """An order of N units at L places, and the trajectories that it comes from.
+    """An order of N units at L places, and its trajectories.
 
     Attributes:
         indices: the unit at each place [L].
-        nudge: the offset of the variation's trajectory in the flow's first coordinate.
+        nudge: offset of the variation's trajectory in the flow's first coordinate.
         piece: the piece's trajectory, every step [(N - 1) * 11 + 1, d].
         other: the variation's trajectory, every step [(L - 1) * 11 + 1, d].
     """
@@ -143,10 +143,10 @@ class Proposal:
 
     Attributes:
         blocks: its stretches.
-        places: the place of each one's first unit among all units.
+        places: index of each stretch's first unit among all units.
         count: number of all units.
-        kept: ids of the stretches that were kept.
-        order: the order of the units that were not.
+        kept: ids of the kept stretches.
+        order: the order of the other units.
     """
 
     blocks: tuple[Block, ...]
@@ -182,7 +182,7 @@ def units_of(blocks: Sequence[Block], clocks: Clocks) -> list[Unit]:
 
 
 def kept_in(blocks: Sequence[Block], ids: Collection[str], clocks: Clocks) -> tuple[Kept, ...]:
-    """Return those stretches of a piece that have these ids, where they stand; arguments as of `units_of`."""
+    """Return the stretches of a piece with these ids, and their places; arguments as for `units_of`."""
     places = np.cumsum([0, *(len(units_of([block], clocks)) for block in blocks)]).tolist()
     return tuple(Kept(block, place) for block, place in zip(blocks, places, strict=False) if block.id in ids)
 
@@ -200,16 +200,16 @@ def vary_blocks(
     """Vary a piece.
 
     Args:
-        blocks: the stretches that are laid out along the trajectory.
-        wanted: the wish.
+        blocks: the stretches to lay out along the trajectory.
+        wanted: the request.
         clocks: returns the clock of a movement.
-        present: the piece as it stands, whose stretches keep their ids; None if it is `blocks`.
-        total: units that the variation has; None for as many as `present`.
-        used: ids that no other stretch may take.
-        insertions: estimates insertions; for a wish that limits them.
+        present: the present piece, whose stretches keep their ids; None if it is `blocks`.
+        total: units of the variation; None for as many as `present` has.
+        used: ids that new stretches may not take.
+        insertions: estimates insertions, for a request that limits them.
 
     Raises:
-        MotionMindError: there is nothing to vary, or the wish cannot be met.
+        MotionMindError: there is nothing to vary, or the request cannot be met.
     """
     present = blocks if present is None else present
     total = len(units_of(present, clocks)) if total is None else total
@@ -239,10 +239,10 @@ def vary_blocks(
 
 
 def find_order(wanted: Wanted, count: int, length: int, insertions: Estimates | None = None) -> Order:
-    """Order `count` units at `length` places; `insertions` are the estimates for a wish that limits them.
+    """Order `count` units at `length` places; `insertions` are estimates, for a request that limits them.
 
     Raises:
-        MotionMindError: no flow has this name, or the wish cannot be met.
+        MotionMindError: no flow has this name, or the request cannot be met.
     """
     stretch = min(wanted.stretch, count, length)
     course = _course(flow_of(wanted.flow).name, wanted.start, count, length, stretch)
@@ -260,13 +260,13 @@ def find_order(wanted: Wanted, count: int, length: int, insertions: Estimates | 
 
 @dataclass(frozen=True, eq=False)
 class _Course:
-    """A piece's trajectory, and the orders that nudges of it give; those that were found are kept.
+    """A piece's trajectory, and a cache of the orders that nudges of it give.
 
     Attributes:
         flow: the flow.
         piece: the trajectory, every step [(N - 1) * 11 + 1, d].
-        length: places of the orders.
-        stretch: units that each stretch has at least.
+        length: number of places.
+        stretch: units in each stretch, at least.
         found: orders by nudge.
     """
 
@@ -293,7 +293,7 @@ class _Course:
         return self.found[nudge]
 
     def within(self, limits: Limits, nudge: float, insertions: Estimates) -> Ints:
-        """Return the unit at each place, with as little insertion as limits say [L]."""
+        """Return the unit at each place [L], with insertions within limits."""
         sites, points = self.piece[::EVERY], self.follow(nudge)[::EVERY]
         itinerary = Itinerary(sites, points, reorder(sites, points))
         kept, _ = keep_within(limits, itinerary, insertions.durations, insertions.seconds, None)
@@ -302,7 +302,7 @@ class _Course:
 
 @lru_cache(maxsize=8)
 def _course(flow: str, start: tuple[float, float, float] | None, count: int, length: int, stretch: int) -> _Course:
-    """Return the course of a wish; a start that a hand set is on the attractor, so nothing is dropped after it."""
+    """Return the course of a request; a start that the user chose is on the attractor and needs no transient."""
     own = flow_of(flow)
     transient = own.transient if start is None else 0
     piece = trajectory(own, start, count=(count - 1) * EVERY + 1, every=1, transient=transient)
@@ -310,7 +310,7 @@ def _course(flow: str, start: tuple[float, float, float] | None, count: int, len
 
 
 def flow_of(name: str) -> Flow:
-    """Return the flow of a name; MotionMindError if no flow in three dimensions has it."""
+    """Return a flow by name; raise MotionMindError if no flow in three dimensions has this name."""
     if name not in FLOWS or len(FLOWS[name].start) != 3:
         known = [known for known, flow in FLOWS.items() if len(flow.start) == 3]
         raise MotionMindError(f"no attractor {name!r:.60}{suggestion(name, known)}")
@@ -318,7 +318,7 @@ def flow_of(name: str) -> Flow:
 
 
 def _without(units: Sequence[Unit], kept: Sequence[Unit]) -> list[Unit]:
-    """The units without those that are kept: of several with the same frames the first goes."""
+    """Return the units without the kept ones; of several with the same frames, the first is removed."""
     taken: dict[tuple[object, ...], int] = {}
     for unit in kept:
         taken[unit[1:4]] = taken.get(unit[1:4], 0) + 1
@@ -332,11 +332,11 @@ def _without(units: Sequence[Unit], kept: Sequence[Unit]) -> list[Unit]:
 
 
 def _runs(indices: Ints, places: Ints, units: Sequence[Unit]) -> list[tuple[int, list[Unit]]]:
-    """The runs of units that go on as recorded, each with the place where it begins.
+    """Return the runs of units that continue as recorded, each with its first place.
 
     Args:
         indices: the unit at each free place [L].
-        places: the free places [L]; a run ends before one that is taken.
+        places: the free places [L]; a run ends before a taken one.
         units: the units.
     """
     runs: list[tuple[int, list[Unit]]] = []
@@ -355,18 +355,18 @@ def _runs(indices: Ints, places: Ints, units: Sequence[Unit]) -> list[tuple[int,
 
 
 class _Naming:
-    """Gives stretches ids: one that is in the piece keeps its own, new ones get ids that never were."""
+    """Assign ids to stretches: a stretch of the piece keeps its own, a new one gets an unused id."""
 
     def __init__(self, present: Sequence[Block], used: Collection[str], kept: Sequence[Block]) -> None:
         self._taken = {block.id for block in kept}
-        self._present: dict[tuple[str, int, int, bool], list[str]] = {}  # of equal stretches, in their order
+        self._present: dict[tuple[str, int, int, bool], list[str]] = {}  # ids of equal stretches, in order
         for block in present:
             if block.id not in self._taken:
                 self._present.setdefault(_frames(block), []).append(block.id)
         self._used = set(used)
 
     def block(self, run: Sequence[Unit]) -> Block:
-        """The stretch that a run of units is."""
+        """Return the stretch of a run of units."""
         unit = run[0]
         bare = Block("", unit.source, unit.first, run[-1].last, unit.mirrored)
         here = self._present.get(_frames(bare))

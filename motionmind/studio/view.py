@@ -1,4 +1,4 @@
-"""The piece as the page sees it: plain values for JSON."""
+"""The page's view of a piece, as plain values for JSON."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from motionmind.studio.piece import Finding, Found, Seam, State, key_of
 from motionmind.studio.placement import Layout, Marks, Part, lay_out
 
 SeamState = Literal["smooth", "abrupt", "waiting", "inserted", "discarded", "none found"]
-Findings = Callable[[Seam], Finding | None]  # returns what is known of a seam; None as long as nothing is
-Standing = Callable[[Seam], Found | None]  # returns what was inserted at a seam before what is known of it was asked
+Findings = Callable[[Seam], Finding | None]  # returns the finding at a seam; None if there is none yet
+Standing = Callable[[Seam], Found | None]  # returns the insertion from before a seam's latest request
 
 _GOES_ON = "goes on as recorded"
 
 
 def state_of(seam: Seam, finding: Finding | None) -> SeamState:
-    """Say how it stands with a seam."""
+    """Return the state of a seam."""
     if seam.goes_on:
         return "smooth"
     if finding is None:
@@ -32,14 +32,14 @@ def state_of(seam: Seam, finding: Finding | None) -> SeamState:
 
 
 def chosen_at(seam: Seam, finding: Finding | None) -> Found | None:
-    """Return what is inserted at a seam; None if nothing is."""
+    """Return the insertion at a seam; None if there is none."""
     if finding is None or not finding.insertions or state_of(seam, finding) != "inserted":
         return None
     return finding.insertions[min(seam.verdict.chosen, len(finding.insertions)) - 1]
 
 
 def layout_of(state: State, findings: Findings, marks: Marks, standing: Standing = lambda _: None) -> Layout:
-    """Place a piece's parts with what is known of its seams; until a wish is answered, what was inserted stands."""
+    """Place a piece's parts by the findings at its seams; an earlier insertion stays until a request is answered."""
 
     def insertion(seam: Seam) -> str | None:
         finding = findings(seam)
@@ -57,14 +57,14 @@ def view_of(
     title: Callable[[str], str],
     standing: Standing = lambda _: None,
 ) -> dict[str, Any]:
-    """Return `piece` of the project's JSON: its length, parts, blocks and seams.
+    """Return `piece` of the project's JSON: its duration, parts, blocks and seams.
 
     Args:
         state: the piece.
-        findings: what is known of its seams.
-        marks: of the movements.
+        findings: returns the finding at a seam.
+        marks: marks of the movements.
         title: returns a movement's title by its key.
-        standing: what stands at a seam until its wish is answered.
+        standing: returns the insertion that stays at a seam until its request is answered.
     """
     layout = layout_of(state, findings, marks, standing)
     blocks = [

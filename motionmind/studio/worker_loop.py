@@ -1,4 +1,4 @@
-"""The inside of a worker process: it does one job after another, and keeps the engines that they need."""
+"""The loop of a worker process: it runs one job after another, and caches engines."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from motionmind.errors import MotionMindError
 if TYPE_CHECKING:
     from motionmind.tween.engine import Engine
 
-_ENGINES = 2  # that a worker keeps loaded
+_ENGINES = 2  # engines that a worker keeps loaded
 
 _home: Path | None = None
 _engines: OrderedDict[tuple[str, int, int], Engine] = OrderedDict()
 
 
 def engine_of(name: str) -> Engine:
-    """Return the engine of a corpus in this worker, loaded when it is asked for first, or was built anew.
+    """Return the engine of a corpus in this worker, loaded on first use and after a rebuild.
 
     Raises:
         MotionMindError: there is no such corpus.
@@ -45,10 +45,10 @@ def engine_of(name: str) -> Engine:
 
 
 def work(connection: Connection, home: Path | None, warm: str) -> None:
-    """Do jobs until the server ends."""
+    """Run jobs until the server ends."""
     global _home  # noqa: PLW0603 - a worker has one
     _home = home
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the server's to answer
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server handles Ctrl-C
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
@@ -76,13 +76,13 @@ def work(connection: Connection, home: Path | None, warm: str) -> None:
 
 
 def _end_with(parent: Any) -> None:
-    """End this process with the one that started it."""
+    """End this process when its parent ends."""
     parent.join()
     os._exit(0)
 
 
 def words_of(error: Exception) -> str:
-    """Return an error as a line; what nobody foresaw goes to the terminal."""
+    """Return an error as a line; print an unexpected one on the terminal."""
     if isinstance(error, MotionMindError):
         return str(error)
     traceback.print_exception(error, file=sys.stderr)

@@ -1,4 +1,4 @@
-"""Worker processes: the engine at work apart from the server, so that a job can be watched, and ended at once."""
+"""Worker processes that run the engine apart from the server, so that jobs report progress and can be killed."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from motionmind.studio.preparation import Told
 from motionmind.studio.worker_loop import words_of, work
 
 JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
-_TRIES = 3  # starts of a worker that ends before it has begun
-_JOBS = 200  # that are over and can still be asked for
-_FEW = 2  # processors with which a second worker does not slow the first
+_TRIES = 3  # starts of a worker that dies before it is ready
+_JOBS = 200  # finished jobs that remain available
+_FEW = 2  # processors that two workers need
 _LOST = "this took more than this computer has, and was ended"
-_LOOK = 0.2  # seconds between two looks at how far a preparation is
-_MEMORY = 2**30  # bytes that are free, of which a second worker takes less than a fifth
+_LOOK = 0.2  # seconds between updates of a preparation's progress
+_MEMORY = 2**30  # free bytes that two workers need; the second takes less than a fifth
 
 
 class Report(Protocol):
-    """Tells how far a job has come."""
+    """Callback for a job's progress."""
 
     def __call__(self, done: int, of: int, words: str = "", partial: Any = None) -> None:
-        """Tell it.
+        """Report the progress.
 
         Args:
-            done: the number of steps that are done.
-            of: the number of all steps.
-            words: what is going on.
-            partial: a part of the result, if there is a new one.
+            done: number of steps done.
+            of: number of all steps.
+            words: description of the current step.
+            partial: a new part of the result, if there is one.
         """
 
 
@@ -47,20 +47,20 @@ class JobCancelledError(MotionMindError):
 
 
 class WorkerLostError(MotionMindError):
-    """The worker ended in the middle of the job, as where memory is short; another one may do it."""
+    """The worker died during the job, for example for lack of memory; another one may succeed."""
 
 
 class Job:
     """A function that a worker runs.
 
     Attributes:
-        id: its name.
-        kind: what it is for.
-        urgent: whether somebody waits for it.
-        state: how it stands.
-        done, of, words: how far it has come.
+        id: its id.
+        kind: its purpose.
+        urgent: whether the user waits for it.
+        state: its state.
+        done, of, words: its progress.
         partial: parts of the result so far, plain values for JSON.
-        shown: the result as plain values for JSON; None as long as there is none to show.
+        shown: the result as plain values for JSON; None if there is none to show yet.
     """
 
     def __init__(
@@ -83,21 +83,21 @@ class Job:
         self._result.add_done_callback(_seen)
 
     async def result(self) -> Any:
-        """Wait for what the function returns.
+        """Wait for the function's result.
 
         Raises:
-            JobCancelledError: it was cancelled.
-            WorkerLostError: its worker ended.
-            MotionMindError: the function failed with it.
+            JobCancelledError: the job was cancelled.
+            WorkerLostError: its worker died.
+            MotionMindError: the function failed.
         """
         return await asyncio.shield(self._result)
 
     def cancel(self) -> None:
-        """End it at once; nothing happens if it is over."""
+        """Stop the job at once, unless it is over."""
         self._workers.cancel(self)
 
     def view(self) -> dict[str, Any]:
-        """Return it as the page sees it."""
+        """Return the job as the page sees it."""
         found = {"id": self.id, "kind": self.kind, "state": self.state, "done": self.done, "of": self.of}
         found["words"] = self.words
         if self.partial:
@@ -112,13 +112,13 @@ class Job:
         return self._task
 
     def take_partial(self, value: Any) -> None:
-        """Take in a part of the result."""
+        """Add a part of the result."""
         self.partial.append(self._collect(value) if self._collect else value)
 
     def end(
         self, state: JobState, value: Any = None, words: str = "", error: type[MotionMindError] = MotionMindError
     ) -> None:
-        """Take in how it ended; whatever goes wrong with the result makes it fail."""
+        """Set the final state; an error in `finish` makes the job fail."""
         if self._result.done():
             return
         if state == "done":
@@ -134,46 +134,46 @@ class Job:
 
 
 def _seen(future: asyncio.Future[Any]) -> None:
-    """Mark an error as seen: a job that nobody awaits tells of it by its state."""
+    """Mark an error as retrieved: a job that nobody awaits reports it by its state."""
     if not future.cancelled():
         future.exception()
 
 
 class Workers:
-    """The worker processes, and the jobs that wait for them: the urgent ones first, and of those the oldest.
+    """The worker processes and their queue of jobs: urgent jobs first, then the oldest.
 
-    Where there are several, one does nothing but what is urgent: nobody waits for what goes on in the background.
+    If there are several workers, one is reserved for urgent jobs, so that these never wait for background work.
     """
 
     def __init__(
         self, home: Path | None, tell: Callable[[Job], None], warm: str = "", number: int | None = None
     ) -> None:
-        """Set up the workers, which start with `begin`, or else with the first job.
+        """Set up the workers, which start with `begin` or with the first job.
 
         Args:
-            home: the folder of the user's corpora; None for the usual one.
+            home: the folder of the user's corpora; None for the default folder.
             tell: called, in the event loop, whenever a job has changed.
             warm: a corpus that each worker loads at once.
-            number: of processes; by default as many as this computer has room for.
+            number: number of processes; by default as many as this computer has room for.
         """
         self._theirs, self._tell = (home, warm), tell
         self._loop = asyncio.get_running_loop()
-        self._numbers = count(time.time_ns())  # no job of a studio that ran before has one of them
+        self._numbers = count(time.time_ns())  # ids differ from those of earlier studios
         self._waiting: deque[Job] = deque()
         self._jobs: OrderedDict[str, Job] = OrderedDict()
         self._number = number or _room()
-        self._has_begun = False  # whether the processes are started
+        self._has_begun = False  # whether the processes have started
         self._held_by: Job | None = None  # the job that all others wait for
         self._workers: list[_Worker] = []
-        self._failures = 0  # workers that have ended before they began, one after another
+        self._failures = 0  # consecutive workers that died before they were ready
 
     @property
     def jobs(self) -> list[Job]:
-        """The jobs that wait or run."""
+        """Waiting and running jobs."""
         return [job for job in self._jobs.values() if job.state in ("waiting", "running")]
 
     def begin(self) -> None:
-        """Start the processes, unless they are started."""
+        """Start the processes, unless they have started."""
         if not self._has_begun:
             self._has_begun = True
             self._workers = [_Worker(self, *self._theirs) for _ in range(self._number)]
@@ -187,15 +187,15 @@ class Workers:
         collect: Callable[[Any], Any] | None = None,
         urgent: bool = False,
     ) -> Job:
-        """Have a worker call `function(report, *arguments)` when one is free.
+        """Queue a job: the next free worker calls `function(report, *arguments)`.
 
         Args:
-            kind: what it is for, as the page knows it.
-            function: a function at the top of a module; `report` is a `Report`.
-            arguments: what can be pickled.
-            finish: called here with the result, returns what the page is shown of it, plain values for JSON.
-            collect: called here with each partial result, in the same way.
-            urgent: whether somebody waits for it.
+            kind: its purpose, for the page.
+            function: a function at the top level of a module; `report` is a `Report`.
+            arguments: picklable arguments.
+            finish: called in this process with the result; returns what the page shows of it, plain values for JSON.
+            collect: called in this process with each partial result; returns likewise.
+            urgent: whether the user waits for it.
         """
         job = self._add(Job(self, next(self._numbers), kind, (function, arguments), finish, collect, urgent))
         self._waiting.append(job)
@@ -205,11 +205,11 @@ class Workers:
         return job
 
     async def prepare(self, kind: str, steps: Told) -> None:
-        """Take steps that spare the workers work, as a job that all others wait for until they may begin.
+        """Run preparatory steps as a job; all others wait until a step lets them begin.
 
         Args:
-            kind: what it is for, as the page knows it.
-            steps: the steps; to close them ends it.
+            kind: its purpose, for the page.
+            steps: the steps; closing the iterator ends the job.
         """
         job = self._held_by = self._add(Job(self, next(self._numbers), kind, (_nothing, ()), None, None, False))
         job.state = "running"
@@ -227,13 +227,13 @@ class Workers:
             self._release(job)
 
     def _release(self, job: Job) -> None:
-        """Let the jobs begin that wait for this one."""
+        """Let the jobs begin that wait for a preparation."""
         if self._held_by is job:
             self._held_by = None
             self.go_on()
 
     def _add(self, job: Job) -> Job:
-        """Know a job, and forget those that have been over for long."""
+        """Register a job, and drop the oldest finished ones."""
         self._jobs[job.id] = job
         over = [one.id for one in self._jobs.values() if one.state not in ("waiting", "running")]
         for old in over[: max(0, len(over) - _JOBS)]:
@@ -241,13 +241,13 @@ class Workers:
         return job
 
     def find(self, job: str) -> Job:
-        """Return the job of an id; MotionMindError if it is not known, or no more."""
+        """Return a job by id; raise MotionMindError if it is unknown or was dropped."""
         if job not in self._jobs:
             raise MotionMindError("there is no such job, or no more")
         return self._jobs[job]
 
     def cancel(self, job: Job) -> None:
-        """End a job at once."""
+        """Cancel a job at once, killing its worker."""
         if job in self._waiting:
             self._waiting.remove(job)
         for place, worker in enumerate(self._workers):
@@ -260,7 +260,7 @@ class Workers:
         self.go_on()
 
     def close(self) -> None:
-        """End all workers, for good."""
+        """Cancel all jobs and kill all workers."""
         self._has_begun = True
         for job in self.jobs:
             job.end("cancelled", words="the studio ends")
@@ -270,7 +270,7 @@ class Workers:
         self._workers.clear()
 
     def go_on(self) -> None:
-        """Give the workers that are free the jobs that wait."""
+        """Give waiting jobs to free workers."""
         while self._waiting and not self._workers:
             job = self._waiting.popleft()
             job.end("failed", words="the engine does not start; the terminal says why")
@@ -282,7 +282,7 @@ class Workers:
                 self._tell(chosen)
 
     def _next(self) -> Job | None:
-        """The job that a worker is to do next; None if there is none for now."""
+        """Return the next job to run; None if there is none for now."""
         urgent = next((job for job in self._waiting if job.urgent), None)
         if urgent or not self._waiting:
             return urgent
@@ -290,8 +290,8 @@ class Workers:
         return self._waiting[0] if patient < max(len(self._workers) - 1, 1) else None
 
     def hear(self, worker: _Worker, message: tuple[Any, ...] | None) -> None:
-        """Take in what a worker says; None if it has ended."""
-        if worker not in self._workers:  # one that was killed
+        """Handle a worker's message; None if it has died."""
+        if worker not in self._workers:  # it was killed
             return
         job = worker.job
         if message is None:
@@ -323,7 +323,7 @@ class Workers:
         self.go_on()
 
     def post(self, worker: _Worker, message: tuple[Any, ...] | None) -> None:
-        """Hand what a worker says to the event loop, from another thread."""
+        """Pass a worker's message from another thread to the event loop."""
         with suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(self.hear, worker, message)
 
@@ -332,8 +332,8 @@ class _Worker:
     """A worker process, and the thread that listens to it.
 
     Attributes:
-        job: the job that it does; None if it is free.
-        has_begun: whether it has come to wait for jobs.
+        job: its job; None if it is free.
+        has_begun: whether it is ready for jobs.
     """
 
     def __init__(self, workers: Workers, home: Path | None, warm: str) -> None:
@@ -343,28 +343,28 @@ class _Worker:
         self._connection, theirs = context.Pipe()
         self._process = context.Process(target=work, args=(theirs, home, warm), daemon=True, name="motionmind studio")
         self._theirs = theirs
-        # Starting a process takes a tenth of a second, in which the server would not answer.
+        # Starting a process takes 0.1 s, which would block the server.
         threading.Thread(target=self._listen, daemon=True).start()
 
     def run(self, job: Job) -> None:
-        """Begin a job."""
+        """Start a job."""
         self.job, job.state = job, "running"
-        # In a thread: large arguments wait until the worker takes them.
+        # In a thread: sending large arguments blocks until the worker reads them.
         threading.Thread(target=self._send, args=(job.task,), daemon=True).start()
 
     def kill(self) -> None:
-        """End the process at once."""
+        """Kill the process."""
         self._is_killed = True
-        with suppress(AttributeError):  # it is yet to be started, and killed then
+        with suppress(AttributeError):  # not started yet: `_listen` kills it after the start
             self._process.kill()
 
     def _send(self, task: Any) -> None:
-        with suppress(OSError):  # it has ended, and the listener says so
+        with suppress(OSError):  # it has died, which the listener reports
             self._connection.send(task)
 
     def _listen(self) -> None:
         try:
-            self._process.start()  # which fails if the process that it is forked from dies just then
+            self._process.start()  # fails if the fork server dies at this moment
             self._theirs.close()
             if self._is_killed:
                 self._process.kill()
@@ -377,8 +377,8 @@ class _Worker:
 
 
 def _context() -> Any:
-    """Return how processes start: forked from one that has all loaded, where that is safe, or else afresh."""
-    if sys.platform != "linux":  # elsewhere, what the system's libraries have begun may not survive a fork
+    """Return how processes start: forked from a preloaded process on Linux, or else spawned."""
+    if sys.platform != "linux":  # on other systems, system libraries may not survive a fork
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["motionmind.studio.preloaded"])
@@ -390,7 +390,7 @@ def _nothing(_: Report) -> None:
 
 
 def _room() -> int:
-    """Return the number of workers that this computer has room for."""
+    """Return the number of workers for this computer's processors and memory."""
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     try:
         memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_AVPHYS_PAGES")
