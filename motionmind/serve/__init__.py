@@ -1,1 +1,1 @@
-"""Movement for other programs: poses, waypoints and pins on a time line become movement, over a protocol."""
+"""Serve movement to other programs: a protocol turns poses, waypoints and pins on a timeline into movement."""

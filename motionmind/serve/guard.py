@@ -1,4 +1,4 @@
-"""The guard between the network and the protocol's application: who may ask, what for, and how long."""
+"""The guard between the network and the application: it checks the origin, route and time of each request."""
 
 from __future__ import annotations
 
@@ -18,16 +18,15 @@ Send = Callable[[Message], Awaitable[None]]
 Application = Callable[[Message, Receive, Send], Awaitable[None]]
 
 ROUTES = {("GET", "/capabilities"), ("POST", "/generate")}
-_SECONDS = 20.0  # in which the body of a request must have come
+_SECONDS = 20.0  # time limit to receive the body of a request
 
 
 class Guard:
-    """An ASGI application around another.
+    """An ASGI application that guards another.
 
-    It answers the protocol's two routes alone. A page on another host that a browser shows cannot ask: its requests
-    have an Origin other than this server, and after DNS rebinding a Host that is a name; only addresses, `localhost`
-    and the name given for the server are taken. A body that comes slowly is dropped, and whatever goes wrong inside
-    leaves as one line.
+    It answers only the protocol's two routes. A foreign page in a browser cannot use the server: its requests have a
+    foreign Origin and, after DNS rebinding, a foreign name as Host; the guard accepts only IP addresses, `localhost`
+    and the server's given name. It drops slow bodies, and reports internal errors as one line.
     """
 
     def __init__(self, application: Application, host: str, *, seconds: float = _SECONDS) -> None:
@@ -36,7 +35,7 @@ class Guard:
         Args:
             application: the application.
             host: the name or address that the server was given.
-            seconds: in which the body of a request must have come.
+            seconds: time limit to receive the body of a request.
         """
         self._application, self._seconds = application, seconds
         self._names = {"localhost", host.lower()}
@@ -67,7 +66,7 @@ class Guard:
         await answer.give(send)
 
     def _fault(self, scope: Message) -> tuple[int, str, str] | None:
-        """Return the status, code and message for a request that is not to be answered; None for others."""
+        """Return the status, code and message for a request to refuse; None to accept it."""
         headers = [(name.lower(), value.decode("latin-1")) for name, value in scope["headers"]]
         hosts = [value for name, value in headers if name == b"host"]
         if len(hosts) != 1 or not self._is_own(hosts[0]):
@@ -92,7 +91,7 @@ class Guard:
 
 
 class _Answer:
-    """An answer that is kept until it is whole: an error on the way is then an answer of its own."""
+    """An answer that is held until complete, so that an error on the way can replace it."""
 
     def __init__(self) -> None:
         self._messages: list[Message] = []
@@ -102,7 +101,7 @@ class _Answer:
         self._messages.append(message)
 
     async def give(self, send: Send) -> None:
-        """Send all messages, with certificates where they belong."""
+        """Send the complete answer, with certificates as `extras` of animations."""
         start, *rest = self._messages
         body = b"".join(message.get("body", b"") for message in rest)
         if start["status"] == 200 and CERTIFICATE.encode() in body:
@@ -112,7 +111,7 @@ class _Answer:
 
 
 def with_extras(body: bytes) -> bytes:
-    """Return an answer with the certificates among its notes moved to the `extras` of the animations they are of."""
+    """Move the certificates in an answer's notes to the `extras` of their animations."""
     document = json.loads(body)
     found = [one["gltf"] for one in document["results"] if "gltf" in one] if "results" in document else [document]
     for gltf in found:
@@ -129,13 +128,13 @@ def with_extras(body: bytes) -> bytes:
 
 
 def _in_time(receive: Receive, seconds: float) -> Receive:
-    """Return `receive`, which raises TimeoutError where the body has not come whole within some seconds."""
+    """Wrap `receive` to raise TimeoutError if the body is not complete in time."""
     until = asyncio.get_running_loop().time() + seconds
     is_whole = False
 
     async def in_time() -> Message:
         nonlocal is_whole
-        if is_whole:  # what follows is that the other side has gone
+        if is_whole:  # the next message tells of a disconnect
             return await receive()
         async with asyncio.timeout_at(until):
             message = await receive()

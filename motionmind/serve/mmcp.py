@@ -1,7 +1,7 @@
-"""MMCP: the open protocol between animation programs and whatever makes movement for them.
+"""MMCP: the open protocol between animation programs and motion generators.
 
-`motionmcp` validates requests and encodes answers; here its words become an `Order`, and the errors of either side the
-protocol's own.
+`motionmcp` validates requests and encodes answers; this module converts requests to an `Order`, and errors to the
+protocol's.
 """
 
 from __future__ import annotations
@@ -32,34 +32,34 @@ from motionmind.tween.headline import beyond, headline
 CERTIFICATE = "certificate"  # code of the notes that `guard.with_extras` moves to the animations
 
 _FPS = 30.0
-_FASTEST = 120.0  # frames a second
-_SECONDS = 30.0  # of movement in a request
+_FASTEST = 120.0  # frames a second, at most
+_SECONDS = 30.0  # of movement in a request, at most
 _JOINTS = 512
 _SAMPLES = 8
 _CONSTRAINTS = 128
 _BYTES = 1 << 20
 _BATCH = 4
-_WAITING = 4  # requests that may wait for another
-_PATIENCE = 60.0  # seconds after which a request ends with what it has, or with an error; twice as long for all
-_LONGEST_FLAGS = 32  # the protocol's most values of an option
+_WAITING = 4  # requests, at most, that wait for the running one
+_PATIENCE = 60.0  # seconds until a search returns its best path; after twice as long, the request fails
+_LONGEST_FLAGS = 32  # values of an option that the protocol allows
 
 
 class Model(Backbone):  # type: ignore[misc]
-    """A corpus as a model of the protocol."""
+    """A corpus, served as a model of the protocol."""
 
     def __init__(self, engine: Engine, *, patience: float = _PATIENCE) -> None:
         """Serve a corpus.
 
         Args:
             engine: the corpus.
-            patience: seconds after which a search ends with the best that it has found.
+            patience: seconds after which a search returns the best path so far.
         """
         self.model_id = engine.corpus.name
         self._engine, self._patience = engine, patience
         self._one_at_a_time, self._waiting, self._ends = asyncio.Lock(), 0, False
 
     def capabilities(self) -> ModelSpec:
-        """Return what the protocol says of a model."""
+        """Describe the model for the protocol."""
         corpus = self._engine.corpus
         names = list(corpus.chains)
         options = [ModelOption(name="novelty", type="number", default=0.0, minimum=0.0, maximum=1.0, title="Novelty")]
@@ -86,11 +86,11 @@ class Model(Backbone):  # type: ignore[misc]
         )
 
     def teardown(self) -> None:
-        """End the work under way: the server ends."""
+        """Stop the running request, because the server is stopping."""
         self._ends = True
 
     async def generate(self, request: GenerateRequest) -> MotionResult:
-        """Answer a request; a few others may wait meanwhile.
+        """Answer a request; up to `_WAITING` others wait.
 
         Raises:
             ProtocolError: it cannot be answered.
@@ -117,7 +117,7 @@ class Model(Backbone):  # type: ignore[misc]
 
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", MotionMindWarning)  # `beyond` says the same
+                warnings.simplefilter("ignore", MotionMindWarning)  # `beyond` reports the same
                 order = order_of(request, self._engine.corpus.skeleton)
                 return _to_result(perform(self._engine, order, watch), order, self._engine, request)
         except NoPathError as error:
@@ -136,14 +136,14 @@ def app(engine: Engine, **options: Any) -> Any:
 
 
 def order_of(request: GenerateRequest, own: Skeleton) -> Order:
-    """Return what a request asks for.
+    """Convert a request to an order.
 
     Args:
-        request: the request, which is valid by the protocol's schema.
+        request: the request, valid under the protocol's schema.
         own: the corpus's skeleton.
 
     Raises:
-        ProtocolError: a number in it is not finite or out of range; there is no pose; what cannot be heeded is asked.
+        ProtocolError: a number is not finite or out of range, there is no pose, or the skeleton is unsupported.
     """
     fps = request.fps(_FPS)
     if not 1.0 <= fps <= _FASTEST:
@@ -196,7 +196,7 @@ def order_of(request: GenerateRequest, own: Skeleton) -> Order:
 def _to_result(
     performances: Sequence[Performance], order: Order, engine: Engine, request: GenerateRequest
 ) -> MotionResult:
-    """Return performances as the protocol has them, with a certificate of each as a note."""
+    """Convert performances to the protocol's result, with the certificate of each as a note."""
     notes: list[dict[str, Any]] = [
         {"code": "note", "severity": "info", "message": message}
         for message in dict.fromkeys(note for one in performances for note in one.notes)
@@ -241,7 +241,7 @@ def _certificate(stretch: Stretch) -> dict[str, Any]:
 
 
 def _to_wire(skeleton: Skeleton) -> WireSkeleton:
-    """Return a skeleton as the protocol has it, standing on the floor in its rest pose."""
+    """Convert a skeleton to the protocol's, standing on the floor in its rest pose."""
     low = float(skeleton.rest[: len(skeleton), 1].min())
     return WireSkeleton(
         joints=[
@@ -257,9 +257,9 @@ def _to_wire(skeleton: Skeleton) -> WireSkeleton:
 
 
 def _from_wire(wire: WireSkeleton, own: Skeleton) -> tuple[Skeleton, Floats]:
-    """Return a skeleton, and where its root joint is in the rest pose [3].
+    """Return a skeleton, and the position of its root joint in the rest pose [3].
 
-    The corpus's own, with its proportions, has the corpus's tips too, which the protocol does not know.
+    A skeleton with the corpus's joints also gets the corpus's tips, scaled, because the protocol has no tips.
     """
     joints = wire.joints
     if len(joints) > _JOINTS:

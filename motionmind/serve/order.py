@@ -1,4 +1,4 @@
-"""Orders of a program: poses, waypoints and pins on a time line, on a body of its own."""
+"""A client's order: poses, waypoints and pins on a timeline, for its own body."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 
-MOST_ROTATIONS = 2_000_000  # in all samples together, 16 bytes each where they are sent
+MOST_ROTATIONS = 2_000_000  # in all samples together; each takes 16 bytes in the answer
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,9 +21,9 @@ class Pose:
 
     Attributes:
         frame: the frame, from 0.
-        rotations: unit quaternions of all joints [J, 4]; those that are not given are any.
+        rotations: unit quaternions of all joints [J, 4], arbitrary for joints that are not given.
         given: which joints are given [J].
-        root: place of the root joint [3], metres; None where it is free.
+        root: position of the root joint [3], metres; None if it is free.
     """
 
     frame: int
@@ -34,12 +34,12 @@ class Pose:
 
 @dataclass(frozen=True, eq=False)
 class Waypoint:
-    """A place on the floor that the root passes in a frame.
+    """A floor position of the root in a frame.
 
     Attributes:
         frame: the frame, from 0.
         place: x and z [2], metres.
-        heading: where the body then faces, radians from +z towards +x; None where it is free.
+        heading: direction that the body faces, radians from +z towards +x; None if it is free.
     """
 
     frame: int
@@ -49,13 +49,13 @@ class Waypoint:
 
 @dataclass(frozen=True, eq=False)
 class Pin:
-    """A place that a joint is at in a frame.
+    """A position of a joint in a frame.
 
     Attributes:
         frame: the frame, from 0.
         joint: the joint.
         place: x, y and z [3], metres.
-        rotation: the joint's rotation then [4]; None where it is free.
+        rotation: the joint's rotation [4]; None if it is free.
     """
 
     frame: int
@@ -70,20 +70,20 @@ class Order:
 
     Attributes:
         skeleton: the body; its zero pose is its rest pose.
-        stands: place of the root joint in the rest pose [3], metres.
-        frames: how many frames.
+        stands: position of the root joint in the rest pose [3], metres.
+        frames: number of frames.
         fps: frames a second.
-        poses: at least one.
-        waypoints: on the way.
-        pins: of joints.
-        samples: how many movements.
-        seed: of the samples; 0 for the best movement and others that differ from it.
+        poses: poses, at least one.
+        waypoints: floor positions of the root.
+        pins: positions of joints.
+        samples: number of movements.
+        seed: seed of the samples; 0 for the best movement and alternatives that differ from it.
         hold: joints of the corpus that keep their state.
-        novelty: from 0 to 1: see `TweenRequest`.
+        novelty: from 0 to 1, see `TweenRequest`.
 
     Raises:
-        MotionMindError: there is no pose; a frame is outside; two poses disagree; two waypoints, or two pins of a
-            joint, are in one frame; there are too many frames.
+        MotionMindError: there is no pose; a frame is out of range; two poses contradict each other; a frame has two
+            waypoints, or two pins of one joint; there are too many frames.
     """
 
     skeleton: Skeleton
@@ -126,7 +126,7 @@ def _check_once(name: str, frames: Sequence[int]) -> None:
 
 
 def _merged(poses: Sequence[Pose]) -> list[Pose]:
-    """Return one pose for each frame, in order; MotionMindError if two give a joint or the root differently."""
+    """Merge poses of the same frame; return them in order; raise MotionMindError if two contradict each other."""
     found: dict[int, Pose] = {}
     for pose in sorted(poses, key=lambda one: one.frame):
         other = found.get(pose.frame)

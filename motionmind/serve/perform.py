@@ -1,11 +1,10 @@
-"""From poses, waypoints and pins on a time line to movement: tweens from pose to pose, each with its certificate.
+"""Turn poses, waypoints and pins on a timeline into movement: tweens from pose to pose, each with its certificate.
 
-A tween goes from each pose to the next in the time between them, and takes up the movement of the one before. Where a
-waypoint lies between two poses, or a pose of some joints alone, the body is first moved without it; the posture that it
-then has there is put on the waypoint, or into the pose, and the tweens go through that posture too. What is left to the
-poses and the waypoints (retargeting is not exact, and waypoints that are close together are not each a posture) is made
-up for by a correction that is linear in time between them. Pins turn limbs, in the pins' frames as far as it takes and
-less and less around them.
+A tween leads from each pose to the next in the time between them, and continues the movement of the previous tween.
+For a waypoint or a partial pose between two poses, a first pass moves the body without it; the resulting posture is put
+on the waypoint or given the pose's rotations, and the second pass goes through it. Corrections that are linear in time
+remove the remaining errors (retargeting is not exact, and not every one of several close waypoints gets a posture).
+Pins turn limbs, fully in the pins' frames and gradually less around them.
 """
 
 from __future__ import annotations
@@ -28,10 +27,10 @@ from motionmind.serve.rig import Rig
 from motionmind.tween.engine import Engine
 from motionmind.tween.result import Tween
 
-_APART = 0.4  # seconds at least between two postures that tweens join for a waypoint's sake
-_EASES = 0.3  # seconds before its first frame in which a pin begins to act, and after its last
-_STILL = 1e-4  # radians and metres within which two poses are one
-_MISSED = 1e-3  # metres by which a pin or a waypoint may be missed without a note
+_APART = 0.4  # seconds, at least, between a posture at a waypoint and its neighbours
+_EASES = 0.3  # seconds in which pins ease in before a joint's first one, and out after its last
+_STILL = 1e-4  # radians and metres: poses that differ less are the same
+_MISSED = 1e-3  # metres: a greater miss of a pin or a waypoint gets a note
 
 
 @dataclass(frozen=True)
@@ -55,9 +54,9 @@ class Performance:
 
     Attributes:
         rotations: of the order's joints [T, J, 4].
-        root: places of the root joint [T, 3], metres.
+        root: positions of the root joint [T, 3], metres.
         stretches: its tweens, in order.
-        notes: what the order may not have meant, in sentences.
+        notes: sentences on results that the client may not expect.
     """
 
     rotations: Floats
@@ -71,13 +70,13 @@ def perform(engine: Engine, order: Order, watch: Watch | None = None) -> list[Pe
 
     Args:
         engine: the corpus that moves the body.
-        order: what is asked.
+        order: the order.
         watch: see `Engine.tween`; its errors end the work.
 
     Raises:
         SkeletonError: the body does not map to the corpus's.
-        NoPathError: nothing joins two poses.
-        MotionMindError: what is asked cannot be.
+        NoPathError: no path joins two poses.
+        MotionMindError: the order cannot be fulfilled.
     """
     return _Stage(engine, order, watch).perform()
 
@@ -110,7 +109,7 @@ class _Stage:
         return out
 
     def _whole_poses(self) -> list[tuple[int, Posture]]:
-        """Return the frames and postures of the poses that are whole, and of the first and the last, filled in."""
+        """Return frames and postures of the whole poses and of the first and last pose, completed if partial."""
         order, skeleton = self.order, self.order.skeleton
         places = {one.frame: one.place for one in order.waypoints}
         places |= {one.frame: one.root[[0, 2]] for one in order.poses if one.root is not None}
@@ -129,7 +128,7 @@ class _Stage:
         return out
 
     def _filled(self, pose: Pose) -> Floats:
-        """Return the rotations of a pose [J, 4]; joints that are not given as in the corpus's nearest posture."""
+        """Return the rotations of a pose [J, 4], with missing joints from the corpus's nearest posture."""
         if pose.given.all():
             return pose.rotations
         skeleton = self.order.skeleton
@@ -147,9 +146,9 @@ class _Stage:
         return rotations
 
     def _with_postures_between(self, given: list[tuple[int, Posture]]) -> list[tuple[int, Posture]]:
-        """Return the whole poses, and between them postures at the other poses and on waypoints.
+        """Return the whole poses, and between them postures at partial poses and waypoints.
 
-        They are those of the movement that passes the whole poses alone, with what is asked put in its place.
+        These postures come from a movement through the whole poses alone, and are adjusted to the order.
         """
         apart, chosen = _APART * self.order.fps, [pose.frame for pose in self.order.poses]
         asked: dict[int, tuple[Pose | None, Waypoint | None]] = {
@@ -174,7 +173,7 @@ class _Stage:
 
         Args:
             poses: frames and postures, in order.
-            tried: tweens of earlier samples between each and the next; that of this sample is added.
+            tried: tweens of earlier samples, for each pair of neighbours; this sample's are added.
             sample: number of the sample.
         """
         order = self.order
@@ -220,7 +219,7 @@ class _Stage:
         return self.engine.tween(start, end, before=before, watch=self.watch, **options)
 
     def _on_waypoints(self, motion: Motion, frames: Ints) -> Motion:
-        """Return the motion on all waypoints, by corrections linear in time between them and the poses' frames."""
+        """Move the motion onto all waypoints, by corrections that are linear in time between them and the poses."""
         times, rotations, root = np.arange(len(motion)), motion.rotations.copy(), motion.root.copy()
         free = [one for one in self.order.waypoints if frames[0] < one.frame < frames[-1] and one.frame not in frames]
         headed = [(one.frame, one.heading) for one in free if one.heading is not None]
@@ -243,7 +242,7 @@ class _Stage:
         return replace(motion, rotations=rotations, root=root)
 
     def _pin(self, motion: Motion, fixed: Sequence[int]) -> tuple[Motion, list[str]]:
-        """Return the motion with joints brought to their pins, poses excepted, and what is missed."""
+        """Return the motion with joints at their pins, except in the poses' frames, and notes on misses."""
         skeleton, rotations, notes = self.order.skeleton, motion.rotations.copy(), []
         eases = round(_EASES * self.order.fps)
         pins = [pin for pin in self.order.pins if pin.frame not in fixed]
@@ -254,7 +253,7 @@ class _Stage:
             goals = rotations[frames]
             for goal, pin in zip(goals, mine, strict=True):
                 if self.watch is not None:
-                    self.watch(Progress(0.0, 0.0, 0))  # which may raise: a request can hold thousands of pins
+                    self.watch(Progress(0.0, 0.0, 0))  # may raise: a request can have thousands of pins
                 goal[:] = reach(skeleton, goal, motion.root[pin.frame], joint, pin.place)
                 if pin.rotation is not None:
                     goal[joint] = pin.rotation
@@ -271,7 +270,7 @@ class _Stage:
 
 
 def _put(posture: Posture, pose: Pose | None, waypoint: Waypoint | None) -> Posture:
-    """Return a posture with what a pose gives of it, and on a waypoint."""
+    """Return a posture with the given rotations of a pose, on a waypoint."""
     rotations, root = posture.rotations.copy(), posture.root.copy()
     if waypoint is not None:
         root[[0, 2]] = waypoint.place
@@ -283,7 +282,7 @@ def _put(posture: Posture, pose: Pose | None, waypoint: Waypoint | None) -> Post
 
 
 def _joining(motion: Motion, a: Posture, b: Posture) -> Motion:
-    """Return a motion that begins and ends in two postures exactly, by a correction linear in time."""
+    """Make a motion begin and end exactly in two postures, by a correction that is linear in time."""
     ends, times = np.array([0, len(motion) - 1]), np.arange(len(motion))
     turns = _turns(motion.rotations[ends], np.stack([a.rotations, b.rotations]))
     rotations = rot.normalise(rot.mul(rot.exp(_lines(times, ends, turns)), motion.rotations))
@@ -292,23 +291,23 @@ def _joining(motion: Motion, a: Posture, b: Posture) -> Motion:
 
 
 def _facing(q: Floats, heading: float) -> Floats:
-    """Return a rotation of the root [4] turned about the vertical to face a heading."""
+    """Turn a rotation of the root [4] about the vertical to face a heading."""
     return rot.mul(rot.about_vertical(heading - float(rot.heading(q))), q)
 
 
 def _turns(q: Floats, wanted: Floats) -> Floats:
-    """Return the rotation vectors [..., 3] that lead from rotations to others."""
+    """Return the rotation vectors [..., 3] from rotations to wanted ones."""
     return rot.log(rot.mul_inv(wanted, q))
 
 
 def _lines(times: Ints, frames: Ints, values: Floats) -> Floats:
-    """Return values [K, ...] at increasing frames [K] linear in time between them, and constant beyond [T, ...]."""
+    """Interpolate values [K, ...] at increasing frames [K] linearly, constant beyond them [T, ...]."""
     flat = values.reshape(len(values), -1)
     return np.stack([np.interp(times, frames, one) for one in flat.T], axis=1).reshape(len(times), *values.shape[1:])
 
 
 def _with_zeros(frames: Ints, values: Floats, beside: Ints) -> tuple[Ints, Floats]:
-    """Return frames and their values, with values of 0 in other frames, in order."""
+    """Add values of 0 at other frames; return frames and values in order."""
     zeros = np.setdiff1d(beside, frames)
     every = np.concatenate([frames, zeros])
     order = np.argsort(every)

@@ -1,4 +1,4 @@
-"""The body of an order, and the corpus's: postures go to the corpus, movement comes back."""
+"""Retarget between the body of an order and the corpus's: postures to the corpus, movement back."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from motionmind.errors import SkeletonError
 from motionmind.retarget.joint_mapping import joint_mapping
 from motionmind.retarget.retarget import from_human23, to_human23
 
-_MOST_COMPARED = 4000  # postures of a corpus among which the nearest is looked for
+_MOST_COMPARED = 4000  # postures of a corpus, at most, to find the nearest among
 
 
 class Rig:
@@ -37,18 +37,18 @@ class Rig:
             own = corpus.skeleton.name
             raise SkeletonError(f"the joints are neither those of {own} nor of a known rig: {difference}")
         at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (len(skeleton), 1))
-        self.to_corpus(Posture(skeleton, at_rest, np.zeros(3)))  # or says why not
+        self.to_corpus(Posture(skeleton, at_rest, np.zeros(3)))  # raises if it cannot be retargeted
 
     def to_corpus(self, posture: Posture) -> Posture:
-        """Return a posture of the rig on the corpus's joints, with the rig's proportions."""
+        """Retarget a posture of the rig to the corpus's joints, with the rig's proportions."""
         return posture if self._is_same else to_human23(posture, up="y")
 
     def from_corpus(self, motion: Motion, like: Posture) -> Motion:
-        """Return a motion of the corpus's joints on the rig; joints that the corpus lacks stay as in a posture."""
+        """Retarget a motion of the corpus's joints to the rig; joints that the corpus lacks stay as in `like`."""
         return replace(motion, insertions=()) if self._is_same else from_human23(motion, like)
 
     def nearest(self, like: Posture, given: Floats) -> Floats:
-        """Return the rotations [J, 4] of the corpus's posture nearest to one, in the joints that are given [J]."""
+        """Return the rotations [J, 4] of the corpus's posture nearest to `like`, joints weighted by `given` [J]."""
         every = max(1, -(-len(self._corpus.rotations) // _MOST_COMPARED))
         rotations = self._corpus.rotations[::every]
         moments = np.arange(len(rotations), dtype=np.float64)
