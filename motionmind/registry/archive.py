@@ -1,8 +1,8 @@
-"""Archives of corpora: uncompressed tar files, of the same bytes whoever packs them, unpacked with suspicion.
+"""Archives of corpora: reproducible, uncompressed tar files, unpacked as untrusted data.
 
-Arrays of orientations hardly compress (docs/design/registry.md), and what is not compressed cannot be a bomb: no more
-comes out of an archive than it is long. Only plain files that the index lists are taken, each once, as long as it says
-and with its hash; all else ends the unpacking. Names that may be listed lead nowhere but into the folder.
+Arrays of orientations hardly compress (docs/design/registry.md), and an uncompressed archive cannot be a decompression
+bomb: its content is no larger than itself. Unpacking accepts only regular files that the index lists, each once, with
+the listed size and hash; anything else aborts it. The index allows only names that stay inside the folder.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ _CHUNK = 2**20  # bytes
 
 
 def pack(files: Mapping[str, Path], archive: Path) -> None:
-    """Pack files, by their names in the archive, in that order; OSError if one cannot be read or written.
+    """Pack files, given by their names in the archive, in this order; raise OSError if reading or writing fails.
 
-    Nothing of the machine or the day goes into the archive: no times, owners or permissions.
+    The archive does not depend on the machine or the day: it has no times, owners or original permissions.
     """
     with tarfile.open(archive, "w", format=tarfile.GNU_FORMAT) as tar:
         for name, path in files.items():
@@ -37,11 +37,11 @@ def unpack(archive: Path, files: Sequence[File], folder: Path) -> None:
 
     Args:
         archive: the archive.
-        files: what it must hold, and nothing else.
-        folder: where to; it is made.
+        files: the files that it must contain, and no others.
+        folder: the new folder.
 
     Raises:
-        CorpusError: it holds something else, or cannot be read or written.
+        CorpusError: the archive has other content, or reading or writing fails.
     """
     wanted = {file.name: file for file in files}
     try:
@@ -64,7 +64,7 @@ def unpack(archive: Path, files: Sequence[File], folder: Path) -> None:
 
 
 def _copy(source: IO[bytes], place: Path, file: File, archive: Path) -> None:
-    """Copy a file out of an archive; CorpusError if it has not the listed hash."""
+    """Copy a file out of an archive; raise CorpusError if its hash is not the listed one."""
     place.parent.mkdir(exist_ok=True)
     digest = hashlib.sha256()
     with place.open("xb") as target:

@@ -1,6 +1,6 @@
-"""Metadata of a published corpus in the words of Croissant 1.0, by which search engines and tools find data sets.
+"""Describe a published corpus in Croissant 1.0, the metadata format by which search engines and tools find data sets.
 
-"Croissant Format Specification", version 1.0, MLCommons (2024) [Croissant24]. JSON-LD on the vocabulary of schema.org.
+"Croissant Format Specification", version 1.0, MLCommons (2024) [Croissant24]. JSON-LD with the schema.org vocabulary.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from urllib.parse import urljoin
 
 from motionmind.registry.index import Archive, Entry, File
 
-# As the specification's first appendix gives it, with the prefixes that its terms use.
+# From the specification's first appendix, with the prefixes that its terms use.
 _CONTEXT: dict[str, Any] = {
     "@language": "en",
     "@vocab": "https://schema.org/",
@@ -54,9 +54,9 @@ def describe(entry: Entry, url: str, date: str, licence_url: str | None) -> dict
 
     Args:
         entry: the corpus.
-        url: the address of the folder that it is published in.
+        url: the address of the published folder.
         date: the day of publication, as "2026-11-23".
-        licence_url: the address of the licence; None if it is known by its name alone.
+        licence_url: the address of the licence; None if there is none.
     """
     creators = dict.fromkeys([entry.author, *entry.performers])
     described = {
@@ -79,7 +79,7 @@ def describe(entry: Entry, url: str, date: str, licence_url: str | None) -> dict
 
 
 def _archive(archive: Archive, url: str) -> dict[str, Any]:
-    """Describe the archive, of which the files are parts."""
+    """Describe the archive that contains the files."""
     return {
         "@type": "cr:FileObject",
         "@id": archive.url,
@@ -92,7 +92,7 @@ def _archive(archive: Archive, url: str) -> dict[str, Any]:
 
 
 def _member(file: File, archive: Archive) -> dict[str, Any]:
-    """Describe a file in the archive, where it has its own name."""
+    """Describe a file in the archive."""
     return {
         "@type": "cr:FileObject",
         "@id": file.name,

@@ -1,7 +1,7 @@
-"""Files from the network: over TLS, no larger than they are said to be, verified, and taken up where they ended.
+"""Download files over TLS, with a size limit, verification, and resumption.
 
-Everything that comes is checked against a SHA-256 that the index states, so a part of a file may be kept and taken up
-again by any later process without asking the server whether it still has the same file.
+Every file is checked against the SHA-256 in the index, so any later process can resume a partial download without
+asking the server whether it still has the same file.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from urllib.parse import urlsplit
 from motionmind.errors import CorpusError
 from motionmind.files import sync_folder
 
-_TIMEOUT = 30.0  # seconds in which a server must answer, or send the next bytes
+_TIMEOUT = 30.0  # seconds for a server to answer, or to send the next bytes
 _CHUNK = 2**18  # bytes
-_MOST_CONNECTIONS = 5  # for one file, each of which must bring something
+_MOST_CONNECTIONS = 5  # for one file; each must deliver some bytes
 _REDIRECTIONS = 5
 
-Progress = Callable[[int], None]  # is told how many bytes there are
+Progress = Callable[[int], None]  # called with the number of bytes so far
 
 
 def check_address(url: str, before: str | None = None) -> None:
-    """Check that an address may be asked: over TLS, or on this machine if nothing else asked for that.
+    """Check that an address is allowed: it uses TLS, or is on this machine and not named by another machine.
 
     Args:
         url: the address.
         before: the address that named it, if any.
 
     Raises:
-        CorpusError: it may not; the message says why.
+        CorpusError: it is not allowed; the message says why.
     """
     try:
         parts = urlsplit(url)
@@ -62,7 +62,7 @@ def _is_loopback(host: str) -> bool:
 
 
 class _Redirections(urllib.request.HTTPRedirectHandler):
-    """Follows redirections to addresses that may be asked, and no others."""
+    """Follows redirections to allowed addresses only."""
 
     max_redirections = _REDIRECTIONS
 
@@ -75,19 +75,19 @@ class _Redirections(urllib.request.HTTPRedirectHandler):
 
 
 def _open(url: str, start: int = 0) -> Any:
-    """Ask for an address, from a byte on; return the response, whose status is 200 or, from that byte on, 206."""
+    """Request an address from byte `start`; return the response, with status 206 from that byte, or 200 from byte 0."""
     check_address(url)
     request = urllib.request.Request(url, headers={"Accept-Encoding": "identity", "User-Agent": "motionmind"})
     if start:
         request.add_header("Range", f"bytes={start}-")
     handlers: list[urllib.request.BaseHandler] = [_Redirections()]
     if _is_loopback(urlsplit(url).hostname or ""):
-        handlers.append(urllib.request.ProxyHandler({}))  # which would ask its own machine
+        handlers.append(urllib.request.ProxyHandler({}))  # a proxy would ask its own machine
     return urllib.request.build_opener(*handlers).open(request, timeout=_TIMEOUT)
 
 
 def _reason(error: Exception) -> str:
-    """Say in words why an address gave nothing."""
+    """Describe why a request failed."""
     if isinstance(error, HTTPError):
         return f"the server answers {error.code} {error.reason}"
     cause = error.reason if isinstance(error, URLError) else error
@@ -99,14 +99,14 @@ def _reason(error: Exception) -> str:
 
 
 def read_address(url: str, most: int) -> tuple[bytes, str]:
-    """Read a small file from an address: its bytes, and the address after redirections.
+    """Read a small file; return its bytes, and the address after redirections.
 
     Args:
         url: the address.
-        most: the most bytes that it may have.
+        most: its largest allowed size in bytes.
 
     Raises:
-        CorpusError: it may not be asked, cannot be reached, or gives more.
+        CorpusError: the address is not allowed or cannot be reached, or the file is larger.
     """
     try:
         with _open(url) as response:
@@ -121,17 +121,17 @@ def read_address(url: str, most: int) -> tuple[bytes, str]:
 
 
 def download(url: str, place: Path, size: int, sha256: str, on_progress: Progress | None = None) -> None:
-    """Download a file; what has come is kept beside its place until all has, and the next call goes on from there.
+    """Download a file; a partial download stays beside its place, and the next call resumes it.
 
     Args:
         url: its address.
-        place: where it goes, in a folder that nobody else writes to.
-        size: its bytes.
+        place: its path, in a folder that no other process writes to.
+        size: its size in bytes.
         sha256: its hash.
-        on_progress: is told how many bytes there are.
+        on_progress: called with the number of bytes so far.
 
     Raises:
-        CorpusError: it cannot be reached, ended early, is larger, is another file, or the disk is too small.
+        CorpusError: it cannot be reached, ends early, is larger, has another hash, or the disk is too small.
     """
     part = place.with_name(f"{place.name}.part")
     try:
@@ -144,7 +144,7 @@ def download(url: str, place: Path, size: int, sha256: str, on_progress: Progres
                 _empty(file)
             _complete(url, file, size, on_progress)
         found = file_hash(part)
-        if found != sha256 and had:  # of another file of this size, perhaps: it is fetched whole
+        if found != sha256 and had:  # the old part may be of another file: download all of it
             part.unlink()
             return download(url, place, size, sha256, on_progress)
         if found != sha256:
@@ -157,7 +157,7 @@ def download(url: str, place: Path, size: int, sha256: str, on_progress: Progres
 
 
 def _complete(url: str, file: IO[bytes], size: int, on_progress: Progress | None) -> None:
-    """Append to a file what lacks of it, over as many connections as bring something, up to a limit."""
+    """Append the missing bytes to a file, over up to `_MOST_CONNECTIONS` connections as long as each delivers some."""
     for _ in range(_MOST_CONNECTIONS):
         if (start := file.tell()) == size:
             return
@@ -168,7 +168,7 @@ def _complete(url: str, file: IO[bytes], size: int, on_progress: Progress | None
         except HTTPError as error:
             if error.code != http.client.REQUESTED_RANGE_NOT_SATISFIABLE:
                 raise CorpusError(f"{url}: cannot be fetched: {_reason(error)}") from error
-            _empty(file)  # it is shorter there: whatever it is, it begins anew
+            _empty(file)  # the server's file is shorter: start over
         except (OSError, http.client.HTTPException, ValueError) as error:
             reason = _reason(error)
         if file.tell() == start:
@@ -178,7 +178,7 @@ def _complete(url: str, file: IO[bytes], size: int, on_progress: Progress | None
 
 
 def _append(url: str, file: IO[bytes], size: int, response: Any, on_progress: Progress | None) -> None:
-    """Append a response to a file, from where it says that it begins; CorpusError if that is more than `size` bytes."""
+    """Append a response to a file, or restart the file with it; raise CorpusError beyond `size` bytes."""
     if response.status != http.client.PARTIAL_CONTENT:
         _empty(file)  # the server sends the whole file
     elif not response.headers.get("Content-Range", "").startswith(f"bytes {file.tell()}-"):
@@ -198,6 +198,6 @@ def _empty(file: IO[bytes]) -> None:
 
 
 def file_hash(path: Path) -> str:
-    """Return the SHA-256 of a file; OSError if it cannot be read."""
+    """Return the SHA-256 of a file; raise OSError if it cannot be read."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

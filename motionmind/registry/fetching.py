@@ -1,4 +1,4 @@
-"""Fetching a corpus: from an index to a corpus of the user's own, verified, validated and learned here."""
+"""Fetch a corpus from an index: download, verify and validate it, and learn it on this machine."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from motionmind.registry.download import Progress, check_address, download, file
 from motionmind.registry.index import Archive, Entry, Recipe, Source, find, is_address, open_index
 
 _ARCHIVE = "archive.tar"
-_TOLD = ("title", "author", "source", "licence", "citation", "origins")  # by the index and the corpus, which must agree
+_TOLD = ("title", "author", "source", "licence", "citation", "origins")  # fields that index and corpus must agree on
 
 
 def archives() -> Path:
-    """Return the folder in which fetched archives are kept, each under its SHA-256."""
+    """Return the folder of fetched archives, each under its SHA-256."""
     return Path(platformdirs.user_cache_dir("motionmind", appauthor=False)) / "archives"
 
 
 def look_up(name: str, index: str | None = None) -> tuple[Entry | Recipe, Source]:
-    """Return what an index says of a corpus, and the index.
+    """Return the entry of a corpus in an index, and the index.
 
     Args:
-        name: of a corpus; or the address of an index, with "#name" after it if that holds several corpora.
-        index: the path or the address of an index to look in before the one that comes with MotionMind.
+        name: the name of a corpus; or the address of an index, with "#NAME" after it if that lists several corpora.
+        index: the path or the address of an index to search before the one that comes with MotionMind.
 
     Raises:
         CorpusError: there is no such corpus, or the index cannot be reached.
@@ -61,20 +61,20 @@ def fetch(
     home: str | os.PathLike[str] | None = None,
     on_progress: Progress | None = None,
 ) -> Path:
-    """Fetch a corpus, and return its folder among the user's own; it is written whole or not at all.
+    """Fetch a corpus, and return its folder among the user's own; it is written completely or not at all.
 
-    Its archive is kept, so that it is not downloaded again; a download that ends early is gone on with.
+    The archive is kept for the next time, and an incomplete download is resumed.
 
     Args:
         entry: the corpus, from `look_up`.
-        source: the index that it is in.
-        name: the name that it gets; its own by default.
+        source: its index.
+        name: its new name; its own by default.
         home: the user's home (`motionmind.corpus.store.home`).
-        on_progress: is told how many bytes of the archive there are.
+        on_progress: called with the number of bytes of the archive so far.
 
     Raises:
-        CorpusError: the name is invalid or taken, the archive cannot be got or is not the one that the index names, or
-            the corpus in it is not valid.
+        CorpusError: the name is invalid or taken, the archive cannot be downloaded or differs from the index, or the
+            corpus in it is invalid.
     """
     chosen = entry.name if name is None else name
     place = store.place_for(chosen, home)
@@ -92,14 +92,14 @@ def fetch(
 
 @contextmanager
 def _held(entry: Entry) -> Iterator[Path]:
-    """Hold the folder of an archive alone; nothing but archives is in it before or after."""
+    """Lock the folder of an archive, and remove unpacked files before and after."""
     folder = archives() / entry.archive.sha256
     try:
         make_folder(folder)
         with locked(folder, alone=True, is_new=True) as is_mine:
             if not is_mine:
                 raise CorpusError(f"{entry.name} is being fetched by another process")
-            shutil.rmtree(folder / "unpacked", ignore_errors=True)  # of a process that was killed
+            shutil.rmtree(folder / "unpacked", ignore_errors=True)  # left by a killed process
             try:
                 yield folder
             finally:
@@ -109,7 +109,7 @@ def _held(entry: Entry) -> Iterator[Path]:
 
 
 def _obtain(entry: Entry, source: Source, folder: Path, on_progress: Progress | None) -> Path:
-    """Return the verified archive of a corpus: a file beside a local index, the one that was kept, or a new one."""
+    """Return the verified archive of a corpus: a file beside a local index, the kept one, or a new download."""
     where, wanted = source.locate(entry.archive), entry.archive
     if is_address(where):
         check_address(where, source.place if is_address(source.place) else None)
@@ -125,12 +125,12 @@ def _obtain(entry: Entry, source: Source, folder: Path, on_progress: Progress | 
 
 
 def _is_archive(path: Path, wanted: Archive) -> bool:
-    """Return whether a file is the archive that an index names; a pipe or a device, which may have no end, is not."""
+    """Return whether a path is the archive that an index names; False for a pipe or a device, which may be endless."""
     return path.is_file() and path.stat().st_size == wanted.size and file_hash(path) == wanted.sha256
 
 
 def _learn(entry: Entry, archive: Path, folder: Path) -> Learned:
-    """Unpack an archive and learn from what it holds; CorpusError if that is not valid, or not what the index says."""
+    """Unpack an archive and learn its corpus; raise CorpusError if it is invalid or contradicts the index."""
     place = folder / entry.name
     unpack(archive, entry.files, place)
     try:

@@ -1,4 +1,4 @@
-"""Indexes of corpora: their schema, reading them, and finding a corpus in them."""
+"""Indexes of corpora: their schema, how to read them, and how to find a corpus."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Line = Annotated[str, msgspec.Meta(max_length=1000)]
 Text = Annotated[str, msgspec.Meta(max_length=100_000)]
 Hash = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
 Bytes = Annotated[int, msgspec.Meta(ge=0, le=2**50)]
-# A corpus's manifest, its licence, and the arrays of its first version: no name leads out of a folder.
+# A corpus's manifest, its licence, and the arrays of its first version: all names stay inside the folder.
 Member = Annotated[str, msgspec.Meta(pattern=r"^(manifest\.json|LICENCE\.txt|1/\w{1,64}(\.\w{1,64}){0,3}\.npy)$")]
 
 
@@ -48,17 +48,17 @@ class Entry(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         name: its name.
         title: a one-line description.
-        author: who made it.
-        performers: whose movement it is.
-        source: where the movement comes from.
-        licence: the name of the licence for its use.
-        licence_text: the licence itself.
-        citation: how to cite it; "" if nobody asks for that.
-        origins: the corpora that parts of it were taken from, with their licences.
-        corpus_version: the version of the form in which it is stored.
-        clips, postures: how many there are.
+        author: its author.
+        performers: the performers of its movement.
+        source: the origin of its movement.
+        licence: the name of its licence.
+        licence_text: the text of the licence.
+        citation: how to cite it; "" for no request.
+        origins: the corpora that parts of it come from, with their licences.
+        corpus_version: the version of its storage format.
+        clips, postures: their numbers.
         archive: the archive to fetch.
-        files: what is in the archive.
+        files: the files in the archive.
     """
 
     name: Name
@@ -77,7 +77,7 @@ class Entry(msgspec.Struct, frozen=True, kw_only=True):
     origins: Annotated[tuple[Origin, ...], msgspec.Meta(max_length=1000)] = ()
 
     def __post_init__(self) -> None:
-        """Check that files are listed once, and take no more than the archive."""
+        """Check that each file is listed once, and that all together are no larger than the archive."""
         names = [file.name for file in self.files]
         if twice := next((name for name in names if names.count(name) > 1), None):
             raise ValueError(f"{twice} is listed twice")
@@ -86,21 +86,21 @@ class Entry(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Recipe(msgspec.Struct, frozen=True, kw_only=True):
-    """A collection that must be got from those who publish it, and how it becomes a corpus.
+    """A collection that only its publisher may distribute, and how to build a corpus from it.
 
     Attributes:
         name: the name of the corpus.
         title: a one-line description.
-        performers: who moves in it, as far as that is known.
+        performers: its performers, as far as known.
         source: the address of the collection's own page.
         licence: the name of the licence.
         licence_text: what it allows and forbids.
-        accept: what must be accepted, and where.
+        accept: the terms to accept, and where.
         citation: how to cite it.
-        size: how much movement it is, in words.
-        form: the form of its files.
-        steps: how to get it and to build a corpus of it, in order; command lines begin with "motionmind".
-        unverified: what could not be verified of this recipe.
+        size: the amount of movement, in words.
+        form: the format of its files.
+        steps: how to obtain it and build a corpus from it, in order; command lines begin with "motionmind".
+        unverified: parts of this recipe that could not be verified.
     """
 
     name: Name
@@ -126,7 +126,7 @@ class Index(msgspec.Struct, frozen=True, kw_only=True):
     recipes: tuple[Recipe, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check that each name is there once."""
+        """Check that all names differ."""
         names: set[str] = set()
         for one in self.all:
             if one.name in names:
@@ -135,13 +135,13 @@ class Index(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def all(self) -> list[Entry | Recipe]:
-        """Its corpora and its recipes."""
+        """All corpora and recipes."""
         return [*self.corpora, *self.recipes]
 
 
 @dataclass(frozen=True)
 class Source:
-    """An index and where it was read: a path or an address, to which those of archives are relative."""
+    """An index and its path or address, which archives' addresses are relative to."""
 
     index: Index
     place: str
@@ -154,12 +154,12 @@ class Source:
 
 
 def is_address(place: str) -> bool:
-    """Return whether a place is an address, and no path."""
+    """Return whether a place is an address, not a path."""
     return "://" in place
 
 
 def parse_index(data: bytes, place: str) -> Index:
-    """Parse an index that was read from `place`; FormatError names what is wrong."""
+    """Parse an index that was read from `place`; raise FormatError with the reason if it is invalid."""
     if len(data) > LARGEST_INDEX:
         raise FormatError(f"is larger than an index may be ({LARGEST_INDEX // 10**6} MB)", path=place)
     try:
@@ -170,7 +170,7 @@ def parse_index(data: bytes, place: str) -> Index:
 
 
 def open_index(place: str | None) -> Source:
-    """Read an index from a path or an address; None for the one that comes with MotionMind, which holds recipes.
+    """Read an index from a path or an address; None reads the one that comes with MotionMind, which has recipes.
 
     Raises:
         CorpusError: it cannot be reached.
@@ -187,14 +187,14 @@ def open_index(place: str | None) -> Source:
 
 
 def find(name: str, places: Iterable[str | None]) -> tuple[Entry | Recipe, Source]:
-    """Return the first corpus or recipe of this name, and the index that it is in.
+    """Return the first corpus or recipe with a name, and its index.
 
     Args:
         name: its name.
-        places: the indexes to look in, as for `open_index`.
+        places: the indexes to search, as for `open_index`.
 
     Raises:
-        CorpusError: there is none; the message names those there are.
+        CorpusError: there is none; the message suggests a similar name or lists all.
     """
     known: list[str] = []
     for place in places:

@@ -1,4 +1,4 @@
-"""Publishing a corpus: a folder to put on any server that serves files, with an archive, metadata and an index."""
+"""Publish a corpus: write a folder with archive, metadata and index, for any file server."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _NEEDED = ("title", "author", "source", "licence")
 
 
 class Published(NamedTuple):
-    """The result of publishing: the entry in the index, and the files that were written."""
+    """The result of publishing: the entry in the index, and the written files."""
 
     entry: Entry
     files: tuple[Path, ...]
@@ -48,23 +48,23 @@ def publish(
 ) -> Published:
     """Write a corpus's archive, its Croissant metadata, and its entry in the index of a folder.
 
-    The same corpus gives the same bytes. Other corpora in the folder's index stay; one of the same name is replaced.
+    The same corpus gives the same bytes. Other corpora in the folder's index stay; one with the same name is replaced.
 
     Args:
-        name: of the corpus, or its folder.
-        folder: where to; it is made if it is not there.
+        name: the name of the corpus, or its folder.
+        folder: the target folder, which is created if necessary.
         url: the address that the folder will have.
         date: the day of publication, as "2026-11-23".
-        licence_text: the licence itself.
-        licence_url: its address, for those who know it by that.
+        licence_text: the text of the licence.
+        licence_url: the address of the licence, if it has one.
         home: the user's home (`motionmind.corpus.store.home`).
 
     Warns:
-        MotionMindWarning: the licences of its parts stand against passing it on.
+        MotionMindWarning: the licences of its parts do not allow redistribution.
 
     Raises:
-        CorpusError: there is no such corpus, it does not say whose it is or under which licence, or the folder cannot
-            be written.
+        CorpusError: there is no such corpus, it lacks a title, author, source or licence, or the folder cannot be
+            written.
     """
     check_address(url := url.rstrip("/") + "/")
     if licence_url is not None:
@@ -81,7 +81,7 @@ def publish(
         with locked(target, alone=True, is_new=True) as is_mine:
             if not is_mine:
                 raise CorpusError(f"{target}: another process is publishing there")
-            shutil.rmtree(staged, ignore_errors=True)  # of a process that was killed
+            shutil.rmtree(staged, ignore_errors=True)  # left by a killed process
             try:
                 save_movement(learned, staged / "corpus")
                 (staged / "corpus" / "LICENCE.txt").write_text(licence_text, "utf-8", newline="\n")
@@ -105,7 +105,7 @@ def _check_date(date: str) -> None:
 
 
 def _check_origin(corpus: Corpus) -> None:
-    """Check that a corpus says what it is, whose, and what may be done with it."""
+    """Check that a corpus has a title, author, source and licence."""
     if missing := [key for key in _NEEDED if not getattr(corpus, key)]:
         options = " ".join(f"--{key}" for key in missing)
         raise CorpusError(f"corpus {corpus.name!r} states no {', '.join(missing)}; build it again with {options}")
@@ -137,7 +137,7 @@ def _pack(corpus: Corpus, staged: Path, licence_text: str) -> Entry:
 
 
 def _write(entry: Entry, target: Path, staged: Path, described: dict[str, object]) -> tuple[Path, ...]:
-    """Move the archive into place, then write metadata and index, which name it."""
+    """Move the archive into place, then write the metadata and the index that name it."""
     index = target / INDEX
     others: tuple[Entry, ...] = ()
     recipes: tuple[Recipe, ...] = ()
@@ -146,7 +146,7 @@ def _write(entry: Entry, target: Path, staged: Path, described: dict[str, object
         others, recipes = tuple(one for one in before.corpora if one.name != entry.name), before.recipes
     corpora = tuple(sorted((*others, entry), key=lambda one: one.name))
     data = msgspec.json.encode(Index(format="motionmind-index", version=1, corpora=corpora, recipes=recipes))
-    parse_index(data, str(index))  # what is published can be read
+    parse_index(data, str(index))  # check that the published index is readable
     archive, metadata = target / entry.archive.url, target / f"{entry.name}.croissant.json"
     (staged / "archive.tar").replace(archive)
     sync_folder(target)
