@@ -1,1 +1,1 @@
-"""Gaps of a corpus: what to record next, so that tweens are cheaper and have fewer bridges."""
+"""Gaps of a corpus: which transitions to record next for cheaper tweens with fewer bridges."""

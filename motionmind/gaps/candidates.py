@@ -1,9 +1,9 @@
-"""Transitions that promise most: by how much each would lower the costs of a sample, if joints did not coordinate.
+"""Choose promising transitions: those that most lower a sample's costs, without the joints' coordination.
 
-Paths of T moves are bounded from below chain by chain: all chains make as many moves, and each state costs what it
-costs alone. A transition is a new edge in each joint graph that lacks it, and what it takes from the bounds is what it
-promises. By that a few are chosen, which are then solved exactly. A transition is a candidate where no joint turns by
-more than it does in some move of the corpus, so that it can be danced in one move.
+The cost of paths of T moves has a lower bound, the sum of one bound for each joint chain: all chains make T moves, and
+each state costs as much as alone. A transition adds an edge to each joint graph that lacks it; its gain is how much it
+lowers the bounds. The best few are later solved exactly. A transition is a candidate if no joint turns by more than in
+some move of the corpus, so that it can be danced in one move.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from motionmind.geometry import rotations as rot
 from motionmind.learned.model import LearnedCorpus
 from motionmind.tween.problem import build_model
 
-MOST_POSTURES = 400  # of a corpus, drawn at random, that transitions begin and end in
-MOST_CANDIDATES = 4000  # drawn at random of the transitions between them
-_FEWEST = 100  # candidates, however large the corpus is
-_WORK = 1e10  # edges that are looked at, about
+MOST_POSTURES = 400  # postures of a corpus, at most, drawn at random as ends of transitions
+MOST_CANDIDATES = 4000  # transitions between them, at most, drawn at random
+_FEWEST = 100  # candidates, at least, however large the corpus is
+_WORK = 1e10  # edges to visit, about
 
 
 def choose_candidates(learned: LearnedCorpus, pairs: Ints, moves: int, count: int, seed: int) -> list[Transition]:
-    """Choose transitions that promise to lower the costs of pairs of postures most, the best first.
+    """Choose the transitions that most lower the bounds on the costs of pairs of postures, the best first.
 
-    No two of them begin in the same posture, or end in the same.
+    No two of them share their first posture or their last.
 
     Args:
-        learned: what was learned.
-        pairs: the sample, by numbers of postures [P, 2].
+        learned: the learned corpus.
+        pairs: the sample, by indices of postures [P, 2].
         moves: the greatest number of moves of its paths.
-        count: how many to choose, at most; fewer where nothing promises anything.
-        seed: of the random choice of candidates.
+        count: how many to choose, at most; fewer if no other has a gain.
+        seed: seed of the random choice of candidates.
     """
     rng = np.random.default_rng(seed)
     chosen = _distinct(np.asarray(learned.states), rng)
@@ -55,13 +55,13 @@ def choose_candidates(learned: LearnedCorpus, pairs: Ints, moves: int, count: in
 
 
 def _distinct(states: Int32s, rng: np.random.Generator) -> Ints:
-    """Return the first posture of each row of states [N, L], or `MOST_POSTURES` of them drawn at random, in order."""
+    """Return the first posture of each distinct row of states [N, L], or `MOST_POSTURES` random ones, in order."""
     first = np.sort(np.unique(states, axis=0, return_index=True)[1])
     return first if len(first) <= MOST_POSTURES else np.sort(rng.choice(first, MOST_POSTURES, replace=False))
 
 
 def _danceable(learned: LearnedCorpus, chosen: Ints) -> Bools:
-    """Return whether no joint turns farther from one chosen posture to another than in any move [C, C]."""
+    """Return whether no joint turns farther between two chosen postures than in some move of the corpus [C, C]."""
     corpus, moves = learned.corpus, learned.corpus.moves
     joints = len(corpus.skeleton)
     chains = corpus.to_chains(np.asarray(corpus.rotations))[:, :joints]
@@ -78,7 +78,7 @@ class _Bounds:
     """Lower bounds of the costs of P pairs of postures, by chain and number of moves.
 
     Attributes:
-        edges: how many edges are looked at where all chains are bounded anew.
+        edges: number of edges to visit for new bounds of all chains.
     """
 
     def __init__(self, learned: LearnedCorpus, pairs: Ints, moves: int) -> None:
@@ -92,7 +92,7 @@ class _Bounds:
         self._known: dict[tuple[int, int, int], Floats] = {}
 
     def gain(self, transition: Transition) -> float:
-        """Return by how much a transition lowers the mean of the bounds, nats."""
+        """Return how much a transition lowers the mean bound, nats."""
         chains = self._chains.copy()
         for chain, (before, after) in enumerate(states_of(self._learned, transition).T.tolist()):
             if self._graph.edge(chain, before, after) < 0:
@@ -103,12 +103,12 @@ class _Bounds:
         return float((self._total(self._chains) - self._total(chains)).mean())
 
     def _total(self, chains: Floats) -> Floats:
-        """Return the least over all numbers of moves of what the chains [L, T + 1, P] cost together [P]."""
+        """Return the sum of bounds over chains [L, T + 1, P], minimised over numbers of moves [P]."""
         per_move = PLAIN.tau * np.arange(self._moves + 1)
         return np.asarray((chains.sum(axis=0) + per_move[:, None]).min(axis=0))
 
     def _bound(self, chain: int, edge: tuple[int, int] | None = None) -> Floats:
-        """Bound what each number of moves of a chain costs, from A to B [T + 1, P]; with an edge more, if given."""
+        """Return a chain's least cost from A to B by number of moves [T + 1, P], with an additional edge if given."""
         model, first, size = self._model, int(self._model.starts[chain]), int(self._graph.sizes()[chain])
         rows = model.indptr[first : first + size + 1]
         alone = model.alone[first : first + size]

@@ -1,4 +1,4 @@
-"""Gaps of a corpus: which joint graphs hang together worst, and which transitions would help its tweens most."""
+"""Find the gaps of a corpus: the worst-connected joint graphs, and the transitions that would help its tweens most."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from motionmind.geometry import rotations as rot
 from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.summary import joined_pairs
 
-TRIED = 4  # candidates that are solved exactly for each transition that is recommended
+TRIED = 4  # candidates that are solved exactly for each recommended transition
 MOST_PAIRS, MOST_TRANSITIONS = 10_000, 100
-OnProgress = Callable[[int, int], None]  # called with how many grammars were tried, and how many there are at most
+OnProgress = Callable[[int, int], None]  # called with grammars tried, and grammars in all, at most
 
 
 class Energy(msgspec.Struct, frozen=True):
-    """Means over a sample of tweens: the cost of the cheapest path and what is proven of it, nats, and its bridges."""
+    """Means over a sample of tweens: the cost of the cheapest path and its lower bound, nats, and its bridges."""
 
     cost: float
     lower_bound: float
@@ -51,13 +51,13 @@ class Place(msgspec.Struct, frozen=True):
     """A posture of the corpus.
 
     Attributes:
-        corpus: the corpus that its clip comes from.
+        corpus: the corpus of its clip.
         clip: the clip.
         mirrored: whether left and right are exchanged.
-        posture: its number in the clip, from 0.
+        posture: its index in the clip, from 0.
         seconds: its time in the recording.
-        near: the nearest posture that has a name; "" if none has.
-        degrees: the mean angle of a joint from there.
+        near: the nearest named posture; "" if there is none.
+        degrees: mean over joints of the angle to it.
     """
 
     corpus: str
@@ -73,11 +73,11 @@ class Recommended(msgspec.Struct, frozen=True):
     """A transition to record.
 
     Attributes:
-        begin: the posture that it leads from.
-        end: the posture that it leads to.
-        joints: those that make a move that no clip attests.
-        energy: of the sample, with this transition and all before it recorded.
-        postures: the two postures' numbers in the corpus.
+        begin: its first posture.
+        end: its last posture.
+        joints: joints with a move that no clip attests.
+        energy: energy of the sample once this transition and all before it are recorded.
+        postures: indices of both postures in the corpus.
     """
 
     begin: Place
@@ -93,10 +93,10 @@ class Gaps(msgspec.Struct, frozen=True):
     Attributes:
         corpus: its name.
         pairs: number of random pairs of postures in the sample.
-        seed: of their random choice.
-        energy: of the sample.
+        seed: seed of their random choice.
+        energy: energy of the sample.
         joints: the joint graphs, the worst first.
-        transitions: what to record, in this order.
+        transitions: transitions to record, in this order.
 
     >>> from motionmind import Engine, find_gaps
     >>> gaps = find_gaps(Engine.load("macarena"), pairs=4, count=1)
@@ -121,18 +121,18 @@ def find_gaps(
     named: Mapping[str, Posture] | None = None,
     on_progress: OnProgress | None = None,
 ) -> Gaps:
-    """Find the joint graphs that hang together worst, and the transitions that would lower the sample's cost most.
+    """Find the worst-connected joint graphs, and the transitions that would lower a sample's cost most.
 
-    Transitions are chosen one after the other: of those that promise most, `TRIED` are added to the corpus in turn, its
-    grammar is learned again and the sample solved again, and the best stays.
+    Transitions are chosen one after the other: each of the `TRIED` most promising is added to the corpus, whose grammar
+    is learned again and the sample solved again; the best stays.
 
     Args:
-        learned: what was learned.
-        pairs: how many random pairs of postures to join.
-        count: how many transitions to recommend; fewer where none helps any more.
-        seed: of the random choice.
+        learned: the learned corpus.
+        pairs: number of random pairs of postures to join.
+        count: number of transitions to recommend; fewer if no other helps.
+        seed: seed of the random choice.
         named: postures by name, on any skeleton.
-        on_progress: called before each grammar that is tried.
+        on_progress: called before each grammar is tried.
 
     Raises:
         MotionMindError: a number is out of its range, or the corpus has a single posture.
@@ -173,7 +173,7 @@ def find_gaps(
 
 
 def _cost(solved: Solved) -> float:
-    """Return the mean cost, rounded, so that the last bits of sums do not decide."""
+    """Return the mean cost, rounded, so that rounding errors of sums do not decide."""
     return round(float(solved.costs.mean()), 9)
 
 
@@ -183,7 +183,7 @@ def _energy(solved: Solved) -> Energy:
 
 
 def _joint_gaps(learned: LearnedCorpus, sample: Ints, solved: Solved) -> list[JointGap]:
-    """Return the joint graphs by how many pairs they do not join, then by their bridges, the worst first."""
+    """Return the joint graphs, the worst first: by the share of pairs that they do not join, then by bridges."""
     graph = learned.grammar.transitions
     apart = 1.0 - joined_pairs(learned.grammar, np.asarray(learned.states), sample).mean(axis=0)
     bridges = solved.bridged.mean(axis=0)
@@ -197,7 +197,7 @@ def _joint_gaps(learned: LearnedCorpus, sample: Ints, solved: Solved) -> list[Jo
 def _recommend(
     learned: LearnedCorpus, transition: Transition, solved: Solved, named: Mapping[str, Posture]
 ) -> Recommended:
-    """Describe a transition that is to be added to what was learned."""
+    """Describe a transition that the learned corpus lacks."""
     edges = learned.grammar.transitions.edges(states_of(learned, transition))[0]
     joints = [joint for joint, edge in zip(learned.grammar.chains, edges, strict=True) if edge < 0]
     begin, end = (_place(learned, posture, named) for posture in transition)
@@ -205,7 +205,7 @@ def _recommend(
 
 
 def _place(learned: LearnedCorpus, posture: int, named: Mapping[str, Posture]) -> Place:
-    """Describe where a posture of the corpus is found, and which named one is the nearest."""
+    """Describe a posture of the corpus by its clip and time, and by the nearest named posture."""
     corpus = learned.corpus
     clip = corpus.clip_of(posture)
     near = {
@@ -226,7 +226,7 @@ def _place(learned: LearnedCorpus, posture: int, named: Mapping[str, Posture]) -
 
 
 def _upright(rotations: Floats) -> Floats:
-    """Return local rotations [J, 4] of a body that faces +Z."""
+    """Turn local rotations [J, 4] so that the body faces +Z."""
     out = np.array(rotations)
     out[0] = rot.mul(rot.about_vertical(-rot.heading(out[0])), out[0])
     return out

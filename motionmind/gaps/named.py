@@ -1,4 +1,4 @@
-"""Postures with names, by which places in a corpus can be told."""
+"""Named postures, to describe places in a corpus."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from motionmind.names.spelling import Source
 
 
 def named_postures(corpus: str, home: Path | None = None) -> dict[str, Posture]:
-    """Return the postures that a corpus names; those of the bundled corpora, as "ballet/tendu", where it names none.
+    """Return the named postures of a corpus; if it has none, those of the bundled corpora, as "ballet/tendu".
 
     Args:
         corpus: its name or folder.
-        home: the folder of the user's corpora; None for the usual one.
+        home: the folder of the user's corpora; None for the default folder.
 
     Raises:
         CorpusError: there is no such corpus.

@@ -1,7 +1,7 @@
-"""A sample of random pairs of a corpus's postures, and the cheapest paths that join them.
+"""Draw random pairs of a corpus's postures, and find the cheapest paths that join them.
 
-The paths are those of the grammar alone: of any number of moves, without the guide and the corpus's pace. So they tell
-how well the joint graphs hang together, and what a transition more is worth.
+The paths depend on the grammar alone: they have any number of moves, no guide and no pace of the corpus. They show how
+well the joint graphs are connected, and the value of another transition.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ class Solved(NamedTuple):
 
     Attributes:
         costs: nats [P].
-        bounds: no path costs less, nats [P].
+        bounds: lower bounds of all paths' costs, nats [P].
         moves: numbers of moves [P].
-        bridged: joints' moves that no clip attests [P, L].
+        bridged: numbers of moves of each joint chain that no clip attests [P, L].
     """
 
     costs: Floats
@@ -40,7 +40,7 @@ class Solved(NamedTuple):
 
 
 def draw_pairs(corpus: Corpus, pairs: int, seed: int) -> Ints:
-    """Draw pairs of different postures of a corpus, by their numbers [P, 2].
+    """Draw pairs of different postures of a corpus, by index [P, 2].
 
     Raises:
         MotionMindError: the corpus has a single posture.
@@ -53,7 +53,7 @@ def draw_pairs(corpus: Corpus, pairs: int, seed: int) -> Ints:
 
 
 def solve_pairs(learned: LearnedCorpus, pairs: Ints) -> Solved:
-    """Find the cheapest paths from the first posture to the second of pairs [P, 2], as `PLAIN` asks."""
+    """Find the cheapest path between the postures of each pair [P, 2], with the options of `PLAIN`."""
     costs, bounds, moves = np.zeros(len(pairs)), np.zeros(len(pairs)), np.zeros(len(pairs), np.int64)
     bridged = np.zeros((len(pairs), len(learned.grammar.chains)), np.int64)
     for number, (a, b) in enumerate(pairs.tolist()):
@@ -70,6 +70,6 @@ def _posture(corpus: Corpus, number: int) -> Posture:
 
 
 def _count_bridges(path: Int32s, grammar: Grammar) -> Ints:
-    """Count the moves of each chain that no clip attests in a path [T + 1, L], but for waits at the goal [L]."""
+    """Count each chain's moves in a path [T + 1, L] that no clip attests, without waits at the goal [L]."""
     waits = (path[:-1] == path[1:]) & (path[:-1] == path[-1])
     return np.asarray(((grammar.transitions.edges(path) < 0) & ~waits).sum(axis=0))

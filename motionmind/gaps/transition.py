@@ -1,4 +1,4 @@
-"""A transition that could be recorded: from one posture of a corpus to another in one move; and learning with it."""
+"""A transition to record, one move between two postures of a corpus, and how to learn a grammar with it."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from motionmind.realise.timeline import usual
 
 
 class Transition(NamedTuple):
-    """A move from posture `begin` of a corpus to its posture `end`, by their numbers.
+    """A move from posture `begin` of a corpus to its posture `end`, by index.
 
-    Where the facing is free, the body keeps the direction that it faces.
+    If the facing is free, the body keeps its heading.
     """
 
     begin: int
@@ -25,10 +25,10 @@ class Transition(NamedTuple):
 
 
 def with_transitions(learned: LearnedCorpus, transitions: list[Transition]) -> LearnedCorpus:
-    """Return a learned corpus with the grammar that it would have with some transitions recorded, each as a clip.
+    """Return a learned corpus with the grammar that it would have if each transition were recorded as a clip.
 
-    The clips have the weight of the heaviest clips, and their moves the usual duration. The states stay what they are,
-    and so does all but the grammar: the movement, the carriage and the pace.
+    These clips have the greatest weight of a clip, and their moves the usual duration. Only the grammar changes: states,
+    movement, posture statistics and pace stay.
     """
     if not transitions:
         return learned
