@@ -1,1 +1,1 @@
-"""Workers to hand jobs to: this process, others on this machine, or a cluster, by one `concurrent.futures.Executor`."""
+"""Workers for jobs: this process, others on this machine, or a cluster, each as a `concurrent.futures.Executor`."""

@@ -1,4 +1,4 @@
-"""Teams of the workers of a cluster, by Dask's distributed scheduler (an extra)."""
+"""Teams of workers on a cluster, with Dask's distributed scheduler (an extra)."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from urllib.parse import urlsplit
 from motionmind.errors import MotionMindError
 from motionmind.executors.team import AHEAD, Team
 
-_PORT = 8786  # of a Dask scheduler, if it is told no other
-_ANSWERS = 10.0  # seconds within which a scheduler answers
-_PATIENCE = 60.0  # seconds for which a cluster may have no workers, before it is taken to be gone
+_PORT = 8786  # default port of a Dask scheduler
+_ANSWERS = 10.0  # seconds for a scheduler to answer
+_PATIENCE = 60.0  # seconds without workers until a cluster counts as lost
 
 
 @contextmanager
@@ -24,25 +24,25 @@ def cluster(address: str) -> Iterator[Team]:
     """Open a team of the workers of a cluster.
 
     Args:
-        address: its scheduler's, such as "tcp://192.168.0.7:8786".
+        address: address of its scheduler, such as "tcp://192.168.0.7:8786".
 
     Raises:
-        MotionMindError: the extra is not installed, nobody answers there, or no worker comes.
+        MotionMindError: the extra is not installed, no scheduler answers there, or no worker appears.
     """
     try:
         from distributed import Client
         from distributed.scheduler import KilledWorker
     except ImportError as error:
         raise MotionMindError(f'a cluster needs an extra: pip install "motionmind[scale]" ({error})') from None
-    for name in ("distributed", "distributed.client"):  # what goes wrong is said once, by us
+    for name in ("distributed", "distributed.client"):  # we report each error once, ourselves
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    connect: Any = Client  # which has no types
+    connect: Any = Client  # untyped
     try:
         place = urlsplit(address)
-        # Asked first: a client that reaches nobody complains long after its error.
+        # Try to connect first: a client without a scheduler logs errors long after it fails.
         socket.create_connection((place.hostname or "", place.port or _PORT), _ANSWERS).close()
         client = connect(address, timeout=_ANSWERS, set_as_default=False)
-    except (OSError, ValueError) as error:  # a time that is up is an OSError
+    except (OSError, ValueError) as error:  # a timeout is an OSError
         raise MotionMindError(f"{address}: no scheduler answers there (tcp://HOST:{_PORT} is usual): {error}") from None
     try:
         watch = _Watch(client, address)
@@ -51,7 +51,7 @@ def cluster(address: str) -> Iterator[Team]:
                 raise MotionMindError(reason)
             time.sleep(0.1)
         yield Team(
-            # Results are ours to keep, so no name is derived from a job; Dask tries a job again on another worker.
+            # Not pure: Dask needs no names derived from jobs. It retries a job on another worker by itself.
             lambda: client.get_executor(pure=False),
             lambda: AHEAD * max(watch.threads, 1),
             (KilledWorker, BrokenExecutor),
@@ -62,10 +62,10 @@ def cluster(address: str) -> Iterator[Team]:
 
 
 class _Watch:
-    """Whether a cluster is there.
+    """Watches whether a cluster is available.
 
     Attributes:
-        threads: how many jobs its workers do at once, when that was last asked.
+        threads: number of jobs that its workers run at once, when last queried.
     """
 
     def __init__(self, client: Any, address: str) -> None:
@@ -75,7 +75,7 @@ class _Watch:
         self.missing()
 
     def missing(self) -> str:
-        """Ask for the workers; return why they are out of reach, or "" while there is hope."""
+        """Query the workers; return why they are unavailable, or "" if they may still be available."""
         if self._client.status == "running":
             try:
                 self.threads = sum(self._client.nthreads().values())

@@ -1,4 +1,4 @@
-"""Executors on this machine: this very process, its threads, and pools of other processes."""
+"""Executors on this machine: this process, its threads, and pools of other processes."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from motionmind.executors.team import AHEAD, Team
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 
-# Linear algebra starts a thread for each core in every process, unless these say otherwise when it is loaded.
+# Linear algebra starts a thread for each core in every process, unless these variables are set when it is loaded.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class Here(Executor):
-    """An executor that does each job in this process, when it is submitted."""
+    """An executor that runs each job in this process, on submission."""
 
     def submit(self, function: Callable[_P, _T], /, *arguments: _P.args, **named: _P.kwargs) -> Future[_T]:
-        """Do a job, and return what came of it."""
+        """Run a job, and return its finished future."""
         future: Future[_T] = Future()
         try:
             future.set_result(function(*arguments, **named))
@@ -35,12 +35,12 @@ class Here(Executor):
 
 
 def this_process() -> Team:
-    """Return a team of this process alone, which does a job at a time."""
+    """Return a team of this process alone, which runs one job at a time."""
     return Team(Here, lambda: 1)
 
 
 def threads(number: int) -> Team:
-    """Return a team of so many threads of this process: for jobs that mostly compute in compiled code."""
+    """Return a team of `number` threads of this process, for jobs that run mostly in compiled code."""
     if number == 1:
         return this_process()
     return Team(lambda: ThreadPoolExecutor(number), lambda: AHEAD * number)
@@ -48,8 +48,8 @@ def threads(number: int) -> Team:
 
 @contextmanager
 def processes(number: int) -> Iterator[Team]:
-    """Open a team of so many processes; they end with the context, or with this process, even if that is killed."""
-    import multiprocessing  # which takes a tween from a built corpus a while to import, and it needs none
+    """Open a team of `number` processes; they end with the context, or with this process, even if it is killed."""
+    import multiprocessing  # slow to import, and most tweens do not need it
     from concurrent.futures import ProcessPoolExecutor
 
     before = {name: os.environ.get(name) for name in _THREADS}
@@ -74,11 +74,11 @@ def processes(number: int) -> Iterator[Team]:
 
 
 def _begin() -> None:
-    """Prepare a worker: Ctrl-C is for the process that started it, with which it ends, however that ends."""
+    """Prepare a worker: it ignores Ctrl-C, and ends with its parent, however that ends."""
     import multiprocessing
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    atexit.register(gc.freeze)  # at the end Python would look for garbage among all that was imported
+    atexit.register(gc.freeze)  # skips the garbage collection at exit, which is slow
     threading.Thread(target=_end_with, args=(multiprocessing.parent_process(),), daemon=True).start()
 
 

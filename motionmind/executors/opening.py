@@ -1,4 +1,4 @@
-"""Opens a team of workers: by their number, or by the address of a cluster."""
+"""Open a team of workers: by their number, or by the address of a cluster."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from motionmind.executors.team import Team
 
 @contextmanager
 def open_team(workers: int = 1, scheduler: str | None = None) -> Iterator[Team]:
-    """Open a team of workers; what they are does not change what they make.
+    """Open a team of workers; results do not depend on the kind of team.
 
     Args:
         workers: the number of processes; 1 for this one alone.
-        scheduler: address of a Dask scheduler, whose workers are taken instead: "tcp://192.168.0.7:8786".
+        scheduler: address of a Dask scheduler, whose workers to use instead: "tcp://192.168.0.7:8786".
 
     Raises:
         MotionMindError: the number is below 1, no scheduler answers at the address, or the extra is not installed.

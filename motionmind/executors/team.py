@@ -1,9 +1,8 @@
-"""Jobs handed to workers, and handed out again when a worker dies with them.
+"""Run jobs on workers, and run them again when a worker dies.
 
-Whoever has jobs sees one thing, a `Team`, whatever works them: it makes an executor, and makes a new one when that
-breaks. A pool of processes breaks as a whole if one of them dies, and does not say by which job. So the jobs that were
-under way are then done one at a time: that finds a job that always ends its worker, and spares memory if its lack was
-the reason.
+A `Team` hides the kind of workers: it makes an executor, and replaces a broken one. A pool of processes breaks as a
+whole if one of them dies, and does not tell which job was the cause. The team therefore repeats the unfinished jobs one
+at a time: this finds a job that always kills its worker, and saves memory if a lack of it was the reason.
 """
 
 from __future__ import annotations
@@ -20,24 +19,24 @@ from motionmind.errors import MotionMindError
 _Job = TypeVar("_Job")
 _Result = TypeVar("_Result")
 
-MOST_TIMES = 3  # that a job may end the worker that it is alone on
+MOST_TIMES = 3  # attempts for a job that kills its worker, alone
 AHEAD = 3  # jobs under way for each worker
-_LOOK = 1.0  # seconds after which a team asks whether its workers are still there
+_LOOK = 1.0  # seconds between checks of the workers
 
 
 class UnfinishedError(MotionMindError):
-    """Work that was broken off by no fault of its input: what is done is kept, for the same command to go on from."""
+    """Work was interrupted through no fault of its input; finished parts are kept, and the same command resumes it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Team:
-    """Workers, by the executor that hands them jobs.
+    """Workers behind an executor.
 
     Attributes:
         make: makes an executor; called again when one breaks.
-        ahead: returns how many jobs to keep under way: enough that no worker idles, few enough that none is held long.
-        lost: errors of a job by which its worker died.
-        missing: returns why the workers cannot be reached any more; "" while they can.
+        ahead: returns the number of jobs to keep submitted: enough to keep all workers busy, but no more.
+        lost: errors that mean that a job's worker died.
+        missing: returns why the workers are unreachable; "" if they are reachable.
     """
 
     make: Callable[[], Executor]
@@ -46,14 +45,15 @@ class Team:
     missing: Callable[[], str] = str
 
     def map(self, function: Callable[[_Job], _Result], jobs: Iterable[_Job]) -> Iterator[_Result]:
-        """Yield the results of `function` for all jobs, in their order.
+        """Yield the results of `function` for all jobs, in order.
 
         Args:
-            function: what to do; a function of a module, as pickle requires. Done again, it must do the same.
-            jobs: taken as workers become free: a long or endless iterable fills no memory.
+            function: a picklable function; repeating a call must give the same result.
+            jobs: the jobs, consumed as workers become free; may be endless.
 
         Raises:
-            UnfinishedError: workers die of a job again and again, or are out of reach; and what `function` raises.
+            UnfinishedError: a job kills its workers repeatedly, or the workers are unreachable.
+            Exception: any error of `function`.
         """
         waiting = iter(jobs)
         under_way: deque[tuple[_Job, Future[_Result]]] = deque()
@@ -69,7 +69,7 @@ class Team:
                 except self.lost:
                     executor.shutdown(wait=False)
                     executor = self.make()
-                    # Those that were done before it broke are not done again.
+                    # Jobs that finished before the failure are not repeated.
                     for job, future in list(under_way):
                         done = future
                         if not self._is_done(future):
@@ -87,7 +87,7 @@ class Team:
     def _alone(
         self, executor: Executor, function: Callable[[_Job], _Result], job: _Job
     ) -> tuple[Executor, Future[_Result]]:
-        """Do a job while no other is under way; return the executor, made anew if it broke, and what was done."""
+        """Run a job alone; return the executor, a new one if it broke, and the finished future."""
         for _ in range(MOST_TIMES):
             future = _submit(executor, function, job)
             try:
@@ -96,7 +96,7 @@ class Team:
                 executor.shutdown(wait=False)
                 executor = self.make()
                 continue
-            except Exception:  # of the job itself: raised where its result is taken
+            except Exception:  # the job's own error: raised when its result is read
                 pass
             return executor, future
         raise UnfinishedError(
@@ -104,17 +104,17 @@ class Team:
         )
 
     def _wait(self, future: Future[_Result]) -> _Result:
-        """Return a result when it is there; MotionMindError if its worker is out of reach."""
+        """Wait for a result; raise UnfinishedError if the workers are unreachable."""
         while not wait([future], _LOOK).done:
             if reason := self.missing():
                 raise _gone(reason)
         try:
             return future.result()
-        except Cancelled:  # nobody here cancels: the workers' side did
+        except Cancelled:  # cancelled by the workers' side: this side never cancels
             raise _gone(self.missing() or "the workers have dropped what they were given") from None
 
     def _is_done(self, future: Future[Any]) -> bool:
-        """Return whether a job was done, be it with an error of its own."""
+        """Return whether a job has finished, with a result or an error of its own."""
         return future.done() and not future.cancelled() and not isinstance(future.exception(), self.lost)
 
 
@@ -122,7 +122,7 @@ _NONE: Any = object()
 
 
 def _submit(executor: Executor, function: Callable[[_Job], _Result], job: _Job) -> Future[_Result]:
-    """Submit a job; to an executor that has broken since, as a job that broke it."""
+    """Submit a job; if the executor is broken, return a failed future."""
     try:
         return executor.submit(function, job)
     except BrokenExecutor as error:

@@ -1,7 +1,7 @@
-"""A workshop: threads for work that can be done apart, and room for arrays that are larger than memory.
+"""A workshop: threads for parallel work, and storage for arrays larger than memory.
 
-Large arrays are mapped from files in a folder, which the system writes and reads as it has memory to spare. The files
-have no names, so nothing is left of them when the arrays are gone, however the process ends.
+Large arrays are memory-mapped from files in a folder, which the system writes and reads as needed. The files have no
+names, so they vanish with their arrays, however the process ends.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ _Result = TypeVar("_Result")
 _One = TypeVar("_One")
 _Other = TypeVar("_Other")
 
-LARGE = 1 << 26  # bytes of an array that is mapped from a file
+LARGE = 1 << 26  # bytes from which an array is mapped from a file
 
 
 @dataclass(frozen=True)
 class Workshop:
-    """Threads, and room for large arrays.
+    """Threads, and storage for large arrays.
 
     Attributes:
-        team: the threads; they share memory with those who have work.
-        folder: for large arrays; None keeps all in memory.
+        team: the threads; they share the caller's memory.
+        folder: folder for large arrays; None keeps all in memory.
     """
 
     team: Team = field(default_factory=this_process)
@@ -43,27 +43,27 @@ class Workshop:
 
     @classmethod
     def of(cls, workers: int, folder: Path | None = None) -> Workshop:
-        """Return a workshop of so many threads."""
+        """Return a workshop with `workers` threads."""
         return cls(threads(workers), folder)
 
     def map(self, function: Callable[[_Job], _Result], jobs: Iterable[_Job]) -> Iterator[_Result]:
-        """Yield the results of `function` for all jobs, in their order."""
+        """Yield the results of `function` for all jobs, in order."""
         return self.team.map(function, jobs)
 
     def do(self, function: Callable[[_Job], None], jobs: Iterable[_Job]) -> None:
-        """Do all jobs, in any order."""
+        """Run all jobs, in any order."""
         for _ in self.team.map(function, jobs):
             pass
 
     def both(self, one: Callable[[], _One], other: Callable[[], _Other]) -> tuple[_One, _Other]:
-        """Return the results of two jobs, side by side if there is more than one worker."""
+        """Run two jobs, in parallel if there is more than one worker; return their results."""
         kept: dict[int, Any] = {}
         jobs: list[tuple[int, Callable[[], Any]]] = [(0, one), (1, other)]
         self.do(lambda job: kept.update({job[0]: job[1]()}), jobs)
         return kept[0], kept[1]
 
     def empty(self, shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray[Any]:
-        """Return an array that is not filled yet.
+        """Return an uninitialised array.
 
         Raises:
             OSError: the folder's disk is full.
@@ -72,20 +72,20 @@ class Workshop:
         if self.folder is None or size < LARGE:
             return np.empty(shape, dtype)
         with _nameless(self.folder) as file:
-            # A page that finds no room when it is written would end the process.
+            # Reserve the space: writing to a mapped page on a full disk would kill the process.
             os.posix_fallocate(file.fileno(), 0, size) if hasattr(os, "posix_fallocate") else file.truncate(size)
             return _map(file, shape, np.dtype(dtype))
 
     def pile(self) -> Pile:
-        """Return an array that is to grow."""
+        """Return an empty array that can grow."""
         return Pile(self.folder)
 
 
 class Pile:
-    """Rows that are put on each other, and become one array.
+    """An array that grows by rows.
 
     Args:
-        folder: of the file that takes them; None keeps them in memory.
+        folder: the folder of its file; None keeps the rows in memory.
     """
 
     def __init__(self, folder: Path | None) -> None:
@@ -116,7 +116,7 @@ class Pile:
         self._file.write(np.ascontiguousarray(rows).data)
 
     def array(self) -> NDArray[Any]:
-        """Return all rows, one at least; nothing can be added any more."""
+        """Return all rows, at least one; afterwards, no more can be added."""
         if self._file is None:
             return np.concatenate(self._rows)
         with self._file as file:
@@ -129,5 +129,5 @@ def _nameless(folder: Path) -> IO[bytes]:
 
 
 def _map(file: IO[bytes], shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Return the array that a file holds; a plain view, for the subclass slows every slice."""
+    """Map an array from a file; return a plain view, because `np.memmap` slows down every slice."""
     return np.asarray(np.memmap(file, dtype, "r+", shape=shape)) if math.prod(shape) else np.empty(shape, dtype)
