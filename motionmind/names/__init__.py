@@ -1,1 +1,1 @@
-"""Names of movement and postures, such as ballet/arabesque and clip.bvh@240: how they are spelled, what they name."""
+"""Names of movements and postures, such as ballet/arabesque and clip.bvh@240: how to parse and resolve them."""

@@ -1,4 +1,4 @@
-"""Ends of a tween by their names, such as "clip.bvh@240~": the posture, and the movement on its other side."""
+"""Find the ends of a tween by name, such as "clip.bvh@240~": the posture, and the movement beside it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from motionmind.names.spelling import PostureName, parse_posture
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion, Posture
 
-_AROUND = 0.2  # seconds of a clip before or after a moving posture; a velocity takes the nearest of them
+_AROUND = 0.2  # seconds of a clip before or after a moving posture; velocity uses the nearest frames
 _ROUNDING = 1e-6  # seconds
 
 
@@ -27,16 +27,16 @@ def find_end(
     *,
     read: Callable[[Path], Motion] = read_motion,
 ) -> tuple[Posture, Motion | None]:
-    """Find the posture of a name, and, if that ends in ~, the movement on one side of it.
+    """Find a posture by name and, if the name ends in ~, the movement on one side of it.
 
     Args:
         name: the name, or its spelling.
-        side: the side of the posture on which movement is taken: before A, after B.
-        home: the folder of the user's corpora; None for the usual one.
+        side: the side of the movement: before A, after B.
+        home: the folder of the user's corpora; None for the default folder.
         read: reads a file.
 
     Raises:
-        MotionMindError: there is no such posture; or it is to be moving and there is no movement on that side.
+        MotionMindError: there is no such posture; or the name ends in ~ and there is no movement on that side.
 
     >>> posture, before = find_end("ballet/adagio@23~", "before")
     >>> before is not None and len(before) > 1

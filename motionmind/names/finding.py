@@ -1,4 +1,4 @@
-"""Finds what names of movement and postures name (`motionmind.names.spelling`)."""
+"""Find movements and postures by name (`motionmind.names.spelling`)."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from motionmind.notation import compose
 from motionmind.notation.read import read_scores
 from motionmind.notation.score import Score
 
-_MOST = 60  # names in a message
-_POSTURES = 64  # that are kept, each with its whole score
-_SCORES = 16  # files, or corpora, whose scores are kept
-_SUFFIX = re.compile(r"\.[a-z]\w{1,4}", re.IGNORECASE | re.ASCII)  # as names of files end
+_MOST = 60  # names in a message, at most
+_POSTURES = 64  # in the cache, each with its whole score
+_SCORES = 16  # files or corpora with scores in the cache
+_SUFFIX = re.compile(r"\.[a-z]\w{1,4}", re.IGNORECASE | re.ASCII)  # suffix of a file name
 
 
 class Collection(ABC):
-    """Clips and postures that have names: a score's or a corpus's.
+    """Named clips and postures of a score or a corpus.
 
     Attributes:
         word: its path or name, for messages.
@@ -48,22 +48,22 @@ class Collection(ABC):
     @property
     @abstractmethod
     def clips(self) -> Mapping[str, str]:
-        """The clips in order: the name of each, and what it is about."""
+        """Descriptions of the clips by name, in order."""
 
     @abstractmethod
     def posture(self, name: str) -> Posture:
-        """Return one of the postures."""
+        """Return a posture by name."""
 
     def credits_of(self, name: str) -> tuple[Credit, ...]:
-        """Return the credits of one of the postures; none where that is not known."""
+        """Return the credits of a posture; none if unknown."""
         return ()
 
     @abstractmethod
     def motions(self, names: Sequence[str]) -> list[Motion]:
-        """Return some of the clips."""
+        """Return clips by name."""
 
     def choose(self, wanted: Sequence[str] = ()) -> list[Motion]:
-        """Return the clips with these names, each once, or all; MotionMindError if one is not there."""
+        """Return the clips with these names, each once, or all; raise MotionMindError if one does not exist."""
         if not self.clips:
             raise MotionMindError(f"{self.word}: holds no clips")
         for name in wanted:
@@ -72,7 +72,7 @@ class Collection(ABC):
         return self.motions(list(dict.fromkeys(wanted)) or list(self.clips))
 
     def find(self, name: str, *, as_clip: bool) -> Motion:
-        """Return a posture, as a motion of one frame, or a clip: the clip if it `as_clip` goes first, and both exist.
+        """Return a posture, as a motion of one frame, or a clip; if both exist, the clip if `as_clip`.
 
         Raises:
             MotionMindError: neither has this name.
@@ -83,7 +83,7 @@ class Collection(ABC):
         return replace(self.posture(name).as_motion(), name=name, recorded=self.credits_of(name))
 
     def check(self, name: str) -> None:
-        """Raise MotionMindError, which suggests one, if neither a posture nor a clip has this name."""
+        """Raise MotionMindError, with a suggestion, if neither a posture nor a clip has this name."""
         if name not in self.postures and name not in self.clips:
             place, at, moment = name.rpartition("@")
             if at and (place in self.postures or place in self.clips):
@@ -93,7 +93,7 @@ class Collection(ABC):
 
 
 class _ScoreCollection(Collection):
-    """A score's clips and postures, and the postures of scores that it includes."""
+    """A score's clips and postures, and the postures of included scores."""
 
     def __init__(self, path: str, home: Path | None) -> None:
         super().__init__(path)
@@ -116,9 +116,9 @@ class _ScoreCollection(Collection):
 
 
 class _CorpusCollection(Collection):
-    """A corpus's clips; one that people wrote has the postures that its scores name, too.
+    """A corpus's clips, and the named postures of its scores if it is written by hand.
 
-    What there is by name in one that people wrote is read from its scores: to learn it takes a while, the first time.
+    Names in a corpus written by hand come from its scores, because learning it takes a while the first time.
     """
 
     def __init__(self, name: str, home: Path | None) -> None:
@@ -128,7 +128,7 @@ class _CorpusCollection(Collection):
 
     @cached_property
     def _written(self) -> SourceManifest | None:
-        """The manifest that people wrote; None for a corpus that was built."""
+        """The manifest of a corpus written by hand; None for a built corpus."""
         manifest = store.read_manifest(self._folder)
         if manifest["format"] == store.BUILT:
             return None
@@ -136,12 +136,12 @@ class _CorpusCollection(Collection):
 
     @cached_property
     def _all_scores(self) -> Sequence[Score]:
-        """The scores of a corpus that people wrote, in order."""
+        """The scores of a corpus written by hand, in order."""
         return _read_once(tuple(self._folder / name for name in self._written.scores)) if self._written else ()
 
     @cached_property
     def _scores(self) -> dict[str, Score]:
-        """The score that names each posture, the first if several do."""
+        """The score of each posture by name, the first if several scores have it."""
         found: dict[str, Score] = {}
         for score in self._all_scores:
             found = dict.fromkeys(score.postures, score) | found
@@ -182,7 +182,7 @@ class _CorpusCollection(Collection):
 
 
 class _Labels(Mapping[str, str]):
-    """The clips of a corpus by their labels: what each is about; to find one takes no look at all of them."""
+    """Descriptions of a corpus's clips by label; a lookup does not read all of them."""
 
     def __init__(self, corpus: Corpus) -> None:
         self._corpus = corpus
@@ -194,7 +194,7 @@ class _Labels(Mapping[str, str]):
         return iter(dict(self.items()))
 
     def items(self) -> ItemsView[str, str]:
-        """Return all labels, each with what its clip is about."""
+        """Return all labels, each with the clip's description."""
         return {clip.label: clip.about for clip in self._corpus.clips}.items()
 
     def __len__(self) -> int:
@@ -206,7 +206,7 @@ _kept: dict[tuple[Path, ...], tuple[_Stamps, Sequence[Score]]] = {}
 
 
 def _read_once(places: tuple[Path, ...]) -> Sequence[Score]:
-    """Return scores; they are read anew once a file has changed."""
+    """Return cached scores, read again if a file has changed."""
     known = _kept.get(places)
     if known is not None and _stamps(known[0]) == known[0]:
         return known[1]
@@ -214,7 +214,7 @@ def _read_once(places: tuple[Path, ...]) -> Sequence[Score]:
     scores, files = read_scores(places)
     stamps = _stamps(files)
     _kept.pop(places, None)
-    # What was written while it was read may have been read in part, or not at all: it is read again next time.
+    # A file that changed during the read may be incomplete: do not cache it.
     if _stamps(places) == before:
         while len(_kept) >= _SCORES:
             _kept.pop(next(iter(_kept)))
@@ -224,12 +224,12 @@ def _read_once(places: tuple[Path, ...]) -> Sequence[Score]:
 
 @lru_cache(_POSTURES)
 def _posture(score: Score, name: str) -> Posture:
-    """Return a posture of a score that is kept; bringing its weight over its feet takes half as long as a tween."""
+    """Return a cached posture of a score; balancing it over its feet takes half as long as a tween."""
     return compose.posture(score, name)
 
 
 def _stamps(files: Iterable[Path]) -> _Stamps:
-    """Return the time of each file's last change, and its size; None for one that is not there."""
+    """Return each file's modification time and size; None for a missing file."""
     return {file: (file.stat().st_mtime_ns, file.stat().st_size) if file.is_file() else None for file in files}
 
 
@@ -243,10 +243,10 @@ def open_collection(source: Source, home: Path | None = None) -> Collection:
 
 
 def locate_score(path: str, home: Path | None = None) -> Path:
-    """Return the path of a score: of the file or, where there is none, of a corpus's own, CORPUS/NAME.score.
+    """Return the path of a score: the file, or else a corpus's own score, CORPUS/NAME.score.
 
     Raises:
-        MotionMindError: neither is there, but a corpus has a score of this name.
+        MotionMindError: neither exists, but a corpus has a score with this name.
     """
     if is_file(path):
         return Path(path)
@@ -266,16 +266,16 @@ def find_motion(
     as_clip: bool = True,
     read: Callable[[Path], Motion] = read_motion,
 ) -> Motion:
-    """Find the movement that a source names; a posture is a motion of one frame.
+    """Find the movement of a source; a posture is a motion of one frame.
 
     Args:
         source: the source.
-        home: the folder of the user's corpora; None for the usual one.
-        as_clip: whether a clip goes before a posture of the same name.
+        home: the folder of the user's corpora; None for the default folder.
+        as_clip: whether a clip has priority over a posture with the same name.
         read: reads a file.
 
     Raises:
-        MotionMindError: there is no such movement, or a score or corpus of several clips names none.
+        MotionMindError: there is no such movement, or the source has several clips and names none.
     """
     if source.kind == "file":
         check_exists(source, home)
@@ -291,15 +291,15 @@ def find_motion(
 def find_posture(
     name: PostureName | str, home: Path | None = None, *, read: Callable[[Path], Motion] = read_motion
 ) -> Posture:
-    """Find the posture of a name, such as "ballet/arabesque".
+    """Find a posture by name, such as "ballet/arabesque".
 
     Args:
         name: the name, or its spelling.
-        home: the folder of the user's corpora; None for the usual one.
+        home: the folder of the user's corpora; None for the default folder.
         read: reads a file.
 
     Raises:
-        MotionMindError: there is no such posture; the message says what there is.
+        MotionMindError: there is no such posture; the message suggests a similar name or lists all.
     """
     named = parse_posture(name, home) if isinstance(name, str) else name
     motion = find_motion(named.source, home, as_clip=named.moment is not None, read=read)
@@ -307,10 +307,10 @@ def find_posture(
 
 
 def check_exists(source: Source, home: Path | None = None) -> None:
-    """Raise MotionMindError if a source is nowhere, and not spelled like a file; the message guesses what is meant."""
+    """Raise MotionMindError, with a suggestion, if a source does not exist and is not spelled like a file."""
     word = source.word
     if source.kind != "file" or is_file(word) or _SUFFIX.fullmatch(Path(word).suffix):
-        return  # those who read files say what is wrong with one
+        return  # the reader reports what is wrong with a file
     if os.path.isdir(word):  # noqa: PTH112 - a name may be too long for any file
         raise MotionMindError(f"{word}: is a folder, and no corpus; give a file, or a corpus's posture or clip")
     place, at, moment = word.rpartition("@")
@@ -327,19 +327,19 @@ def check_exists(source: Source, home: Path | None = None) -> None:
 
 
 def check_named(source: Source, home: Path | None = None) -> None:
-    """Raise MotionMindError if there is no such movement, as far as that is seen before any is read or learned."""
+    """Raise MotionMindError if there is no such movement, as far as is known before reading or learning it."""
     if source.kind != "file":
         if source.name:
             open_collection(source, home).check(source.name)
     elif not is_file(source.place):
-        find_motion(source, home)  # which says what is wrong
+        find_motion(source, home)  # raises with the reason
 
 
 def frame_of(name: PostureName, motion: Motion) -> int:
-    """Return the number of a posture's frame in its movement.
+    """Return the index of a posture's frame in its movement.
 
     Raises:
-        MotionMindError: there is no such frame, or there are several and the name does not say which.
+        MotionMindError: there is no such frame, or there are several and the name gives none.
     """
     if name.moment is not None:
         return select_frame(name.source.word, motion, name.moment)
@@ -353,7 +353,7 @@ def frame_of(name: PostureName, motion: Motion) -> int:
 
 
 def select_frame(word: str, motion: Motion, moment: Moment) -> int:
-    """Return the number of a frame of a motion; MotionMindError, which names the motion `word`, if it has no such."""
+    """Return the index of a frame; raise MotionMindError, which names the motion `word`, if there is no such frame."""
     if moment.seconds is None:
         return select_frames(word, len(motion), moment.frame, moment.frame)[0]
     times, seconds = motion.times, moment.seconds
@@ -366,7 +366,7 @@ def select_frame(word: str, motion: Motion, moment: Moment) -> int:
 
 
 def select_frames(clip: Path | str, length: int, start: int, end: int) -> range:
-    """Return the frames of a clip from `start` to `end`, both included and negative if counted from the end.
+    """Return the frames of a clip from `start` to `end`, both inclusive; negative numbers count from the end.
 
     Args:
         clip: the clip's name, for messages.
@@ -387,23 +387,23 @@ def select_frames(clip: Path | str, length: int, start: int, end: int) -> range:
 
 
 def _no_moment(word: str, moment: str) -> str:
-    """Say that what follows the @ after a movement's name is no moment of it."""
+    """Return the message for an invalid moment after the @ of a movement's name."""
     return f"{word}: @{moment} is neither a frame, such as @240, nor seconds, such as @2.0s"
 
 
 def _example(source: Source, collection: Collection) -> str:
-    """Say how to name a posture or a clip of a collection, if it holds any."""
+    """Return a hint with the name of a posture or a clip of a collection, if it has any."""
     example = next(iter((*collection.postures, *collection.clips)), None)
     return f"; name a posture or a clip, such as {source.place}/{example}" if example else ""
 
 
 def _elsewhere(name: str, home: Path | None) -> str:
-    """Return "; did you mean CORPUS/NAME?" for a corpus that names this posture, or that is called nearly so; or ""."""
+    """Return "; did you mean ...?" with a corpus's posture of this name or a corpus of a similar name; or ""."""
     corpora = store.list_corpora(home)
     for corpus in corpora:
         try:
             if name in _CorpusCollection(corpus, home).postures:
                 return f"; did you mean {corpus}/{name}?"
-        except MotionMindError:  # a corpus that is damaged has no say here
+        except MotionMindError:  # ignore damaged corpora
             continue
     return did_you_mean(name, corpora)

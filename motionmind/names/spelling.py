@@ -1,15 +1,15 @@
-"""Names of movement and postures, as words spell them.
+"""Parse the spellings of movements and postures.
 
     arabesque.json           the only posture of a file
     clip.bvh@240             frame 240 of a file, counted from 0; @-1 is the last
     clip.bvh@2.0s            the frame nearest to 2.0 s
-    centre.score/tendu       a posture that a score names
+    centre.score/tendu       a named posture of a score
     centre.score/adagio@23   a frame of one of its clips
-    ballet/arabesque         a posture that a corpus names
+    ballet/arabesque         a named posture of a corpus
     ballet/adagio@23         a posture of one of its clips
 
-A file that has the whole name goes first, since a file's name may hold @ and ~, too; then a corpus, by its name or its
-folder. Nothing is read here but which files and corpora there are.
+A file with the whole name has priority, because file names may contain @ and ~; a corpus, by name or folder, comes
+next. This module only checks which files and corpora exist.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from typing import Literal
 
 from motionmind.errors import MotionMindError
 
-_MOMENT = r"-?\d{1,9}|\d{1,9}(?:\.\d{1,9})?s"  # a number with more digits is a slip of the keyboard
+_MOMENT = r"-?\d{1,9}|\d{1,9}(?:\.\d{1,9})?s"  # more digits are a typing error
 _POSTURE = re.compile(rf"(.+?)(?:@({_MOMENT}))?(~?)", re.ASCII | re.DOTALL)
 _FRAMES = re.compile(rf"(.+)@({_MOMENT})\.\.({_MOMENT})", re.ASCII | re.DOTALL)
 _SCORE = re.compile(r"(.+?\.score)(?:/(.+))?", re.IGNORECASE | re.DOTALL)
@@ -30,11 +30,11 @@ _SCORE = re.compile(r"(.+?\.score)(?:/(.+))?", re.IGNORECASE | re.DOTALL)
 
 @dataclass(frozen=True)
 class Source:
-    """Where movement comes from.
+    """A source of movement.
 
     Attributes:
         word: its spelling.
-        kind: whether that is a file of one movement, a score, or a corpus. What is nowhere counts as a file.
+        kind: a file of one movement, a score, or a corpus; a missing source counts as a file.
         place: the path of the file or score; the name or the folder of the corpus.
         name: the posture or clip of the score or corpus; "" if none is named.
     """
@@ -46,7 +46,7 @@ class Source:
 
     @property
     def paths(self) -> tuple[Path, ...]:
-        """The file that is read, if it is one: nothing is written into a corpus's folder by its name."""
+        """The file to read, if the source is not a corpus: names never lead to writing in a corpus's folder."""
         return () if self.kind == "corpus" else (Path(self.place),)
 
 
@@ -55,8 +55,8 @@ class Moment:
     """A frame of a movement.
 
     Attributes:
-        frame: its number, from 0, or from the end if negative.
-        seconds: the time that it is nearest to; None if its number is given.
+        frame: its index, from 0, or from the end if negative.
+        seconds: the time to find the nearest frame for; None if `frame` is given.
     """
 
     frame: int = 0
@@ -74,9 +74,9 @@ class PostureName:
 
     Attributes:
         word: its spelling.
-        source: the movement that it is in.
+        source: its movement.
         moment: its frame there; None if the movement has only one.
-        is_moving: whether the movement around it counts, too, as a ~ says.
+        is_moving: whether the name ends in ~, which includes the movement around it.
     """
 
     word: str
@@ -87,7 +87,7 @@ class PostureName:
 
 @dataclass(frozen=True)
 class FramesName:
-    """The name of consecutive frames: their movement, the first and the last of them."""
+    """The name of consecutive frames: their movement, the first and the last frame."""
 
     source: Source
     first: Moment
@@ -99,9 +99,9 @@ def parse_source(word: str, home: Path | None = None) -> Source:
 
     Args:
         word: the name.
-        home: the folder of the user's corpora; None for the usual one.
+        home: the folder of the user's corpora; None for the default folder.
     """
-    # Imported here, for files of movement need no corpora.
+    # Imported here, because motion files need no corpora.
     from motionmind.corpus.store import MANIFEST, list_corpora
 
     score = _SCORE.fullmatch(word)
@@ -115,7 +115,7 @@ def parse_source(word: str, home: Path | None = None) -> Source:
     parts = word.split("/")
     for length in range(len(parts), 0, -1):
         if length < len(parts) and os.path.isdir(word):  # noqa: PTH112 - as in `is_file`
-            break  # a folder in a corpus's, and none of its names
+            break  # a folder inside a corpus's folder, not one of its names
         folder = "/".join(parts[:length])
         if folder and os.path.isfile(f"{folder}/{MANIFEST}"):  # noqa: PTH113 - as in `is_file`
             return Source(word, "corpus", folder, "/".join(parts[length:]))
@@ -123,7 +123,7 @@ def parse_source(word: str, home: Path | None = None) -> Source:
 
 
 def parse_posture(word: str, home: Path | None = None) -> PostureName:
-    """Parse the name of a posture; arguments as of `parse_source`."""
+    """Parse the name of a posture; arguments as for `parse_source`."""
     found = _POSTURE.fullmatch(word)
     if found is None or is_file(word):
         return PostureName(word, parse_source(word, home))
@@ -132,11 +132,11 @@ def parse_posture(word: str, home: Path | None = None) -> PostureName:
 
 
 def parse_frames(word: str, home: Path | None = None) -> FramesName:
-    """Parse frames such as "clip.bvh@230..240", both included, or "clip.bvh", all of them.
+    """Parse frames such as "clip.bvh@230..240", both inclusive, or "clip.bvh", all frames.
 
     Args:
         word: the name.
-        home: the folder of the user's corpora; None for the usual one.
+        home: the folder of the user's corpora; None for the default folder.
 
     Raises:
         MotionMindError: the word names neither a movement nor frames of one.
@@ -150,6 +150,6 @@ def parse_frames(word: str, home: Path | None = None) -> FramesName:
 
 
 def is_file(word: str) -> bool:
-    """Return whether there is a file, a pipe or the like with this name, and no folder."""
-    # Path.exists fails for names that are too long for any file.
+    """Return whether a file, a pipe or the like, but no folder, has this name."""
+    # Path.exists fails for names that are too long for a file.
     return os.path.exists(word) and not os.path.isdir(word)  # noqa: PTH110, PTH112
