@@ -20,7 +20,7 @@ _Job = TypeVar("_Job")
 _Result = TypeVar("_Result")
 
 MOST_TIMES = 3  # attempts for a job that kills its worker, alone
-AHEAD = 3  # jobs under way for each worker
+AHEAD = 3  # submitted jobs for each worker
 _LOOK = 1.0  # seconds between checks of the workers
 
 

@@ -123,8 +123,8 @@ def find_gaps(
 ) -> Gaps:
     """Find the worst-connected joint graphs, and the transitions that would lower a sample's cost most.
 
-    Transitions are chosen one after the other: each of the `TRIED` most promising is added to the corpus, whose grammar
-    is learned again and the sample solved again; the best stays.
+    Transitions are chosen one by one: for each of the `TRIED` most promising, the grammar is learned again with it and
+    the sample solved again; the best transition stays.
 
     Args:
         learned: the learned corpus.

@@ -27,8 +27,8 @@ class Transition(NamedTuple):
 def with_transitions(learned: LearnedCorpus, transitions: list[Transition]) -> LearnedCorpus:
     """Return a learned corpus with the grammar that it would have if each transition were recorded as a clip.
 
-    These clips have the greatest weight of a clip, and their moves the usual duration. Only the grammar changes: states,
-    movement, posture statistics and pace stay.
+    These clips have the greatest weight of a clip, and their moves the usual duration. Only the grammar changes:
+    states, movement, posture statistics and pace stay.
     """
     if not transitions:
         return learned

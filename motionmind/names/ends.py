@@ -36,7 +36,7 @@ def find_end(
         read: reads a file.
 
     Raises:
-        MotionMindError: there is no such posture; or the name ends in ~ and there is no movement on that side.
+        MotionMindError: there is no such posture, or no movement on the side that ~ asks for.
 
     >>> posture, before = find_end("ballet/adagio@23~", "before")
     >>> before is not None and len(before) > 1

@@ -94,7 +94,7 @@ class JointAngles:
 
     @cached_property
     def carries(self) -> Bools:
-        """Whether joint i's rotation turns joint j [J, J]: `carries[j, i]` for i itself and all that hangs from it."""
+        """Whether joint i's rotation turns joint j [J, J]: `carries[j, i]` for j = i and all descendants j."""
         count = len(self.skeleton)
         out = np.eye(count, dtype=np.bool_)
         for joint in range(1, count):
