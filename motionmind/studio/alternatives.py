@@ -80,7 +80,7 @@ class Account(msgspec.Struct, frozen=True):
 
 
 def find(engine: Engine, a: Posture, b: Posture, count: int = COUNT, **options: Any) -> Iterator[Tween]:
-    """Find distinct movements from `a` to `b`, the best first, each within `WITHIN` of the optimal cost.
+    """Find distinct movements from `a` to `b`, the best first, each proven within `WITHIN` of the best of its kind.
 
     Args:
         engine: the engine of the corpus.

@@ -284,7 +284,7 @@ def _apply(state: State, edit: Single) -> State:  # noqa: PLR0911 (one case an e
 
 
 def arranged(state: State, blocks: tuple[Block, ...]) -> State:
-    """Return a piece with other blocks; a new seam with the same ends as an old one inherits its verdict.
+    """Return a piece with other blocks; a new seam with the ends of an old one inherits its verdict, unlocked.
 
     Args:
         state: the piece.
@@ -358,7 +358,7 @@ def _put(state: State, block: Block) -> State:
 
 
 def _forget_ends(state: State, block: Block, *, begins: bool, ends: bool) -> State:
-    """Reset the decisions at a block's changed ends, because they concern other insertions than will be found.
+    """Reset the decisions at a block's changed ends, where the search will find other insertions.
 
     Raises:
         MotionMindError: an insertion is locked there.

@@ -206,8 +206,8 @@ class _Body:
     def rise(self, standing: Sequence[str] | None, heel: int, place: Floats) -> tuple[Wishes, Wishes]:
         """Return the targets that hold the balls of feet in place, and those for the height of a heel.
 
-        Other heels at the same height follow, and the body rises rather than bend its knees, unless another foot stays
-        flat on the floor. The heel of a foot that does not stand is dragged like any other point.
+        Other heels at the same height follow, and the body rises rather than bend its knees, unless another foot on the
+        floor does not follow. The heel of a foot that does not stand is dragged like any other point.
         """
         soles = self.kept(standing, None).points[::3]
         high = self.began[heel, 1]
