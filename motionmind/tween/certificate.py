@@ -1,4 +1,4 @@
-"""The certificate in detail: what each joint's move costs, where it was seen, and which moves no clip attests."""
+"""The certificate in detail: the cost and source of each joint's move, and the moves that no clip attests."""
 
 from __future__ import annotations
 
@@ -20,16 +20,15 @@ from motionmind.tween.problem import TRANSITION, WAIT, kinds_of
 
 @dataclass(frozen=True, eq=False)
 class CostBreakdown:
-    """The cost of a path of T moves of L chains, taken apart: all but `likelihood`, `degrees` and names add up to it.
+    """The parts of the cost of a path of T moves of L chains; all but `likelihood`, `degrees` and `names` add up to it.
 
     Attributes:
         moves: nats for each chain's move, bridge or wait [T, L].
-        coordination: nats for the state that each chain arrives in, or the move that it makes, beside its parent's:
-            lambda * -log P [T, L].
-        guide: nats for the state that each chain arrives in, for its departure from what walks expect; 0 in the last
-            move [T, L].
+        coordination: nats for each chain's new state, or its move, given its parent's: lambda * -log P [T, L].
+        guide: nats for the departure of each chain's new state from the orientation that corpus walks expect; 0 in the
+            last move [T, L].
         per_move: tau, nats for each move.
-        likelihood: P(state arrived in | state left), as the corpus counts it; 0 where it attests no such move [T, L].
+        likelihood: P(next state | state), as counted in the corpus; 0 where it attests no such move [T, L].
         degrees: the angle between the two states [T, L].
         names: names of the states of each posture [T + 1][L].
     """
@@ -56,14 +55,14 @@ def break_down_cost(
     network: Coordination,
     factor: float,
 ) -> CostBreakdown:
-    """Return the cost of a path, taken apart.
+    """Break down the cost of a path.
 
     Args:
         path: states of the problem [T + 1, L].
         problem: the problem that was searched, whose costs come from the grammar.
-        grammar: what was learned.
+        grammar: the learned grammar.
         space: the states of each chain.
-        network: how the chains' states of the problem coordinate.
+        network: the coordination network over the problem's states.
         factor: factor of the network's -log P in the problem's costs.
     """
     held, graph = problem.model_with_waits(), grammar.transitions
@@ -107,7 +106,7 @@ class Bridge:
 
 @dataclass(frozen=True)
 class Wait:
-    """A move that a joint spends waiting at its goal for the others.
+    """A move during which a joint waits at its goal for the others.
 
     Attributes:
         joint: the joint's name.
@@ -130,12 +129,12 @@ class Source:
 
     Attributes:
         clip: the clip's name.
-        posture: number of the posture in the clip from which the move starts.
+        posture: number, within the clip, of the posture where the move starts.
         corpus: the corpus that the clip comes from.
         mirrored: whether the clip was learned with left and right exchanged.
         reversed: whether the clip was learned backwards: the move leads to the posture before.
         seconds: that posture's time in its recording.
-        reconstructed: whether the joint was not recorded right there, and was interpolated when the corpus was built.
+        reconstructed: whether the joint's recording has a gap there, interpolated when the corpus was built.
 
     >>> from motionmind import Source
     >>> Source("plies", posture=12, corpus="ballet", seconds=4.8).clip
@@ -158,14 +157,14 @@ def trace_path(
 
     Args:
         path: states of the grammar's chains [T + 1, L].
-        grammar: what was learned.
-        corpus: what it was learned from.
-        weights: of the grammar's transitions, in the scheme that was searched [E], nats.
+        grammar: the learned grammar.
+        corpus: the corpus behind the grammar.
+        weights: weights of the grammar's transitions in the scheme of the search [E], nats.
         wait: nats for each move that a chain waits at its goal.
         bridge_price: nats for each degree of a bridge.
 
     Returns:
-        The share of moves that are attested, the bridges, the waits, and the sources [T][L], as in `Tween`.
+        The share of attested moves, the bridges, the waits, and the sources [T][L], as in `Tween`.
     """
     graph = grammar.transitions
     edges, holds_goal = graph.edges(path), (path[:-1] == path[1:]) & (path[1:] == path[-1])
@@ -185,13 +184,13 @@ def trace_path(
 
 
 def sources_of(corpus: Corpus, postures: Ints | Int32s, to: Ints | Int32s, joints: Sequence[str]) -> list[Source]:
-    """Return the places in a corpus where moves lead from some postures to others, by their numbers.
+    """Return the places in a corpus that attest moves between numbered postures.
 
     Args:
         corpus: the corpus.
-        postures: numbers of the postures [n].
-        to: numbers of the postures that follow [n].
-        joints: the joint that moves in each [n]; "" for the whole body.
+        postures: number of each move's first posture [n].
+        to: number of each move's last posture [n].
+        joints: the joint that moves [n]; "" for the whole body.
     """
     clips, times = np.searchsorted(corpus.columns.starts, postures, side="right") - 1, corpus.times[[postures, to]]
     columns = (column.tolist() for column in (clips, postures, to, times[0], times.min(axis=0), times.max(axis=0)))
@@ -205,5 +204,5 @@ def sources_of(corpus: Corpus, postures: Ints | Int32s, to: Ints | Int32s, joint
 
 
 def gap_of(cost: float, lower_bound: float) -> float:
-    """Return the share of a cost that is not proven to be needed: 0 where the bound meets it. Both in nats."""
+    """Return the optimality gap as a share of the cost: 0 where the bound (nats) meets the cost (nats)."""
     return 0.0 if cost <= lower_bound else (cost - lower_bound) / abs(cost)

@@ -1,4 +1,4 @@
-"""Constraints on the way: joints that are pinned or held, states to avoid, and which of them leave no path."""
+"""Constraints on a path: pinned joints, held joints and states to avoid, and the conflicts among them."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from motionmind.errors import MotionMindError, NoPathError
 from motionmind.search.problem import Model, Problem, Via, costs_to_go
 from motionmind.search.solve import feasible
 
-MOST_CONFLICTS, MOST_TRIED = 4, 50  # sets of constraints that are named, and in which they are looked for
-FARTHEST = 60  # moves by which a via is moved to see whether that helps
+MOST_CONFLICTS, MOST_TRIED = 4, 50  # conflicts to report; sets of constraints to examine for them
+FARTHEST = 60  # moves by which to shift a via at most to see whether that helps
 
 
 class Constraint(NamedTuple):
-    """A constraint by its name, such as "pin left_wrist=B", and whether it allows each state on the way [G]."""
+    """A named constraint, such as "pin left_wrist=B", and whether it allows each state between A and B [G]."""
 
     name: str
     allowed: Bools
@@ -33,7 +33,7 @@ def constraints_of(
     hold: Sequence[str],
     avoid: Sequence[tuple[str, int | str]],
 ) -> list[Constraint]:
-    """Return the constraints on the states of joints on the way, after posture A and before posture B.
+    """Return the constraints on the joints' states after posture A and before posture B.
 
     Args:
         space: the states of each joint.
@@ -45,7 +45,7 @@ def constraints_of(
 
     Raises:
         MotionMindError: no such joint or state.
-        NoPathError: A and B differ where a joint is to be held.
+        NoPathError: A and B differ at a joint to hold.
     """
     out = []
     for joint, end in pin.items():
@@ -68,7 +68,7 @@ def constraints_of(
 
 
 def restrict(model: Model, constraints: Sequence[Constraint]) -> Model:
-    """Return the model with those states on the way that all constraints allow."""
+    """Return the model restricted to the states that all constraints allow."""
     return model._replace(allowed=np.logical_and.reduce([model.allowed, *(one.allowed for one in constraints)]))
 
 
@@ -82,7 +82,7 @@ def find_conflicts(chains: Sequence[str], model: Model, problem: Problem, constr
         constraints: the constraints in it.
 
     Returns:
-        A message, one line for each conflict and remedy; empty where there is no path without the constraints either.
+        A message with one line for each conflict and remedy; empty if no path exists without the constraints either.
     """
     vias, rules = problem.vias, problem.rules
     names = [*(one.name for one in constraints), *(_via_name(problem, i) for i in range(len(vias)))]
@@ -109,13 +109,13 @@ def find_conflicts(chains: Sequence[str], model: Model, problem: Problem, constr
 
 
 def _minimal_conflicts(every: list[int], possible: Callable[[Sequence[int]], bool]) -> list[list[int]]:
-    """Find up to MOST_CONFLICTS sets of constraints that leave no path, and leave one without any of theirs.
+    """Find up to MOST_CONFLICTS minimal sets of constraints that exclude every path.
 
-    Each is looked for in what is left without one constraint of every set before it.
+    To find the next set, drop one constraint of each set found so far.
 
     Args:
-        every: all constraints, by number; together they leave no path.
-        possible: whether some of them do leave one.
+        every: numbers of all constraints, which together exclude every path.
+        possible: return whether a path satisfies some of the constraints.
     """
     found: list[list[int]] = []
     tried = [every]
@@ -137,7 +137,7 @@ def _minimal_conflicts(every: list[int], possible: Callable[[Sequence[int]], boo
 
 
 def _feasible_moves(problem: Problem) -> Iterator[tuple[int, int]]:
-    """Yield each via, by its place, that a path could pass at another move, and the nearest such move."""
+    """Yield the index of each via that a path could pass at another move, with the nearest such move."""
     for i, (states, wanted) in enumerate(problem.vias):
         if wanted is None:
             continue
@@ -150,7 +150,7 @@ def _feasible_moves(problem: Problem) -> Iterator[tuple[int, int]]:
 
 
 def _blocked_segments(chains: Sequence[str], problem: Problem) -> Iterator[str]:
-    """Yield a line for each segment between A, the vias and B that some joints cannot make in any number of moves."""
+    """Yield a line for each segment between A, the vias and B that some joints cannot cross in any number of moves."""
     held = problem.model_with_waits()
     stops = problem.stops
     stop_names = ["A", *(_via_name(problem, i) for i in range(len(problem.vias))), "B"]
@@ -175,12 +175,12 @@ def _only(space: StateSpace, chain: int, state: int) -> Bools:
 
 
 def _state(space: StateSpace, chain: int, wanted: int | str) -> int:
-    """Return the state that a number or a name stands for."""
+    """Return the state with a number or name."""
     word = str(wanted)
     if word in space.labels[chain]:
         return space.labels[chain].index(word)
     if word.isdecimal() and len(word) < 10:
-        space.label(chain, int(word))  # which says what numbers there are
+        space.label(chain, int(word))  # raises an error that states the valid numbers
         return int(word)
     named = f": {', '.join(space.labels[chain])}" if space.labels[chain] else "; here none is named"
     raise MotionMindError(

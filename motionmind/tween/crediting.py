@@ -1,4 +1,4 @@
-"""Credits of a tween, from the places in the corpus that its moves and its passage were found at."""
+"""Credits of a tween, from the sources of its moves and its passage in the corpus."""
 
 from __future__ import annotations
 
@@ -16,16 +16,15 @@ from motionmind.tween.certificate import Source
 def credit_tween(
     corpus: Corpus, sources: Sequence[Iterable[Source | None]], detail: Sequence[Source], times: Floats
 ) -> tuple[Credit, ...]:
-    """Credit the clips that a tween is made of, by the time that each joint spends in moves that they attest.
+    """Credit each clip in a tween with the time that the joints spend in moves that the clip attests.
 
-    The passage that the tween is danced like counts as one more joint. The time of moves that no clip attests is the
-    engine's.
+    The passage that the tween follows counts as one more joint. The engine gets the time of unattested moves.
 
     Args:
-        corpus: what was searched.
+        corpus: the corpus that was searched.
         sources: a place that attests each joint's move, or None [T][L].
-        detail: places of the passage, for even parts of the tween's time.
-        times: of the moves [T + 1], seconds.
+        detail: places of the passage, at equal intervals of the tween.
+        times: times of the moves [T + 1], seconds.
 
     Returns:
         The credits, the largest first; none where nothing moves.
@@ -42,7 +41,7 @@ def credit_tween(
 
 
 def _credit(corpus: Corpus, clip: tuple[str, str] | None, share: float) -> Credit:
-    """Return so large a share for a clip, by its corpus and its name; for the engine where there is none."""
+    """Return a credit of this share for a clip, given as (corpus, name), or for the engine if `clip` is None."""
     if clip is None:
         return Credit(share)
     return replace(corpus.credit_of(corpus.clips_named(*clip)[-1]), share=share)

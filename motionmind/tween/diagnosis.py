@@ -1,4 +1,4 @@
-"""Diagnosis of a request without a path: the joints that have no way, from where to where, and what would help."""
+"""Diagnosis of a request without a path: the blocked joints, their states in A and B, and possible remedies."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from motionmind.geometry import rotations as rot
 from motionmind.grammar.grammar import Grammar
 from motionmind.search.problem import Model, Rules
 
-_COARSER = (1.25, 1.5, 2.0, 3.0)  # times the tolerance that are tried
+_COARSER = (1.25, 1.5, 2.0, 3.0)  # multiples of the tolerance to try
 
 
 @dataclass(frozen=True)
 class Remedy:
-    """A change that would give a joint a path, and the least number of moves that it then needs."""
+    """A change that would give a joint a path, and the fewest moves that such a path takes."""
 
     what: str
     moves: int
@@ -35,7 +35,7 @@ class Remedy:
 
 @dataclass(frozen=True)
 class Gap:
-    """The two states that come nearest to joining, by name, and the angle between them."""
+    """The names of the two nearest states across a gap in a joint graph, and the angle between them."""
 
     before: str
     after: str
@@ -50,11 +50,11 @@ class BlockedJoint:
         joint: its name.
         start: name of its state in A.
         goal: name of its state in B.
-        needs: least number of moves that it needs; None where no number is enough.
-        ahead: number of states that its state in A leads to, itself among them.
-        behind: number of states that lead to its state in B.
-        gap: where `needs` is None, the two nearest of these.
-        remedies: what would give it a path.
+        needs: fewest moves that it needs; None where no number suffices.
+        ahead: number of states reachable from its state in A, itself included.
+        behind: number of states from which its state in B is reachable.
+        gap: where `needs` is None, the nearest pair of states from these two sets.
+        remedies: changes that would give it a path.
     """
 
     joint: str
@@ -72,10 +72,10 @@ class Diagnosis:
     """The reason why there is no path.
 
     Attributes:
-        max_moves: greatest number of moves that was allowed.
+        max_moves: greatest number of moves allowed.
         strict: whether bridges were forbidden.
         faults: the joints without a path.
-        helps: what would give all of them a path.
+        helps: changes that would give all of them a path.
     """
 
     max_moves: int
@@ -121,11 +121,11 @@ def diagnose(
     rules: Rules,
     strict: bool,
 ) -> Diagnosis:
-    """Find the joints without a path from states `start` [L] to `goal` [L] under `rules`, and what would help them.
+    """Find the joints without a path from states `start` [L] to `goal` [L] under `rules`, and remedies for them.
 
-    Remedies are tried joint by joint: bridges, if `strict` forbade them; the corpus learned backwards as well, and
-    mirrored as well, as far as it has states for that; and coarser states. A joint that has arrived may wait, so there
-    is a path wherever each joint has one of few enough moves.
+    Try these remedies for each joint: bridges, if `strict` forbade them; learning the corpus backwards too, or mirrored
+    too, as far as its states allow; and coarser states. A joint may wait at its goal, so a path exists if each joint
+    has a path that is short enough.
     """
     faults = []
     for chain in range(len(grammar.chains)):
@@ -159,7 +159,7 @@ def diagnose(
 def _remedies(
     graph: csr_array, grammar: Grammar, corpus: Corpus, space: StateSpace, chain: int, a: int, b: int, strict: bool
 ) -> Iterator[tuple[str, int | None]]:
-    """Yield each change that might help a chain from state `a` to `b`, and the moves that it then needs, if any do."""
+    """Yield each change that might lead a chain from state `a` to `b`, with the moves it then needs, None if stuck."""
     if strict:
         first, last = grammar.transitions.starts[chain], grammar.transitions.starts[chain + 1]
         indptr = grammar.bridges.indptr[first : last + 1]
@@ -180,8 +180,9 @@ def _remedies(
 
 
 def _mirrored(grammar: Grammar, corpus: Corpus, space: StateSpace, chain: int) -> csr_array | None:
-    """Return the moves of a chain's partner, mirrored, between the chain's own states; None where the body has no
-    mirror image, or the chain's image is more than its partner's reflection."""
+    """Mirror the moves of a chain's partner onto the chain's own states.
+
+    Return None if the body has no mirror image, or the chain's image is more than its partner's reflection."""
     graph = grammar.transitions
     if grammar.chains[chain] == FACING:
         partner, image = chain, space.of(chain) * np.array([-1.0, -1.0, -1.0, 1.0])
@@ -205,7 +206,7 @@ def _mirrored(grammar: Grammar, corpus: Corpus, space: StateSpace, chain: int) -
 
 
 def _coarser(corpus: Corpus, ends: Floats, chain: int, degrees: float) -> int | None:
-    """Return the moves that a joint needs between two orientations [2, 4] with states learned anew, `degrees` wide."""
+    """Return the moves that a joint needs between two orientations [2, 4] after relearning states `degrees` wide."""
     orientations = corpus.to_chains(corpus.rotations)[:, chain]
     centres = codebook(orientations, degrees)
     states, (a, b) = nearest(orientations, centres)[0], nearest(ends, centres)[0]
@@ -217,12 +218,12 @@ def _graph(sources: NDArray[Any], targets: NDArray[Any], size: int) -> csr_array
 
 
 def _moves(graph: csr_array, a: int, b: int) -> int | None:
-    """Return the least number of moves from one state to another; None where there is no path."""
+    """Return the fewest moves from one state to another; None if there is no path."""
     hops = shortest_path(graph, unweighted=True, indices=a)[b]
     return int(hops) if np.isfinite(hops) else None
 
 
 def _state_name(space: StateSpace, chain: int, state: int) -> str:
-    """Return a state by its number, and its name where it has one."""
+    """Return a state's number, and its name if it has one."""
     number, name = f"state {state}", space.label(chain, int(state))
     return number if name == number else f"{number} ({name})"

@@ -46,8 +46,8 @@ from motionmind.tween.result import Tween
 from motionmind.tween.what_if import Answer, WhatIf, find_what_if
 from motionmind.tween.whole_body import Bodies, find_bodies, solve_posturewise
 
-TRIED = 2  # passages that are tried for an alternative, at most, before it is a variant of the best movement
-SAME_ANGLE = 0.1  # degrees: a movement that was bent to within a tolerance is within it to this, as frames tell
+TRIED = 2  # passages to try for an alternative before falling back on a variant of the best movement
+SAME_ANGLE = 0.1  # degrees: slack for comparing frames with a tolerance that the synthesis has met
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Engine(LearnedCorpus):
-    """A learned corpus, ready to answer; `Engine.fit` learns one and `Engine.load` opens one (see LearnedCorpus).
+    """A learned corpus that answers requests; `Engine.fit` learns one, `Engine.load` opens one (see LearnedCorpus).
 
     >>> from motionmind import Engine
     >>> engine = Engine.load("ballet")
@@ -87,24 +87,23 @@ class Engine(LearnedCorpus):
         """Find the best movement from posture `a` to posture `b` in the style of the corpus.
 
         Args:
-            a: where the motion starts, exactly; a posture, or its name, such as "ballet/arabesque" and "clip.bvh@240",
-                or "clip.bvh@240~" for one that moves as the clip does there.
-            b: where the motion ends, exactly, in the same way.
-            request: what is asked beside the two postures; None asks for nothing more.
-            before: frames that lead up to `a`, which shows how the body moves as it leaves: the last of them is `a`,
-                wherever it stands. Frames beyond a flip, where a joint was recorded badly, do not count. None where it
-                is not known.
-            after: frames that follow `b`, in the same way: the first of them is `b`.
-            watch: called between pieces of work with the search's progress; where it returns True, the best path so
-                far is the answer, with what is proven by then.
-            options: fields of `TweenRequest` to set, as `engine.tween(a, b, duration=2.0)`.
+            a: the exact first posture; a posture or its name, such as "ballet/arabesque" or "clip.bvh@240", or
+                "clip.bvh@240~" to leave it with the clip's velocity.
+            b: the exact last posture, in the same form.
+            request: everything else in the request; None for the defaults.
+            before: frames that lead up to `a` and show the body's velocity there. The last frame is `a`, wherever it
+                stands. Frames before a flip (a badly recorded joint) do not count. None if unknown.
+            after: frames that follow `b`, in the same form; the first frame is `b`.
+            watch: called from time to time with the search's progress; return True to end the search and get the best
+                path and bound so far.
+            options: fields of `TweenRequest` to set, as in `engine.tween(a, b, duration=2.0)`.
 
         Raises:
-            NoPathError: nothing joins them under these rules; the message is the diagnosis.
-            SkeletonError: a posture or a movement is on another skeleton than the corpus, or has no such joint.
-            MotionMindError: an option is out of its range, or asks for what cannot be; no posture has such a name;
-                `before` does not end in `a`, `after` does not begin in `b`, or one of them has a single frame.
-            WrongTypeError: an argument is of another type, or there is no such option.
+            NoPathError: no path joins the postures under these rules; the message is the diagnosis.
+            SkeletonError: a posture or movement has another skeleton than the corpus, or lacks a joint.
+            MotionMindError: an option is out of range or impossible; no posture has this name; `before` does not end
+                in `a`, `after` does not begin in `b`, or one of them has a single frame.
+            WrongTypeError: an argument has the wrong type, or an option does not exist.
         """
         request = TweenRequest.of(request, **options)
         check_type("before", before, Motion, or_none=True)
@@ -149,30 +148,29 @@ class Engine(LearnedCorpus):
         watch: Watch | None = None,
         **options: Any,
     ) -> Iterator[Tween]:
-        """Find the best movement, then others with as many moves, each of which differs from all before by `differ`.
+        """Find the best movement, then others with as many moves, each at least `differ` from all earlier ones.
 
-        The others are danced like passages of the corpus that lead from A to B in other ways, which their
-        `request.passage` names. Their paths follow these, so their costs are not to be compared with the best one's.
-        Where the corpus shows no other way, they are the next best paths. Samples (`sample`) differ by their seeds
-        instead, the one that is asked for and those that follow it. What restrictions cost (`what_if`) is reported of
-        the first.
+        Each of the others follows a different passage of the corpus from A to B, named in its `request.passage`. Its
+        path follows that passage, so do not compare its cost with the best one's. If the corpus has no other passage,
+        the others are the next best paths. Samples (`sample`) differ by seed instead: the given seed and its
+        successors. Only the first tween reports the cost of restrictions (`what_if`).
 
         Args:
-            a: where the motion starts, exactly.
-            b: where the motion ends, exactly.
-            count: how many movements to find.
-            request: see `tween`, as for the other arguments and the errors.
+            a: the exact first posture.
+            b: the exact last posture.
+            count: number of movements to find.
+            request: see `tween`, also for the errors.
             before: see `tween`.
             after: see `tween`.
             watch: see `tween`.
             options: see `tween`.
 
         Yields:
-            The tweens. The cost of each is least among what differs from those before, as far as its bound says, for
-            the passage that it is danced like.
+            The tweens. Each has the least cost, within its gap, of all that follow the same passage and differ enough
+            from the earlier tweens.
 
         Raises:
-            NoPathError: nothing joins the postures, or, after the first tween, nothing else differs by so much.
+            NoPathError: no path joins the postures, or, after the first tween, no other path differs enough.
 
         >>> from motionmind import Engine
         >>> engine = Engine.load("ballet")
@@ -207,7 +205,7 @@ class Engine(LearnedCorpus):
             yield found[-1]
 
     def _find_path(self, formulation: Formulation, watch: Watch | None) -> Certificate:
-        """Return the best path of a formulated request; NoPathError says why there is none."""
+        """Find the best path of a formulated request; a NoPathError explains why there is none."""
         problem, searched = formulation.problem, formulation.searched
         if formulation.stays:
             still = {"problem": 0.0, "bound": 0.0, "search": 0.0}
@@ -246,7 +244,7 @@ class Engine(LearnedCorpus):
         return NoPathError(str(found), found.plain())
 
     def _realise(self, formulation: Formulation, certificate: Certificate) -> Realised:
-        """Return the motion of a path."""
+        """Synthesise the motion of a path."""
         request = formulation.request
         paced = request.paced and request.moves is None
         return realise(
@@ -286,7 +284,7 @@ class Engine(LearnedCorpus):
         seconds: dict[str, float],
         what_if: tuple[WhatIf, ...],
     ) -> Tween:
-        """Return the answer: a path and its motion with their certificate, costs and provenance."""
+        """Assemble the answer: a path and its motion with their certificate, costs and provenance."""
         request, searched = formulation.request, formulation.searched
         path = places(searched.model, certificate.path)
         attested, bridges, waits, sources = trace_path(
@@ -308,7 +306,7 @@ class Engine(LearnedCorpus):
             )
         begins = np.zeros(0, dtype=np.int64) if realised.danced is None else realised.danced.passage.postures
         last = self.corpus.columns.starts[np.searchsorted(self.corpus.columns.starts, begins, side="right")] - 1
-        # A curve through the frames: a move may fall between two, and the arc between them is a chord.
+        # Use a spline: a move may fall between two frames, and the arc between them cuts the corner.
         reached = rotation_spline(motion.times, motion.rotations, motion.insertions[0].times)
         path_degrees = self.space.distance(self.corpus.to_chains(reached), path)
         followed = path_degrees <= self.space.tolerances + SAME_ANGLE
@@ -361,7 +359,7 @@ class Engine(LearnedCorpus):
 
     @cached_property
     def _bodies(self) -> Bodies:
-        """The corpus's whole postures, but for where they face."""
+        """The corpus's whole postures, without their facing."""
         moves, joints = self.corpus.moves, len(self.corpus.skeleton)
         return find_bodies(np.asarray(self.states[:, :joints]), moves.begins, moves.ends)
 
@@ -370,7 +368,7 @@ class Engine(LearnedCorpus):
         return graphs.joint_graph(self, joint)
 
     def network(self) -> DiscreteBayesianNetwork:
-        """Return the coordination network as a pgmpy network; its tables say the same as the costs."""
+        """Return the coordination network as a pgmpy network; its tables agree with the costs."""
         return graphs.network(self)
 
     def info(self) -> dict[str, Any]:
@@ -378,7 +376,7 @@ class Engine(LearnedCorpus):
         return summary.to_plain(summary.summarise(self.corpus, self.grammar))
 
     def check(self, pairs: int = 2000, seed: int = 0) -> dict[str, Any]:
-        """Measure how well the corpus hangs together, as plain values: see `motionmind.learned.summary.CorpusCheck`."""
+        """Measure how well connected the corpus is, as plain values: see `motionmind.learned.summary.CorpusCheck`."""
         return summary.to_plain(summary.check_corpus(self.corpus, self.grammar, self.states, pairs, seed))
 
 
@@ -412,7 +410,7 @@ def _read_person(path: Path) -> Motion:
 
 
 def _no_other_path(request: TweenRequest, most: float) -> NoPathError:
-    """Return the error that says that no path differs by enough from those of a request's tweens to differ from."""
+    """Return the error for a request where no path differs enough from the tweens in `unlike`."""
     count, moves = len(request.unlike), len(request.unlike[0].path) - 1
     diagnosis = {"differ": request.differ, "most": most}
     if moves < 2:
@@ -425,7 +423,7 @@ def _no_other_path(request: TweenRequest, most: float) -> NoPathError:
 
 
 def _shown(sources: tuple[tuple[Source | None, ...], ...], followed: Bools) -> tuple[tuple[Source | None, ...], ...]:
-    """Return the sources [T][L] of moves that are seen: the motion is near the states that they lead from and to."""
+    """Return the sources [T][L] of the moves that the motion follows at both ends; None for the others."""
     seen = followed[:-1] & followed[1:]
     return tuple(
         tuple(source if shown else None for source, shown in zip(row, shows, strict=True))
@@ -434,13 +432,13 @@ def _shown(sources: tuple[tuple[Source | None, ...], ...], followed: Bools) -> t
 
 
 def _credited(motion: Motion, found: tuple[Credit, ...]) -> Motion:
-    """Return the motion of a tween with its credits."""
+    """Attach credits to the motion of a tween."""
     (insertion,) = motion.insertions
     return replace(motion, insertions=(replace(insertion, credits=found),))
 
 
 def _with_bridges(motion: Motion, bridges: tuple[Bridge, ...]) -> Motion:
-    """Return the motion with its bridged joints marked; a bridged facing shows at the root, which turns with it."""
+    """Mark the bridged joints of a motion; mark the root for a bridged facing, which turns it."""
     (insertion,) = motion.insertions
     root = motion.skeleton.names[0]
     named = ((root if bridge.joint == FACING else bridge.joint, bridge.move) for bridge in bridges)
