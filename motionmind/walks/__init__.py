@@ -1,1 +1,1 @@
-"""Walks through a corpus: where they are, between given postures, and the fine detail of the movement they expect."""
+"""Corpus walks between given postures: their marginals, their mean, and passages that add recorded detail."""

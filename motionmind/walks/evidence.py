@@ -1,8 +1,8 @@
-"""Evidence for trust: what a corpus would have made of its own clips, had it not seen them.
+"""Evidence for trust: leave-one-out reconstruction of a corpus's own clips.
 
-Clips are left out, each with its copies and the other parts of its take, and windows of them are filled by walks
-through the others. How far the walks' departure from the minimal movement goes along with the true one is the evidence
-from which `motionmind.learned.trust` fits its table.
+Each clip is left out, with its copies and the other parts of its take, and windows of it are filled by walks through
+the remaining clips. `motionmind.learned.trust` fits its table to the agreement between the walks' departures from the
+minimal movement and the true departures.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ from motionmind.walks.mean_walk import Walk, walk_between
 from motionmind.walks.minimal import departure, minimal_movement
 from motionmind.walks.stops import Stop, stop_at
 
-LENGTHS = (0.4, 0.6, 1.2, 2.0, 4.0)  # seconds of the windows
-BRIEF = LENGTHS[1:3]  # of those in which velocities at the ends tell most
-WINDOWS = 12  # of each length, evenly spread over the clips
-MOST = 2_000  # postures of the corpus that are learned from: each window takes time in proportion
-PIECES = 8  # of so many clips at least
-PAIRS = 1_000  # of random postures
-FEWEST = 3  # families of clips: of two, each alone decides about the other
-LASTS = (0.3, 0.45, 0.6)  # seconds for which a velocity may be felt; with 1.0 a take of cmu-29 lost 23 points
+LENGTHS = (0.4, 0.6, 1.2, 2.0, 4.0)  # window lengths, seconds
+BRIEF = LENGTHS[1:3]  # window lengths at which end velocities matter most
+WINDOWS = 12  # windows per length, evenly spread over the clips
+MOST = 2_000  # postures to learn from, about: the time per window is proportional to it
+PIECES = 8  # least number of clips to take them from
+PAIRS = 1_000  # random pairs of postures
+FEWEST = 3  # least number of clip families: with two, each is judged by the other alone
+LASTS = (0.3, 0.45, 0.6)  # candidate decay times of end velocities, seconds; 1.0 cost a take of cmu-29 23 points
 
 
 class _Piece(NamedTuple):
     """Consecutive postures of a clip.
 
     Attributes:
-        clip: its number.
+        clip: index of the clip.
         start, stop: the first posture, and the one after the last.
-        family: names all clips that are left out with it.
+        family: key shared by all clips that are left out together.
     """
 
     clip: int
@@ -55,7 +55,7 @@ class _Piece(NamedTuple):
 
 
 class _Window(NamedTuple):
-    """Postures of a corpus from one to another, both included."""
+    """A range of a corpus's postures, from first to last inclusive."""
 
     piece: _Piece
     first: int
@@ -63,14 +63,14 @@ class _Window(NamedTuple):
 
 
 def learn_trust(corpus: Corpus, carriage: Carriage, workshop: Workshop | None = None) -> Trust:
-    """Learn how far the walks through a corpus are to be trusted, and how long velocities are felt.
+    """Learn how far to trust walks through a corpus, and how long the effect of an end velocity lasts.
 
-    A corpus of fewer families of clips than FEWEST tells too little: it takes the prior.
+    A corpus with fewer than FEWEST families of clips takes the prior.
 
     Args:
         corpus: the movement.
-        carriage: its moments.
-        workshop: threads; None for this one.
+        carriage: posture statistics of its samples.
+        workshop: threads; None for the current one.
     """
     spread = spread_of(corpus, carriage)
     evidence = gather_evidence(corpus, carriage, WINDOWS, workshop) if len(corpus.clips) >= FEWEST else []
@@ -82,13 +82,13 @@ def learn_trust(corpus: Corpus, carriage: Carriage, workshop: Workshop | None = 
 
 
 def gather_evidence(corpus: Corpus, carriage: Carriage, count: int, workshop: Workshop | None = None) -> list[Squares]:
-    """Return how far walks are right in windows of each family of clips, when they know the other families alone.
+    """Compare walks with the recording in windows of each family of clips; the walks use the other families only.
 
     Args:
         corpus: the movement.
-        carriage: its moments.
-        count: windows of each length.
-        workshop: threads; None for this one.
+        carriage: posture statistics of its samples.
+        count: windows per length.
+        workshop: threads; None for the current one.
     """
     pieces, spread = [piece for piece in _pieces(corpus) if piece.stop - piece.start > 1], spread_of(corpus, carriage)
     windows = [window for seconds in LENGTHS for window in _windows(corpus, pieces, seconds, count)]
@@ -105,14 +105,14 @@ def gather_evidence(corpus: Corpus, carriage: Carriage, count: int, workshop: Wo
 
 
 def spread_of(corpus: Corpus, carriage: Carriage) -> Floats:
-    """Return the distance between two random postures by part of the body [P], radians a joint, root mean square."""
+    """Return the RMS distance per joint between two random postures, for each body part [P], radians."""
     one, other = np.random.default_rng(0).integers(len(corpus), size=(2, PAIRS))
     turned = rot.angle(carriage.orientations[one], carriage.orientations[other]) ** 2
     return np.array([max(float(np.sqrt(turned[:, part].mean())), NO_WAY) for part in parts_of(corpus.skeleton)])
 
 
 def of_pieces(corpus: Corpus, carriage: Carriage, pieces: Sequence[_Piece]) -> Carriage:
-    """Return the carriage of pieces of clips alone, as far as walks need it; pieces are in the corpus's order."""
+    """Restrict a carriage to pieces of clips, given in corpus order; only the fields that walks need are updated."""
     starts, firsts, count = corpus.columns.starts, corpus.moves.firsts, len(corpus.columns.weights)
     postures = np.concatenate([np.arange(piece.start, piece.stop) for piece in pieces])
     moves = np.concatenate(
@@ -142,12 +142,12 @@ def of_pieces(corpus: Corpus, carriage: Carriage, pieces: Sequence[_Piece]) -> C
 
 
 def _family(corpus: str, name: str) -> tuple[str, str]:
-    """Return what names a clip's take: mirrored copies have its name, and parts and namesakes a number after it."""
+    """Return the key of a clip's take: mirrored copies share its name; parts and namesakes append a number to it."""
     return corpus, re.sub(r"(\.\d+| \(\d+\))+$", "", name)
 
 
 def _pieces(corpus: Corpus) -> list[_Piece]:
-    """Return pieces of clips that stand for a corpus, with MOST postures together at most, about."""
+    """Choose pieces of clips that represent a corpus, with about MOST postures in total at most."""
     starts = corpus.columns.starts
     numbers = np.arange(len(starts) - 1)
     if len(corpus) > MOST:
@@ -164,7 +164,7 @@ def _pieces(corpus: Corpus) -> list[_Piece]:
 
 
 def _windows(corpus: Corpus, pieces: Sequence[_Piece], seconds: float, count: int) -> list[_Window]:
-    """Return so many windows of so many seconds, about, evenly spread over pieces; of two moves at least."""
+    """Return about `count` windows of about `seconds`, evenly spread over pieces; each spans at least two moves."""
     found: list[tuple[_Piece, Ints, Ints]] = []
     for piece in pieces:
         times = corpus.times[piece.start : piece.stop]
@@ -183,10 +183,10 @@ def _windows(corpus: Corpus, pieces: Sequence[_Piece], seconds: float, count: in
 
 
 def _squares(corpus: Corpus, carriage: Carriage, others: Carriage, spread: Floats, window: _Window) -> Squares:
-    """Return how far walks through other clips' moments go along with the true movement in a window.
+    """Compare the departure of walks through the other clips with the true departure in a window.
 
-    Departures are those of the joints' global rotations at the postures between. They are taken relative to the true
-    departure of the window, so that quiet windows count as much as wild ones.
+    Departures are in the joints' global rotations, at the inner postures. They are divided by the window's true
+    departure, so that quiet windows count as much as lively ones.
     """
     skeleton, here = corpus.skeleton, slice(window.first, window.last + 1)
     true, times = carriage.orientations[here, : len(skeleton)], corpus.times[here]
@@ -206,18 +206,18 @@ def _squares(corpus: Corpus, carriage: Carriage, others: Carriage, spread: Float
 
 
 def _of_joints(walk: Walk, spread: Floats) -> Floats:
-    """Return how much each entry of the table counts in the share of each joint [J, 5]."""
+    """Return the weight of each table entry in the share of each joint [J, 5]."""
     of_parts = counts(walk.nearest.mean(axis=1), walk.ways, spread)
     return np.asarray(np.einsum("k,jkc->jc", np.array(SIZES), of_parts[walk.members]))
 
 
 def errors_of_lasting(corpus: Corpus, count: int) -> Floats:
-    """Return how far minimal movements are from the true ones by how long velocities are felt, those of LASTS [n]: sums
-    over windows of mean distances, radians; 0 if there are no windows.
+    """Return the error of minimal movements for each decay time in LASTS [n]: mean distances from the recordings,
+    summed over windows, radians; 0 if there are no windows.
 
     Args:
         corpus: the movement.
-        count: windows of each length.
+        count: windows per length.
     """
     pieces, out = _pieces(corpus), np.zeros(len(LASTS))
     for window in (window for seconds in BRIEF for window in _windows(corpus, pieces, seconds, count)):
@@ -228,7 +228,7 @@ def errors_of_lasting(corpus: Corpus, count: int) -> Floats:
 
 
 def _errors_in(corpus: Corpus, clip: Clip, window: _Window) -> Floats:
-    """Return the distances of minimal movements from a clip's recording in a window [n], means over its frames."""
+    """Return mean distances of minimal movements from a clip's recording over a window's frames [n], for LASTS."""
     skeleton, frames = corpus.skeleton, corpus.detail.shape[1] + 1  # a move
     first, last = ((end - clip.start) * frames for end in (window.first, window.last))
     shown = corpus.recording(clip, first - frames, last + frames + 1)
@@ -248,7 +248,8 @@ def _errors_in(corpus: Corpus, clip: Clip, window: _Window) -> Floats:
 
 
 def _carried(skeleton: Skeleton) -> Floats:
-    """Return how many joints each joint turns with it [J]: as often its error is in the global rotations."""
+    """Return the number of joints that each joint carries, itself included [J]: its error recurs in their global
+    rotations."""
     out = np.ones(len(skeleton))
     for joint in range(len(skeleton) - 1, 0, -1):
         out[skeleton.parents[joint]] += out[joint]

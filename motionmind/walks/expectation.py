@@ -1,6 +1,6 @@
-"""The expectation of walks through a corpus, between two postures: where each joint is, and where the body faces.
+"""The expectation of walks through a corpus between two postures: each joint's orientation, and the heading.
 
-The search takes it as its guide, before any path is known; the motion takes it again, of walks near the path.
+It guides the search before any path is known. Synthesis computes it again, from walks near the path.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from motionmind.walks.stops import Stop, moments_rates
 
 
 class Expectation(NamedTuple):
-    """The expectation of walks at T moves and midway between them: the half steps.
+    """The expectation of walks at the ends and middles of T moves: the half steps.
 
     Attributes:
         half_steps: times [2 T + 1], seconds.
-        poses: orientations of the joints [2 T + 1, J, 4], without the body's turning where facing is free.
-        headings: where the body faces [2 T + 1], radians.
-        moments: probabilities of moments of the corpus [2 T + 1, n].
-        moves: probabilities of moves of the corpus in each half step [2 T, m].
-        trust: how far each joint is trusted to the walks in each half step [2 T, J], from 0 to 1.
-        of_moments: which of the corpus's moments are meant [n]; all of them where they are a slice.
-        of_moves: which of its moves are meant [m]; all of them where they are a slice.
-        left_out: share of walks whose ends others stand for (`motionmind.walks.mean_walk.MeanWalk`).
+        poses: orientations of the joints [2 T + 1, J, 4], without the body's turn where the facing is free.
+        headings: heading of the body [2 T + 1], radians.
+        moments: probabilities of the corpus's samples [2 T + 1, n].
+        moves: probabilities of the corpus's moves in each half step [2 T, m].
+        trust: trust in the walks per joint and half step [2 T, J], from 0 to 1.
+        of_moments: indices of these samples [n]; a slice means all.
+        of_moves: indices of these moves [m]; a slice means all.
+        left_out: share of walks whose end samples are represented by others (`motionmind.walks.mean_walk.MeanWalk`).
     """
 
     half_steps: Floats
@@ -47,7 +47,7 @@ class Expectation(NamedTuple):
     left_out: float = 0.0
 
     def chains(self, corpus: Corpus, at: Floats) -> Floats:
-        """Return orientations of the chains [K, L, 4] at some times [K]: a C2 curve through those of the half steps."""
+        """Return orientations of the joint chains [K, L, 4] at times [K], on a C2 curve through the half steps."""
         out = rotation_spline(self.half_steps, self.poses, at)
         if corpus.facing == "free":
             turn = rot.about_vertical(natural_spline(self.half_steps, self.headings, at))
@@ -63,21 +63,21 @@ def expect(
     path: Floats | None = None,
     near: bool = False,
 ) -> Expectation:
-    """Return what walks through a corpus expect between the stops.
+    """Return the expectation of walks through a corpus between the stops.
 
     Args:
-        corpus: the movement that was learned from.
-        carriage: how its bodies hold themselves, travel and stand.
-        stops: what is passed exactly, by the number of moves that lead there; increasing, with the first and the last.
-        half_steps: times of the moves and midway between them [2 T + 1], seconds.
-        path: orientations of the joints at the moves that walks are to be near to [T + 1, J, 4]; None for all walks.
-        near: whether the body turns the near way, whatever walks do (`turn_with_walks`): where the time is what the
-            corpus takes for that.
+        corpus: the movement learned from.
+        carriage: its posture statistics.
+        stops: postures to pass exactly, keyed by the number of moves before each; increasing, first and last included.
+        half_steps: times of the ends and middles of the moves [2 T + 1], seconds.
+        path: orientations of the joints at the moves, which the walks follow [T + 1, J, 4]; None for all walks.
+        near: turn the body the short way whatever the walks do (`turn_with_walks`): for durations that the corpus
+            takes for the short way.
     """
     moving = any(stop.rates is not None for stop in stops.values())
     rates = partial(moments_rates, corpus, carriage) if moving else None
     walk = mean_walk(corpus.skeleton, carriage, rates, stops, half_steps, path)
-    # Each half step leads to the middle of a move or from there.
+    # Each half step leads to or from the middle of a move.
     middles, of = _middles(walk.of, len(carriage.weights), len(carriage.turn))
     moves = walk.moments[:-1, middles] + walk.moments[1:, middles]
     moves /= moves.sum(axis=1, keepdims=True)
@@ -95,7 +95,7 @@ def expect(
 
 
 def _middles(moments: Ints | slice, count: int, moves: int) -> tuple[Ints | slice, Ints | slice]:
-    """Return which of some moments are middles of moves, and of which moves, of a corpus with `count` moments."""
+    """Return which samples are middles of moves, and of which moves; the corpus has `count` samples."""
     if isinstance(moments, slice):
         return slice(count - moves, None), moments
     middles = np.flatnonzero(moments >= count - moves)

@@ -1,4 +1,4 @@
-"""Frames: a corpus's recordings at 30 frames a second, or those of them that are near a movement."""
+"""Frames: a corpus's recordings at 30 frames per second, whole or near a movement."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import postures_near
 from motionmind.walks.likelihood import squared_distances
 
-NEAREST = 8  # postures of a large corpus near each of a movement's around which recordings are looked at
-BESIDE = 8  # postures before and after these, at least
-LEAVES = 32  # of the tree over a large corpus that are searched for them
-KNOTS = 4  # postures beyond a stretch that its spline is made through, too: farther ones change it by a hundredth
+NEAREST = 8  # neighbours sought for each posture of a movement, in a large corpus
+BESIDE = 8  # postures taken before and after each neighbour, at least
+LEAVES = 32  # tree leaves searched for the neighbours
+KNOTS = 4  # spline knots beyond each end of a stretch: farther ones change it by a hundredth
 
 
 class Frames(NamedTuple):
-    """Recordings of a corpus at 30 frames a second, stretch after stretch.
+    """Recordings of a corpus at 30 frames per second, in consecutive stretches.
 
     Attributes:
         chains: orientations of the joint chains [F, L, 4].
-        stretches: number of the stretch that each frame is in, rising [F].
-        postures: the corpus's last posture that is not after each [F].
+        stretches: index of each frame's stretch, increasing [F].
+        postures: the corpus's last posture at or before each frame [F].
         times: of the frames in their clips [F], seconds.
-        rates: angular velocities of the chains, in their own frames [F, L, 3], radians a second.
+        rates: angular velocities of the joint chains, in their own frames [F, L, 3], rad/s.
     """
 
     chains: Floats
@@ -44,14 +44,14 @@ class Frames(NamedTuple):
 
 @lru_cache(maxsize=2)
 def all_frames(corpus: Corpus) -> Frames:
-    """Return all of a corpus's recordings; keyframes, as of a score, are joined by splines."""
+    """Return all of a corpus's recordings; splines join keyframes, such as those of a score."""
     starts = corpus.columns.starts
     return _joined([_sample(corpus, int(a), int(b) - 1, (int(a), int(b))) for a, b in pairwise(starts)])
 
 
 def frames_near(corpus: Corpus, carriage: Carriage, poses: Floats, beside: int = BESIDE) -> Frames:
-    """Return the recordings near some postures [K, J, 4], and so many postures before and after; all of a corpus
-    without trees."""
+    """Return the recordings within `beside` postures of the neighbours of `poses` [K, J, 4]; all recordings of a
+    corpus without trees."""
     if carriage.trees is None:
         return all_frames(corpus)
     count, starts = len(corpus), corpus.columns.starts
@@ -68,12 +68,12 @@ def frames_near(corpus: Corpus, carriage: Carriage, poses: Floats, beside: int =
 
 
 def _sample(corpus: Corpus, first: int, last: int, known: tuple[int, int]) -> tuple[Floats, Ints, Floats]:
-    """Return chains [n, L, 4], postures [n] and times [n] of the frames from one posture of a clip to another.
+    """Return joint chains [n, L, 4], postures [n] and times [n] of the frames between two postures of a clip.
 
     Args:
         corpus: the corpus.
         first, last: the postures.
-        known: the first of the postures that the curve is made through, and the one after the last.
+        known: range of postures that the spline passes through, the end excluded.
     """
     knots, between = slice(*known), corpus.detail.shape[1]
     keys, begin = corpus.times[knots], corpus.times[first]
@@ -87,29 +87,29 @@ def _sample(corpus: Corpus, first: int, last: int, known: tuple[int, int]) -> tu
         below = np.clip(np.floor(share + 1e-6), 0, between).astype(np.int64)
         rest = np.maximum(share - below, 0.0)[:, None, None]
         edge = np.zeros((len(times), 1, *corpus.detail.shape[2:]))
-        detail = np.concatenate([edge, corpus.detail[begins], edge], axis=1)  # none at the postures
+        detail = np.concatenate([edge, corpus.detail[begins], edge], axis=1)  # zero at the postures
         rows = np.arange(len(times))
         rotations = rot.mul(rotations, rot.exp((1.0 - rest) * detail[rows, below] + rest * detail[rows, below + 1]))
     return rot.normalise(corpus.to_chains(rotations)), postures, times
 
 
 def _joined(parts: Sequence[tuple[Floats, Ints, Floats]]) -> Frames:
-    """Return the frames of some stretches, one after another."""
+    """Concatenate stretches of frames."""
     chains, postures, times = (np.concatenate(found) for found in zip(*parts, strict=True))
     stretches = np.repeat(np.arange(len(parts)), [len(found) for found, _, _ in parts])
     rates = RATE * rot.log(rot.inv_mul(chains[:-1], chains[1:]))
     rates = np.concatenate([rates, np.zeros((1, *rates.shape[1:]))])
     ends = np.flatnonzero(np.diff(stretches, append=len(parts)) > 0)
-    rates[ends] = np.where((np.diff(ends, prepend=-1) > 1)[:, None, None], rates[ends - 1], 0.0)  # one frame is at rest
+    rates[ends] = np.where((np.diff(ends, prepend=-1) > 1)[:, None, None], rates[ends - 1], 0.0)  # lone frames rest
     return Frames(np.ascontiguousarray(chains), stretches, postures, times, rates)
 
 
 def frames_of(corpus: Corpus, clip: int, begin: float, end: float) -> Frames:
-    """Return the recording of a clip, by its number, from the last posture before a time to the first after another.
+    """Return a clip's recording from the last posture at or before `begin` to the first at or after `end`.
 
     Args:
         corpus: the corpus.
-        clip: number of the clip.
+        clip: index of the clip.
         begin, end: times in the clip's own recording, seconds.
     """
     first, stop = (int(at) for at in corpus.columns.starts[clip : clip + 2])
@@ -122,6 +122,6 @@ def frames_of(corpus: Corpus, clip: int, begin: float, end: float) -> Frames:
 
 
 def distances_of(recorded: Frames, poses: Floats) -> Floats:
-    """Return the squared distances of all frames from some postures [K, J, 4]: means over joints [K, F], radians^2."""
-    whole = np.zeros((poses.shape[1], 1), dtype=np.int64)  # the body as its only part
+    """Return squared distances between postures [K, J, 4] and all frames: means over joints [K, F], radians^2."""
+    whole = np.zeros((poses.shape[1], 1), dtype=np.int64)  # one part: the whole body
     return np.asarray(squared_distances(recorded.chains, whole, 1, np.ascontiguousarray(poses))[0])

@@ -1,4 +1,4 @@
-"""Where a body faces and travels, on corpora whose facing is free: headings are angles about the vertical, radians."""
+"""Heading and travel of the body, for corpora with free facing: headings are angles about the vertical, radians."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
 from motionmind.walks.minimal import LASTS, departure
 
-NEARLY = np.radians(150.0)  # of half a turn: by so much a body may as well turn the other way
-SPINS = 4.0  # radians a second from which a body goes on turning as the corpus does, even the far way
-RUN = 0.5  # seconds for which a body that turns goes on turning
+NEARLY = np.radians(150.0)  # turns from here to 180 degrees may go either way
+SPINS = 4.0  # rad/s: a body that turns faster at an end continues as the corpus does, even the long way round
+RUN = 0.5  # seconds for which a turning body keeps turning
 
 
 def turn_with_walks(
@@ -26,27 +26,26 @@ def turn_with_walks(
     near: bool = False,
     lasts: float = LASTS,
 ) -> Floats:
-    """Return headings [2 T + 1], unwrapped, of a body that turns as the walks do and meets the given facings.
+    """Return unwrapped headings [2 T + 1] of a body that turns as the walks do and meets the given facings.
 
-    The less certain it is to which side walks turn on the whole, the less they turn: of turns that add up to M with
-    variance V the share M^2 / (M^2 + V) is taken, the linear estimate of least mean square error. Walks that turn do so
-    for about RUN seconds, so V counts steps that vary together for as long. The turn still missing to each facing is
-    distributed over the steps in proportion to their variance, as in the mean of normal variables given their sum; of
-    all facings that differ by whole turns, the nearest to what the walks do is meant, or, where it is to be the `near`
-    way and that is less than NEARLY half a turn, the nearest to the facing before; a body that SPINS at an end goes on,
-    by one whole turn more at most.
-    As far as walks are not trusted, the body does not turn with them, and distributes what is missing evenly. A body
-    that turns at an end does so there, too.
+    Walks that disagree about the direction turn the body less: a total turn M with variance V is scaled by
+    M^2 / (M^2 + V), the linear estimate of least mean square error. A turn lasts about RUN seconds, so V treats steps
+    within that time as correlated. The turn still missing to each facing is distributed over the steps in proportion
+    to their variance, as in the mean of normal variables given their sum. Facings are known up to whole turns: the
+    one nearest to the walks' turn is taken or, with `near` and for turns below NEARLY, the one nearest to the previous
+    facing. A body that SPINS at an end may go on by one whole turn more.
+    Where walks are not trusted, the body does not turn with them, and the missing turn is distributed evenly. Given
+    turning rates at the ends are met.
 
     Args:
         turn: mean turn of the walks in each step [2 T], radians.
-        spread: mean square of the same [2 T].
-        trust: how far walks are trusted in each step [2 T], from 0 to 1.
+        spread: mean square of the turn [2 T].
+        trust: trust in the walks in each step [2 T], from 0 to 1.
         half_steps: times of the steps' ends [2 T + 1], seconds.
-        facing: the rotations [4] that the headings meet, by the number of moves; with the first and the last.
-        rates: turning at the first and at the last, radians a second; None where it is unknown.
-        near: whether the body is to turn the near way from each facing to the next.
-        lasts: seconds for which turning at an end is felt at most.
+        facing: rotations [4] that the headings meet, keyed by the number of moves; first and last included.
+        rates: turning rate at the first and the last, rad/s; None where unknown.
+        near: turn the short way from each facing to the next.
+        lasts: seconds for which a turning rate at an end has effect, at most.
     """
     spins = [rate for rate in rates if rate is not None and abs(rate) >= SPINS]
     varies = np.maximum(spread - turn**2, 1e-4)
@@ -59,7 +58,7 @@ def turn_with_walks(
         way = rot.heading(facing[end // 2]) - rot.heading(facing[start // 2])
         way -= 2.0 * np.pi * np.round(way / (2.0 * np.pi))
         missing -= 2.0 * np.pi * np.round(missing / (2.0 * np.pi))
-        if near:  # no more than the one turn that a spin, or having as far to either side, is worth
+        if near:  # at most one extra turn, for a spin or a turn of nearly 180 degrees
             either = abs(way) >= NEARLY
             fewest = -int(either or any(rate < 0.0 for rate in spins))
             most = int(either or any(rate > 0.0 for rate in spins))
@@ -78,9 +77,9 @@ def turn_with_walks(
 
 
 def correct_headings(headings: Floats, centres: Floats, within: Floats) -> Floats:
-    """Return what to add to headings [K] to be `within` radians [K] of the `centres` of states [K], without a leap.
+    """Return continuous corrections that bring headings [K] `within` radians [K] of the `centres` of states [K].
 
-    Where both turn on opposite ways the corrections come to a whole turn, and stay there.
+    Where headings and centres turn in opposite directions, the corrections grow to a whole turn and keep it.
     """
     missing = np.unwrap(centres - headings)
     turns = 2.0 * np.pi * np.round(missing / (2.0 * np.pi))
@@ -88,10 +87,10 @@ def correct_headings(headings: Floats, centres: Floats, within: Floats) -> Float
 
 
 def travel_along(travel: Floats, headings: Floats) -> Floats:
-    """Return the root's level displacement in the world in each step [2 T, 3], metres.
+    """Return the root's horizontal displacement in world axes in each step [2 T, 3], metres.
 
     Args:
-        travel: the same in the body's own heading midway through the step [2 T, 3], metres.
+        travel: the displacement relative to the body's heading midway through the step [2 T, 3], metres.
         headings: at the steps' ends [2 T + 1], radians.
     """
     along = rot.mul_vec(rot.about_vertical(0.5 * (headings[1:] + headings[:-1])), travel)

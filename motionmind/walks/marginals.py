@@ -1,7 +1,7 @@
-"""Posterior marginals of walks: how likely each of a corpus's postures is at each move, given both ends.
+"""Posterior marginals of walks: the exact probability of each of a corpus's samples at each step, given both ends.
 
-Computed exactly, by passing messages forward and backward. Source: Rabiner, "A tutorial on hidden Markov models",
-Proc. IEEE 77(2) (1989), section III.
+The forward-backward algorithm computes them. Source: Rabiner, "A tutorial on hidden Markov models", Proc. IEEE 77(2)
+(1989), section III.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from motionmind.walks.likelihood import ANYWHERE, STRAIGHT_ON
 def posterior_marginals(
     begins: Ints, ends: Ints, shares: Floats, clusters: Int32s, weights: Floats, near: Floats
 ) -> Floats:
-    """Return the probability that a walk is in each posture at each step [S + 1, N]; rows sum to 1.
+    """Return the probability that a walk is in each sample at each step [S + 1, N]; rows sum to 1.
 
-    The chance of a walk is proportional to the product of the weight of its first posture, the shares of its steps, the
-    mixing after each, and the nearness of its postures.
+    The probability of a walk is proportional to the product of the weight of its first sample, the shares of its
+    steps, the jump probability after each, and the likelihoods of its samples.
 
     Args:
-        begins: postures from which the corpus's steps lead [M].
-        ends: postures that they lead to [M].
-        shares: share of each step among those that leave the same posture [M]; they add up to 1.
-        clusters: cluster of each posture [N].
-        weights: of the postures [N], above 0.
-        near: a weight of each posture at each step [S + 1, N].
+        begins: sample from which each of the corpus's steps leads [M].
+        ends: sample to which it leads [M].
+        shares: share of each step among those that leave the same sample [M]; they add up to 1.
+        clusters: cluster of each sample [N].
+        weights: of the samples [N], above 0.
+        near: likelihood of each sample at each step [S + 1, N].
     """
     over = (1.0 - STRAIGHT_ON - ANYWHERE) / np.bincount(clusters, weights)
     anywhere = ANYWHERE / weights.sum()
@@ -50,8 +50,8 @@ def _forward_messages(
 ) -> Floats:
     """Return alpha [S + 1, N] with alpha[t] = near[t] * mixed(alpha[t - 1] moved on by a step), rows scaled to sum 1.
 
-    Of mass that comes to posture i, the share STRAIGHT_ON stays; over[k] of that in cluster k, and `anywhere` of all,
-    goes to each posture in proportion to its weight.
+    Mixing keeps the share STRAIGHT_ON of the mass in each sample. Each sample also receives its weight times
+    (over[k] * mass in its cluster k + anywhere * total mass).
     """
     out = np.empty_like(near)
     came, pooled = weights.copy(), np.empty((4, len(over)))
@@ -82,8 +82,8 @@ def _times_backward_messages(
     anywhere: float,
     near: Floats,
 ) -> None:
-    """Multiply rows [S + 1, N] by beta with beta[t] = mixed(beta[t + 1] * near[t + 1]) moved back by a step, and scale
-    them to sum 1."""
+    """Multiply rows [S + 1, N] by beta, with beta[t] = mixed(beta[t + 1] * near[t + 1]) moved back by a step, and scale
+    each to sum 1."""
     back, on, weighs = np.ones(near.shape[1]), np.empty(near.shape[1]), np.empty(near.shape[1])
     pooled = np.empty((4, len(over)))
     for t in range(len(near) - 2, -1, -1):
@@ -105,22 +105,22 @@ def _times_backward_messages(
 
 @jit
 def _pool(values: Floats, clusters: Int32s, pooled: Floats) -> float:
-    """Write the sums of values [N] in clusters [N] to pooled[0] [4, K], and return the sum of all.
+    """Write the sums of values [N] by cluster [N] to pooled[0] of [4, K], and return the total.
 
-    Neighbours are mostly in one cluster. They are added to different sums: one addition need not wait for another.
+    Consecutive samples are mostly in one cluster. Four separate sums keep their additions independent.
     """
     pooled[:] = 0.0
     for i in range(len(values)):
         pooled[i % 4, clusters[i]] += values[i]
     for k in range(1, 4):
-        for cluster in range(pooled.shape[1]):  # assigning whole rows compiles for seconds, for an error message
+        for cluster in range(pooled.shape[1]):  # assigning whole rows takes seconds to compile, for an error message
             pooled[0, cluster] += pooled[k, cluster]
     return float(pooled[0].sum())
 
 
 @jit
 def _scale(row: Floats) -> None:
-    """Scale a row to sum 1; it is added up in four sums, as in `_pool`."""
+    """Scale a row to sum 1; four separate sums add it up, as in `_pool`."""
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
     last = len(row) - len(row) % 4
     for i in range(0, last, 4):

@@ -1,4 +1,4 @@
-"""The mean of all walks through a corpus between given postures: a movement's postures at its moves and midway."""
+"""The mean of all corpus walks between given postures: the movement's postures at the ends and middles of moves."""
 
 from __future__ import annotations
 
@@ -41,24 +41,23 @@ from motionmind.walks.minimal import departure, minimal_movement
 from motionmind.walks.sparse import Chosen, all_of, choose, merged, steps_on
 from motionmind.walks.stops import Rates, Stop
 
-STRIDE = 0.5  # radians a joint that go with travelling as far as the body is tall; chosen on cmu-05 and cmu-16
-THREADS = min(4, os.cpu_count() or 1)  # in which parts of the body are worked on; results do not depend on it
-BUSY = 4000  # moments of a corpus that keep a thread busy: for fewer, another costs more than it saves
+STRIDE = 0.5  # radians per joint that count as much as travelling one body height; chosen on cmu-05 and cmu-16
+THREADS = min(4, os.cpu_count() or 1)  # one body part each at a time; results do not depend on the number
+BUSY = 4000  # samples per thread: with fewer, another thread costs more than it saves
 
 _Item = TypeVar("_Item")
 _Made = TypeVar("_Made")
 
 
 class MeanWalk(NamedTuple):
-    """The mean of walks through a corpus, at T moves and midway between them: the half steps.
+    """The mean of walks through a corpus at the ends and middles of T moves: the half steps.
 
     Attributes:
         poses: orientations of the joints [2 T + 1, J, 4].
-        moments: probabilities of moments of the corpus [2 T + 1, n].
-        of: which moments these are [n]; all of them in a small corpus.
-        trust: how far each joint is trusted to the walks in each half step [2 T, J], from 0 to 1
-            (`motionmind.learned.trust`).
-        left_out: share of walks that begin or end in moments that others stand for, about, in the part of the body
+        moments: probabilities of the corpus's samples [2 T + 1, n].
+        of: indices of these samples [n]; all of them in a small corpus.
+        trust: trust in the walks per joint and half step [2 T, J], from 0 to 1 (`motionmind.learned.trust`).
+        left_out: approximate share of walks that begin or end in samples represented by others, in the body part
             where it is greatest; 0 in a small corpus.
     """
 
@@ -77,20 +76,20 @@ def mean_walk(
     half_steps: Floats,
     path: Floats | None,
 ) -> MeanWalk:
-    """Return the mean over walks from each stop to the next, and how likely moments of the corpus are.
+    """Return the mean over walks from each stop to the next, and the probabilities of the corpus's samples.
 
-    Walks of limbs count as much as those of larger parts together. The moments, by which the body travels and stands,
-    are those of walks of the whole and of the part that carries it. The mean is taken as a departure from the minimal
-    movement between the stops (`motionmind.walks.minimal`), of which that share is kept that the corpus has been found
-    to know (`motionmind.learned.trust`). It comes near the stops but not to them: its offsets there are subtracted
-    along the walk in proportion to time, and those of its velocities as `departure` has it.
+    Walks of a limb weigh as much as those of both larger parts together. The probabilities of samples, which decide
+    travel and support, come from walks of the whole body and of the part that carries it. The mean is expressed as a
+    departure from the minimal movement between the stops (`motionmind.walks.minimal`), scaled by the trust that the
+    corpus has earned (`motionmind.learned.trust`). It passes near the stops, not through them: its offsets there are
+    subtracted along the walk, in proportion to time, and those of its velocities with `departure`.
 
     Args:
         skeleton: the body.
-        carriage: the corpus's N moments and its steps between them.
-        rates: returns the velocities in moments; None where no stop has any.
-        stops: what the walk passes, by the number of moves that lead there; increasing, with the first and the last.
-        half_steps: times of the moves and midway between them [2 T + 1], seconds.
+        carriage: the corpus's N samples and the steps between them.
+        rates: returns the velocities in samples; None where no stop has a velocity.
+        stops: postures to pass, keyed by the number of moves before each; increasing, first and last included.
+        half_steps: times of the ends and middles of the moves [2 T + 1], seconds.
         path: orientations to follow at the moves [T + 1, J, 4], or None.
     """
     joints, parts = len(skeleton), parts_of(skeleton)
@@ -115,11 +114,11 @@ class Walk(NamedTuple):
     Attributes:
         minimal: the minimal movement, orientations [S + 1, J, 4].
         departs: departure of the mean from it [S + 1, J, 3]: rotation vectors, radians, 0 at both stops.
-        members: the parts of the body of all three sizes that each joint is in [J, 3].
-        nearest: distance of each stop from the nearest moment of each part [P, 2], radians a joint.
-        ways: how far each part has to go [P], radians a joint.
-        moments: probabilities of moments [S + 1, n] in walks of the whole body, and in those of what carries it, each
-            with the moments that these are.
+        members: the body part of each of the three sizes that each joint belongs to [J, 3].
+        nearest: distance of each stop from the nearest sample, by body part [P, 2], radians per joint.
+        ways: displacement of each part [P], radians per joint (`_way`).
+        moments: probabilities of samples [S + 1, n] and the indices of these samples, in walks of the whole body and
+            of the part that carries it.
         left_out: as in `MeanWalk`.
     """
 
@@ -132,19 +131,19 @@ class Walk(NamedTuple):
     left_out: float
 
     def trusted(self, trust: Trust) -> Floats:
-        """Return the share of its departure that each joint keeps [J], from 0 to 1."""
+        """Return the share of the departure that each joint keeps [J], from 0 to 1."""
         return np.asarray(trust.shares(self.nearest.mean(axis=1), self.ways)[self.members] @ np.array(SIZES))
 
 
 class _PartWalk(NamedTuple):
-    """The walks of one part of the body from one stop to the next in S steps.
+    """The walks of one body part from one stop to the next in S steps.
 
     Attributes:
-        chosen: the n moments that they are summed over.
-        shown: what these show of the part [n, p, 4]; of a corpus without trees, all chains in all moments.
-        marginals: their probabilities [S + 1, n].
-        counts: of a corpus with trees, those of them that may count in a mean.
-        counted: their probabilities by the part's size, as `mean_of_parts` takes them, once for all joints of the part.
+        chosen: the n samples in the sum over walks.
+        shown: orientations of the part in these samples [n, p, 4]; without trees, all joint chains in all samples.
+        marginals: probabilities of the samples [S + 1, n].
+        counts: with trees, the samples whose probability is not negligible in a mean.
+        counted: their probabilities times the weight of the part's size, in the form that `mean_of_parts` takes.
         left_out: as in `MeanWalk`.
     """
 
@@ -157,19 +156,19 @@ class _PartWalk(NamedTuple):
 
 
 def _joined(segments: Mapping[int, Walk], count: int, moments: int) -> tuple[Floats, Ints | slice]:
-    """Return the probabilities of moments at each of so many half steps, and which moments of the corpus these are.
+    """Return the probabilities of samples at each half step [2 T + 1, n], and the indices of these samples.
 
     Args:
-        segments: by the number of moves that lead to their first stop.
+        segments: walks, keyed by the number of moves before their first stop.
         count: 2 T + 1.
-        moments: N, of the corpus.
+        moments: N, the number of samples in the corpus.
     """
     kept = [of for walk in segments.values() for _, of in walk.moments if not isinstance(of, slice)]
     chosen = reduce(merged, kept) if kept else slice(None)
     out = np.zeros((count, moments if isinstance(chosen, slice) else len(chosen)))
     for start, walk in segments.items():
         rows = out[2 * start : 2 * start + len(walk.minimal)]
-        rows[0] = 0.0  # of the segment before
+        rows[0] = 0.0  # written by the previous segment
         for share, of in walk.moments:
             if isinstance(of, slice) or isinstance(chosen, slice):
                 rows += 0.5 * share
@@ -180,7 +179,7 @@ def _joined(segments: Mapping[int, Walk], count: int, moments: int) -> tuple[Flo
 
 @jit
 def _add_half(rows: Floats, columns: Ints, shares: Floats) -> None:
-    """Add half of shares [S, n] to some columns [n] of rows."""
+    """Add half of shares [S, n] to the given columns [n] of rows."""
     for t in range(len(rows)):
         for k in range(len(columns)):
             rows[t, columns[k]] += 0.5 * shares[t, k]
@@ -198,11 +197,11 @@ def walk_between(
 
     Args:
         parts: of the body, as in `parts_of`.
-        carriage: the corpus's N moments and its steps between them.
-        rates: returns the velocities in moments; or None.
+        carriage: the corpus's N samples and the steps between them.
+        rates: returns the velocities in samples; or None.
         ends: both stops.
         times: of the steps' ends [S + 1], seconds.
-        path: orientations to follow at every other step between [S / 2 - 1, J, 4], or None.
+        path: orientations to follow at every second step end between the stops [S / 2 - 1, J, 4], or None.
     """
     joints = max(int(part.max()) for part in parts) + 1
     orientations = np.stack([stop.chains[:joints] for stop in ends])
@@ -243,7 +242,7 @@ def walk_between(
             return _PartWalk(chosen, here, *found, left_out)
 
         larger, limbs = {number for numbers in groups for number in numbers[:-1]}, {numbers[-1] for numbers in groups}
-        # Where all moments are summed over, what a limb's walks are alone in is not kept: it may be large.
+        # Without trees, arrays run over all samples and may be large: those of limbs are used at once, not kept.
         kept = sorted(larger if trees is None else larger | limbs)
         walks = dict(zip(kept, _each(walk, kept, pool, threads), strict=True))
 
@@ -269,10 +268,10 @@ def walk_between(
 
 
 def _each(work: Callable[[_Item], _Made], items: Sequence[_Item], pool: Executor, threads: int) -> list[_Made]:
-    """Return what `work` makes of each item, which this thread and those of a pool take one after another.
+    """Map `work` over items, which this thread and those of a pool take from one queue.
 
-    Parts of the body do not depend on each other, and compiled loops run side by side. To start a thread, and to wait
-    for it, costs as much as a part: so this one does not wait.
+    Body parts are independent, and compiled loops release the interpreter lock. Starting a thread and waiting for it
+    costs as much as one part, so the calling thread works, too.
     """
     left, made = iter(range(len(items))), dict[int, _Made]()
 
@@ -288,7 +287,7 @@ def _each(work: Callable[[_Item], _Made], items: Sequence[_Item], pool: Executor
 
 
 def _members(parts: tuple[Ints, ...], joints: int) -> tuple[Ints, dict[tuple[int, ...], list[int]]]:
-    """Return the parts of all three sizes that each joint is in [J, 3], and the joints that are in the same three."""
+    """Return the part of each size that each joint belongs to [J, 3], and the joints grouped by these three parts."""
     inside = np.zeros((joints, len(parts)), dtype=np.bool_)
     for number, part in enumerate(parts):
         inside[part, number] = True
@@ -300,7 +299,7 @@ def _members(parts: tuple[Ints, ...], joints: int) -> tuple[Ints, dict[tuple[int
 
 
 def _without_ends(off: Floats, times: Floats, leaving: bool, arriving: bool, lasts: float) -> Floats:
-    """Return departures [S + 1, m, 3] less what they are at both ends and, where velocities are given, their rates."""
+    """Subtract from departures [S + 1, m, 3] their values at both ends and, where velocities are given, their rates."""
     share = ((times - times[0]) / (times[-1] - times[0]))[:, None, None]
     off = off - (1.0 - share) * off[0] - share * off[-1]
     first = (off[1] - off[0]) / (times[1] - times[0]) if leaving else None
@@ -315,11 +314,11 @@ def _likely(
     ends: tuple[Stop, Stop],
     off: Floats,
 ) -> tuple[Floats, tuple[float, float], float]:
-    """Return the likelihoods of moments in one part of the body [K, n], how far the nearest are from both ends, radians
-    a joint, and the share of walks' ends that are in moments for which others stand.
+    """Return the likelihoods of samples for one body part [K, n], the distance of the nearest from each end, radians
+    per joint, and the share of walks that begin or end in samples represented by others.
 
-    Arguments are those of `walk_between`, but for the moments that are `chosen`, and how far `off` they are from the
-    two ends, and then from the postures of the path, if there is one: squared distances of the part [K, n], radians^2.
+    Arguments are those of `walk_between`, except `chosen`, the samples, and `off`, their squared distances in the part
+    from the two ends and then from the postures of the path, if any [K, n], radians^2.
     """
     nearest = nearest_to_ends(off)
     squares = in_variances(off, *map(variance_at_ends, nearest))
@@ -344,15 +343,15 @@ def _marginals(
     size: float,
     few: bool,
 ) -> tuple[Floats, Ints, Floats]:
-    """Return the posterior marginals [S + 1, n] of walks of one part of the body, which of its few moments may count in
-    a mean, and their weights there, as `counted` has them.
+    """Return the posterior marginals [S + 1, n] of one body part's walks, the samples that are not negligible in a
+    mean, and their weights there, from `counted`.
 
     Args:
         begins, goals, shares, clusters, weights: of `posterior_marginals`.
-        likely: of the moments, as `by_step` takes them.
+        likely: likelihoods of the samples, in the form that `by_step` takes.
         count: S + 1.
         size: weight of the part.
-        few: whether any are to be counted.
+        few: whether to compute the last two results.
     """
     marginals = posterior_marginals(begins, goals, shares, clusters, weights, by_step(likely, count))
     counts = that_count(marginals) if few else np.empty(0, np.int64)
@@ -360,12 +359,11 @@ def _marginals(
 
 
 def _way(part: Ints, ends: tuple[Stop, Stop], seconds: float, lasts: float) -> float:
-    """Return how far a part of the body has to go, radians a joint, root mean square.
+    """Return the displacement of a body part, RMS radians per joint.
 
-    It is the root of the sum of three squares: of the turn from one end to the other; of how far the part's speed at
-    the ends goes if it fades as (1 - t / lasts)^2, sooner where there is less time; and of STRIDE for each of the
-    body's heights that its root travels. A body in one posture of a cycle has a way to go if it moves there, or has to
-    get elsewhere.
+    It is the root of the sum of three squares: the turn from one end to the other; the distance that the part's end
+    speed covers while it decays as (1 - t / lasts)^2, faster in a shorter movement; and STRIDE per body height that
+    the root travels. So a cycle that returns to its first posture has a displacement if the body moves or travels.
     """
     turn = squared_distance(ends[0].chains[part], ends[1].chains[part]) / len(part)
     rates = [stop.rates.joints[part] for stop in ends if stop.rates is not None]
@@ -375,9 +373,9 @@ def _way(part: Ints, ends: tuple[Stop, Stop], seconds: float, lasts: float) -> f
 
 
 def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
-    """Return squared differences of the moments' velocities from a stop's [N], in units of their variances.
+    """Return squared differences between the samples' velocities and a stop's [N], in units of their variances.
 
-    Parts with the root know also how the body turns and travels.
+    Parts that include the root also compare the body's turning rate and travel.
     """
     if rates is None or stop.rates is None:
         return []
@@ -390,7 +388,7 @@ def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
 
 
 def _mean_of_few(walks: Sequence[_PartWalk], parts: Sequence[Ints], joints: Sequence[int], about: Floats) -> Floats:
-    """Return `mean_rotations` of some joints [m] over the walks of the parts of all three sizes that they are in."""
+    """Return `mean_rotations` of joints [m] over the walks of the three parts that they belong to."""
     weights, counts, shown = zip(*((one.counted, one.counts, one.shown) for one in walks), strict=True)
     columns = np.array([[np.flatnonzero(part == joint)[0] for joint in joints] for part in parts])
     return mean_of_parts(weights, counts, shown, columns, about)
@@ -398,7 +396,7 @@ def _mean_of_few(walks: Sequence[_PartWalk], parts: Sequence[Ints], joints: Sequ
 
 @jit
 def _mixed(whole: Floats, half: Floats, limb: Floats) -> Floats:
-    """Return how likely moments are in walks of all three sizes together [S + 1, N], from those of each."""
+    """Mix the probabilities of samples over walks of the three sizes [S + 1, N]."""
     out = np.empty_like(limb)
     for t in range(len(out)):
         for i in range(out.shape[1]):
