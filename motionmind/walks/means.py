@@ -1,4 +1,4 @@
-"""Means of rotations, each of many orientations by weights of its own."""
+"""Weighted means of rotations: many means over the same orientations."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import numpy as np
 from motionmind._typing import Floats, Ints
 from motionmind.jit import jit
 
-# Orientations of less weight are left out of a mean; from here to twice as much, their weight rises from 0 to its own.
-# At a sudden threshold the last bit of a weight would decide whether the orientation is in the mean.
+# A mean ignores orientations of less weight; from here to twice as much, the effective weight rises from 0 to its own.
+# At a sudden threshold, rounding would decide whether an orientation is in the mean.
 COUNTS = 1e-6
 
 
@@ -16,14 +16,14 @@ COUNTS = 1e-6
 def mean_rotations(weights: Floats, orientations: Floats, joints: Ints, about: Floats) -> Floats:
     """Return weighted means [S, m, 4] of m joints' orientations, in the hemisphere of `about`.
 
-    The mean is the normalised sum of quaternions of one sign, which is within a few thousandths of the mean rotation
-    where they lie within a right angle. Source: Gramkow, "On averaging rotations", IJCV 42 (2001).
+    The mean is the normalised sum of quaternions of the same sign, within a few thousandths of the mean rotation if
+    they lie within a right angle. Source: Gramkow, "On averaging rotations", IJCV 42 (2001).
 
     Args:
         weights: of the orientations in each mean [S, N].
-        orientations: of all chains [N, L, 4].
-        joints: the m of them.
-        about: orientations that choose each quaternion's sign, and stand in for a mean of length 0 [S, m, 4].
+        orientations: of all joint chains [N, L, 4].
+        joints: indices of the m joints.
+        about: orientations that set each quaternion's sign, and replace a mean of length 0 [S, m, 4].
     """
     sums = np.zeros((len(joints), 4, len(about)))
     counts = np.arange(weights.shape[1])
@@ -39,14 +39,14 @@ def mean_of_parts(
     columns: Ints,
     about: Floats,
 ) -> Floats:
-    """Return `mean_rotations` over the walks of three parts of the body together, each of moments of its own.
+    """Return `mean_rotations` over the walks of three body parts together; each part has its own samples.
 
     Args:
-        weights: of those moments that count, by part, `counted` [m, S].
-        counts: which of the part's moments these are, by part [n].
-        shown: what the part's moments show of it, by part [N, p, 4].
-        columns: which of the joints of each part are meant [3, m].
-        about: of `mean_rotations`.
+        weights: per part, from `counted` [m, S].
+        counts: per part, indices of the non-negligible samples [n].
+        shown: per part, orientations of its joints in its samples [N, p, 4].
+        columns: indices of the joints within each part [3, m].
+        about: as in `mean_rotations`.
     """
     sums = np.zeros((columns.shape[1], 4, len(about)))
     for k in range(3):
@@ -56,7 +56,7 @@ def mean_of_parts(
 
 @jit
 def that_count(weights: Floats) -> Ints:
-    """Return which of some orientations have a weight of more than COUNTS in any of the means [S, N]: [n]."""
+    """Return the indices [n] of orientations whose weight exceeds COUNTS in any of the means [S, N]."""
     most = weights[0].copy()
     for t in range(1, len(weights)):
         for i in range(len(most)):
@@ -66,15 +66,15 @@ def that_count(weights: Floats) -> Ints:
 
 @jit
 def counted(size: float, weights: Floats, counts: Ints) -> Floats:
-    """Return the weights of some orientations, times a factor, as `add_rotations` takes them [m, S].
+    """Scale the weights of orientations and arrange them for `add_rotations` [m, S].
 
-    They lie side by side for all means, which are then added to at once, four moments at a time: so there are rows of 0
-    beyond the last. A weight of 0 changes no sum.
+    The weights of one orientation in all means are contiguous. `add_rotations` takes four orientations at a time, so
+    rows of 0, which change no sum, pad the number to a multiple of four.
 
     Args:
-        size: the factor.
+        size: the scale factor.
         weights: of the orientations in each mean [S, N].
-        counts: which of them to add [n].
+        counts: indices of the orientations to add [n].
     """
     out = np.zeros((len(counts) + -len(counts) % 4, len(weights)))
     for i in range(len(counts)):
@@ -88,15 +88,15 @@ def counted(size: float, weights: Floats, counts: Ints) -> Floats:
 def add_rotations(
     sums: Floats, weights: Floats, counts: Ints, orientations: Floats, joints: Ints, about: Floats
 ) -> None:
-    """Add some orientations, those of one sign with `about`, to the sums of all means [m, 4, S].
+    """Add orientations, in the hemisphere of `about`, to the sums of all means [m, 4, S].
 
-    Arguments are those of `mean_rotations`, but for the weights, which are `counted`, and `counts`, which orientations
-    to add [n].
+    Arguments are those of `mean_rotations`, except `weights`, from `counted`, and `counts`, the indices of the
+    orientations to add [n].
     """
     count, moments = len(about), len(counts)
     near, signed, shown = np.empty((4, count)), np.empty((4, count)), np.empty((4, 4))
     for j in range(len(joints)):
-        for t in range(count):  # assigning the array compiles for seconds, for an error message
+        for t in range(count):  # assigning the array takes seconds to compile, for an error message
             for c in range(4):
                 near[c, t] = about[t, j, c]
         middle, added_up = about[count // 2, j], sums[j]
@@ -125,7 +125,7 @@ def add_rotations(
 
 @jit
 def means(sums: Floats, about: Floats) -> Floats:
-    """Return normalised sums of m joints' orientations [m, 4, S] as means [S, m, 4]; `about` where one is 0."""
+    """Normalise sums of m joints' orientations [m, 4, S] to means [S, m, 4]; `about` where a sum is 0."""
     out = about.copy()
     for j in range(len(sums)):
         for t in range(len(about)):
@@ -138,8 +138,8 @@ def means(sums: Floats, about: Floats) -> Floats:
 
 @jit
 def _spread(near: Floats, middle: Floats) -> float:
-    """Return how far orientations [4, S] are from one of them [4] at most, as vectors: a cosine with that one which is
-    greater has the same sign with all."""
+    """Return the greatest distance, as vectors, of orientations [4, S] from one of them [4]: a quaternion whose cosine
+    with that one is greater has a cosine of the same sign with all."""
     farthest = 0.0
     for t in range(near.shape[1]):
         far = 0.0

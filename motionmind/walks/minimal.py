@@ -1,8 +1,7 @@
 """The minimal movement between two postures.
 
-With nothing known but two postures, each joint turns the short way, evenly. Where the body moves at an end, it loses
-or gains that velocity within a while. Walks through a corpus add what such a body does on the way
-(`motionmind.walks.mean_walk`).
+Each joint turns the short way, evenly. A velocity given at an end decays, or builds up, within LASTS seconds. Walks
+through a corpus add the rest (`motionmind.walks.mean_walk`).
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import numpy as np
 from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
 
-LASTS = 0.45  # seconds for which a velocity at an end is felt at most, unless a corpus shows otherwise
+LASTS = 0.45  # seconds for which a velocity at an end has effect, at most, unless a corpus shows otherwise
 
 
 def departure(
@@ -26,10 +25,11 @@ def departure(
 
     Args:
         times: increasing [S + 1], seconds.
-        leaving: rate at the first time [...], units a second; None for 0.
-        arriving: rate at the last.
-        until: the time by which the first is over, and that before which the last is not felt; None for the whole.
-        lasts: seconds for which each rate is felt at most.
+        leaving: rate at the first time [...], units per second; None for 0.
+        arriving: rate at the last time.
+        until: the time at which the effect of `leaving` ends, and that at which the effect of `arriving` begins; None
+            for the last time and the first.
+        lasts: seconds for which each rate has effect, at most.
     """
     over, begins = until or (times[-1], times[0])
     begin, end = (times - times[0], over - times[0]), (times[-1] - times, times[-1] - begins)
@@ -50,9 +50,9 @@ def minimal_movement(
     Args:
         ends: orientations of m joints at both ends [2, m, 4].
         times: increasing [S + 1], seconds.
-        leaving: angular velocities at the first [m, 3], radians a second, in the joints' own frames; None if unknown.
-        arriving: the same at the last.
-        lasts: seconds for which each is felt at most.
+        leaving: angular velocities at the first time [m, 3], rad/s, in the joints' own frames; None if unknown.
+        arriving: angular velocities at the last time.
+        lasts: seconds for which each velocity has effect, at most.
     """
     length = times[-1] - times[0]
     straight = rot.slerp(ends[:1], ends[1:], ((times - times[0]) / length)[:, None])

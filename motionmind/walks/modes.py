@@ -1,9 +1,9 @@
-"""Modes: passages of the corpus that lead from one posture to another in quite different ways.
+"""Modes: recorded passages that lead from one posture to another in quite different ways.
 
-A mean of walks has no alternatives but itself, perturbed. The likeliest passages that begin near A and end near B after
-about the time that there is are other answers: other ways through space, other tempi, another foot to stand on. Among
-these, each next one is the farthest from all before (the traversal of Gonzalez, "Clustering to minimize the maximum
-intercluster distance", Theoretical Computer Science 38, 1985).
+A mean of walks offers only perturbations of itself as alternatives. The likeliest passages that begin near A and end
+near B in about the given time offer other trajectories, tempi and support feet. Each mode is the passage farthest from
+all earlier ones: the farthest-first traversal of Gonzalez, "Clustering to minimize the maximum intercluster distance",
+Theoretical Computer Science 38, 1985.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ LIKELIEST = 16  # passages to choose from
 def find_modes(
     corpus: Corpus, carriage: Carriage, ends: tuple[Stop, Stop], seconds: float, known: list[Floats]
 ) -> Iterator[Place]:
-    """Yield where likely passages begin, each the farthest from the movements that are `known` by then.
+    """Yield the places where likely passages begin, each the farthest from the movements `known` by then.
 
     Args:
-        corpus: the movement that was learned from.
-        carriage: how its bodies hold themselves.
-        ends: the first and the last posture, with their velocities if they are given.
-        seconds: how long the movement lasts.
-        known: orientations of the joints [K, J, 4] in each movement that is known, at even times from its first posture
-            to its last; those yielded are to be added by whoever takes them.
+        corpus: the movement learned from.
+        carriage: its posture statistics.
+        ends: the first and the last posture, with velocities if given.
+        seconds: duration of the movement.
+        known: orientations of the joints [K, J, 4] in each known movement, at even times from its first posture to its
+            last; the caller appends each yielded one.
     """
     steps, joints = max(1, round(seconds * RATE / STRIDE)), known[0].shape[1]
     poses = np.stack([stop.chains[:joints] for stop in ends])
@@ -53,9 +53,9 @@ def find_modes(
 
 
 def _likeliest(recorded: Frames, ends: tuple[Stop, Stop], poses: Floats, steps: int) -> list[tuple[int, int]]:
-    """Return the first and the last frame of passages that begin and end near the ends, the likeliest first.
+    """Return the first and last frames of passages that begin and end near the ends, likeliest first.
 
-    No more than half of the time of one lies within another.
+    Two passages overlap by at most half of the shorter one.
     """
     first, last = distances(recorded, poses, ends)
     total, begins = _from_start_to_end(recorded.stretches, first, steps)
@@ -71,12 +71,12 @@ def _likeliest(recorded: Frames, ends: tuple[Stop, Stop], poses: Floats, steps: 
 
 
 def _from_start_to_end(stretches: Ints, costs: Floats, steps: int) -> tuple[Floats, Ints]:
-    """Return the least cost of passages of so many steps to each frame [F], and the frames that they begin at [F].
+    """Return the least cost of a passage of `steps` steps to each frame [F], and the frame at which it begins [F].
 
     Args:
-        stretches: number of the stretch that each frame is in [F].
+        stretches: index of each frame's stretch [F].
         costs: of beginning at each frame [F].
-        steps: of a tenth of a second as it was danced, or up to a third more or less.
+        steps: number of steps, each 0.1 s of the recording, up to a third more or less.
     """
     total, begins = costs, np.arange(len(costs))
     goes_on = {warp: np.flatnonzero(stretches[warp:] == stretches[:-warp]) for warp in WARPS}
@@ -87,19 +87,19 @@ def _from_start_to_end(stretches: Ints, costs: Floats, steps: int) -> tuple[Floa
             better = on < best[starts + warp]
             best[starts[better] + warp], before[starts[better] + warp] = on[better], begins[starts[better]]
         total, begins = best, before
-        if np.isinf(total.min()):  # no stretch is as long
+        if np.isinf(total.min()):  # no stretch is long enough
             break
     return total, begins
 
 
 def _held_to_ends(recorded: Frames, passage: tuple[int, int], poses: Floats, count: int) -> Floats:
-    """Return orientations of the joints [count, J, 4] along a passage, its offsets at the ends distributed along it.
+    """Return orientations of the joints [count, J, 4] along a passage, warped to meet the given ends.
 
     Args:
         recorded: the recordings.
         passage: its first frame and its last.
         poses: orientations of the joints at the ends [2, J, 4].
-        count: how many, at even times.
+        count: number of even times.
     """
     share = np.linspace(0.0, 1.0, count)[:, None, None]
     frames = np.round(np.linspace(*passage, count)).astype(np.int64)

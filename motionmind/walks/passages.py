@@ -1,12 +1,12 @@
-"""Passages: what a real dancer did on a way like a movement's, and the movement danced like that.
+"""Passages: consecutive recorded frames that resemble a movement, and the transfer of their detail to it.
 
-A mean of walks is near the truth on average and like nothing that was ever danced: averaging removes the middle
-frequencies. Here a movement keeps its mean in the low band, and takes everything above a cut-off from a passage: frames
-of the corpus's recordings that follow one another, all joints from the same frames. The trade between the two is that
-of Blau and Michaeli, "The Perception-Distortion Tradeoff", CVPR 2018.
+A mean of walks has a small error but looks unlike real dancing: averaging removes the middle frequencies. Here a
+movement keeps its mean in the low band and takes everything above a cut-off from a passage: consecutive frames of the
+corpus's recordings, all joints from the same frames. For the trade-off see Blau and Michaeli, "The
+Perception-Distortion Tradeoff", CVPR 2018.
 
 The passage is the path of least cost through the recordings along the mean (Viterbi's algorithm), with a cost for each
-change to another one. It may be faster or slower than it was danced by a third: its time is warped to the movement's.
+change to another stretch. It may be up to a third faster or slower than recorded: its time is warped to the movement's.
 """
 
 from __future__ import annotations
@@ -28,36 +28,36 @@ from motionmind.walks.expectation import Expectation
 from motionmind.walks.frames import Frames, distances_of, frames_near, frames_of
 from motionmind.walks.stops import Stop
 
-STRIDE = 3  # frames of a recording from one node of a passage to the next, 0.1 s, as it was danced
-WARPS = 2, 3, 4  # frames that it may take instead: a passage is danced up to a third faster or slower
-SLOWEST = WARPS[-1] / STRIDE  # seconds of a passage in a second of movement, at most
-WARP_COST = 0.3  # radians^2 for each of these frames more or less
+STRIDE = 3  # recorded frames between nodes of a passage at its own tempo: 0.1 s
+WARPS = 2, 3, 4  # recorded frames allowed between nodes: up to a third faster or slower
+SLOWEST = WARPS[-1] / STRIDE  # recorded seconds per second of movement, at most
+WARP_COST = 0.3  # radians^2 per frame more or less than STRIDE
 CHANGE_COST = 0.72  # radians^2 for a change to another passage: 0.6 radians a joint off, before and after
-ENDS_WEIGHT = 20.0  # how many times as much the distance at a given posture counts as that on the way
-# How many times as much it counts on the way: a mean is quiet, and so are the frames nearest to it. Chosen on cmu-05:
-# at 1 passages are a tenth slower and told from the dancer more often (AUC 0.77, not 0.74), at an error as great.
+ENDS_WEIGHT = 20.0  # weight of the distance at a given posture
+# Weight of the distance at other nodes. It is low because a mean is quiet, and so are the frames nearest to it. Chosen
+# on cmu-05: with 1, passages are a tenth slower and easier to tell from the dancer (AUC 0.77, not 0.74) at equal error.
 WAY_WEIGHT = 0.05
-RATES_S = 0.2  # seconds for which a difference of velocity at an end counts as the distance that it leads to
-BLEND_S = 0.2  # seconds in which the velocities of one passage give way to the next one's
+RATES_S = 0.2  # seconds: converts a difference of velocity at an end to a distance
+BLEND_S = 0.2  # seconds in which the velocities of one passage blend into those of the next
 HALF_HZ = 0.6  # cut-off at a liveliness of a half; chosen on cmu-05: lower ones cost more error for each point of AUC
-HALF_CYCLES = 0.9  # of it in a short movement, at least
+HALF_CYCLES = 0.9  # least number of cut-off periods in a short movement, at a liveliness of a half
 
 
 class Place(NamedTuple):
-    """A place in a corpus: the number of a clip, and a time in its recording, seconds."""
+    """A place in a corpus: the index of a clip, and a time in its recording, seconds."""
 
     clip: int
     seconds: float
 
 
 class Danced(NamedTuple):
-    """A walk's mean danced as a passage.
+    """Displacements that give a mean of walks the detail of a passage.
 
     Attributes:
         passage: the passage.
         times: of the displacements [n + 1], seconds.
-        off: displacements of the joints from the mean, rotation vectors, radians [n + 1, J, 3]. The body faces where
-            the mean does: passages turn elsewhere.
+        off: displacements of the joints from the mean, rotation vectors, radians [n + 1, J, 3]. The heading stays that
+            of the mean, since the passage faces elsewhere.
     """
 
     passage: Passage
@@ -65,23 +65,23 @@ class Danced(NamedTuple):
     off: Floats
 
     def at(self, times: Floats) -> Floats:
-        """Return the displacements at some times [N, J, 3]."""
+        """Return the displacements at times [N]: [N, J, 3]."""
         return natural_spline(self.times, self.off, times)
 
     def move(self, chains: Floats, times: Floats) -> Floats:
-        """Return the mean's chains [N, L, 4] at some times [N] as they are danced."""
+        """Displace the mean's joint chains [N, L, 4], given at times [N]."""
         off, joints = self.at(times), self.off.shape[1]
         return np.concatenate([rot.mul(chains[:, :joints], rot.exp(off)), chains[:, joints:]], axis=1)
 
 
 class Passage(NamedTuple):
-    """A passage along a movement: at each node the frame of the recordings that is danced there.
+    """A passage along a movement: one recorded frame per node.
 
     Attributes:
         times: of the nodes in the movement, evenly spaced [K], seconds.
-        frames: number of the frame at each [K].
+        frames: index of the frame at each node [K].
         recorded: the recordings.
-        starts: nodes at which another stretch begins, the first among them.
+        starts: nodes at which a new stretch begins, the first node included.
     """
 
     times: Floats
@@ -91,7 +91,7 @@ class Passage(NamedTuple):
 
     @property
     def postures(self) -> Ints:
-        """The corpus's last posture before each node's frame [K]."""
+        """The corpus's last posture at or before each node's frame [K]."""
         return self.recorded.postures[self.frames]
 
 
@@ -102,8 +102,8 @@ def find_passage(recorded: Frames, poses: Floats, times: Floats, ends: tuple[Sto
         recorded: the recordings to choose from.
         poses: orientations of the joints at the nodes [K, J, 4].
         times: of the nodes, evenly spaced [K], seconds.
-        ends: what is known of the first and the last posture.
-        given: nodes whose postures are given, the first and the last among them.
+        ends: the first and the last posture, with velocities if given.
+        given: nodes whose postures are given, first and last included.
     """
     weights = np.full(len(poses), WAY_WEIGHT)
     weights[given] = ENDS_WEIGHT
@@ -128,7 +128,7 @@ def find_passage(recorded: Frames, poses: Floats, times: Floats, ends: tuple[Sto
 
 
 def distances(recorded: Frames, poses: Floats, ends: tuple[Stop, Stop]) -> Floats:
-    """Return squared distances of all frames from some postures, at the ends also of their rates [K, F], radians^2.
+    """Return squared distances between postures and all frames, including velocities at the ends [K, F], radians^2.
 
     Args:
         recorded: the frames.
@@ -144,9 +144,9 @@ def distances(recorded: Frames, poses: Floats, ends: tuple[Stop, Stop]) -> Float
 
 
 def velocities(passage: Passage, times: Floats) -> Floats:
-    """Return the angular velocities of a passage's chains from each of some times to the next [n, L, 3], rad/s.
+    """Return the angular velocities of a passage's joint chains from each time to the next [n, L, 3], rad/s.
 
-    Where one passage gives way to another, theirs are blended.
+    Velocities are blended where the passage changes to another stretch.
 
     Args:
         passage: the passage.
@@ -176,7 +176,7 @@ def velocities(passage: Passage, times: Floats) -> Floats:
 
 
 def _chains_at(recorded: Frames, passage: Passage, nodes: tuple[int, int], times: Floats) -> Floats:
-    """Return the chains that one of a passage's parts shows at some times [n, L, 4], beyond its nodes, too.
+    """Return the joint chains of one part of a passage at the given times [n, L, 4], extrapolated beyond its nodes.
 
     Args:
         recorded: the recordings.
@@ -185,7 +185,7 @@ def _chains_at(recorded: Frames, passage: Passage, nodes: tuple[int, int], times
         times: the times [n], seconds.
     """
     at, frames = passage.times[slice(*nodes)], passage.frames[slice(*nodes)].astype(np.float64)
-    frames[1:-1] = 0.25 * frames[:-2] + 0.5 * frames[1:-1] + 0.25 * frames[2:]  # its tempo does not jump
+    frames[1:-1] = 0.25 * frames[:-2] + 0.5 * frames[1:-1] + 0.25 * frames[2:]  # smooths the tempo
     first = last = RATE
     if len(at) > 1:
         first, last = (np.diff(frames) / np.diff(at))[[0, -1]]
@@ -199,21 +199,22 @@ def _chains_at(recorded: Frames, passage: Passage, nodes: tuple[int, int], times
 
 
 def displacements(base: Floats, times: Floats, rates: Floats, given: Ints, cutoff: float) -> Floats:
-    """Return how a movement is displaced to move as a passage does above a cut-off: rotation vectors [n + 1, J, 3].
+    """Displace a movement so that it moves as a passage does above a cut-off: rotation vectors [n + 1, J, 3].
 
     They minimise, over each joint's displacements d that are 0 at the given times,
 
         sum over t of |d'(t) - (rate of the passage - rate of the movement)|^2 + (2 pi cutoff)^2 |d(t)|^2,
 
-    a screened Poisson problem. So velocities are the passage's above the cut-off, and places the movement's below it.
+    a screened Poisson problem. Above the cut-off, velocities follow the passage; below it, orientations follow the
+    movement.
     Source: Bhat, Curless, Cohen and Zitnick, "Fourier analysis of the 2D screened Poisson equation for gradient domain
     problems", ECCV 2008.
 
     Args:
         base: orientations of the joints in the movement [n + 1, J, 4].
-        times: of these, evenly spaced from one given time to the next [n + 1], seconds.
-        rates: angular velocities of the passage from each to the next [n, J, 3], radians a second.
-        given: rows of times at which nothing is displaced, rising, the first and the last among them.
+        times: of the movement, evenly spaced from one given time to the next [n + 1], seconds.
+        rates: angular velocities of the passage from each time to the next [n, J, 3], rad/s.
+        given: indices of times with zero displacement, increasing, first and last included.
         cutoff: in hertz.
     """
     steps = np.diff(times)
@@ -226,7 +227,7 @@ def displacements(base: Floats, times: Floats, rates: Floats, given: Ints, cutof
 
 def _screened(steps: Floats, screen: float) -> Floats:
     """Return d[1], ..., d[n - 1] that minimise sum |d[t + 1] - d[t] - steps[t]|^2 + screen^2 |d[t]|^2, with d[0] = d[n]
-    = 0, for steps [n, ...]: a tridiagonal system, solved from its first row to its last and back (Thomas)."""
+    = 0, for steps [n, ...]: a tridiagonal system, solved by Thomas's algorithm."""
     out = steps[:-1] - steps[1:]
     diagonal, pivots = 2.0 + screen**2, np.empty(len(out))
     for row in range(len(out)):
@@ -248,15 +249,15 @@ def dance(
     liveliness: float,
     place: Place | None = None,
 ) -> Danced | None:
-    """Return how a walk's mean is danced as a passage of the corpus; None where nothing is added.
+    """Add the detail of a passage to a mean of walks; return None where there is nothing to add.
 
     Args:
-        corpus: the movement that was learned from.
-        carriage: how its bodies hold themselves.
+        corpus: the movement learned from.
+        carriage: its posture statistics.
         walk: the mean of walks.
-        stops: what is passed exactly, by the seconds that lead there; increasing, with the first and the last.
+        stops: postures to pass exactly, keyed by time in seconds; increasing, first and last included.
         liveliness: 0 for the mean itself, 1 for the passage, displaced to meet the stops.
-        place: where the passage begins; None for any.
+        place: start of the passage; None for any.
     """
     (first, *_, last), passed = stops.values(), np.array([*stops])
     joints, length = walk.poses.shape[1], float(passed[-1])
@@ -279,14 +280,14 @@ def dance(
 
 
 def _kept_from(off: Floats, times: Floats, rows: Ints) -> Floats:
-    """Return displacements [n + 1, J, 3] that are 0 at some rows, less smooth bumps that end at the next ones.
+    """Make displacements [n + 1, J, 3] zero at the given rows, by subtracting smooth bumps that end at the next ones.
 
-    A displacement that was held at 0 there would turn back at once: the movement would falter where it passes.
+    A displacement simply constrained to 0 there would reverse at once, and the movement would falter.
 
     Args:
         off: displacements, 0 at the first row and the last.
         times: of the displacements [n + 1], seconds.
-        rows: rising, the first and the last among them.
+        rows: increasing, first and last included.
     """
     out = off.copy()
     for before, row, after in zip(rows[:-2], rows[1:-1], rows[2:], strict=True):
@@ -299,7 +300,7 @@ def _kept_from(off: Floats, times: Floats, rows: Ints) -> Floats:
 
 
 def _grid(passed: Floats) -> tuple[Floats, Ints]:
-    """Return times some 1 / RATE apart, evenly from each of the times passed to the next, and the rows of these."""
+    """Return times about 1 / RATE apart, evenly spaced between consecutive stops, and the rows of the stops."""
     parts, rows = [passed[:1]], [0]
     for begin, end in pairwise(passed.tolist()):
         count = max(1, round((end - begin) * RATE))
@@ -309,15 +310,15 @@ def _grid(passed: Floats) -> tuple[Floats, Ints]:
 
 
 def cutoff_of(liveliness: float, seconds: float) -> float:
-    """Return the cut-off, hertz, for a liveliness above 0 and a movement that lasts so long.
+    """Return the cut-off, hertz, for a liveliness above 0 and a movement of this duration.
 
-    It is 0 for 1, and for a half HALF_HZ, or HALF_CYCLES in a movement too short for that: it has no slower ones.
+    It is 0 at a liveliness of 1. At a half it is HALF_HZ or, in a movement too short for that, HALF_CYCLES periods.
     """
     return max(HALF_HZ, HALF_CYCLES / seconds) * (1.0 - liveliness) / liveliness
 
 
 def _starts(frames: Ints, stretches: Ints) -> Ints:
-    """Return the nodes at which a passage begins or changes to another [C]."""
+    """Return the nodes at which a passage begins or changes to another stretch [C]."""
     steps, apart = np.diff(frames), np.diff(stretches[frames]) != 0
     changes = apart | (steps < min(WARPS)) | (steps > max(WARPS))
     return np.concatenate([[0], np.flatnonzero(changes) + 1])

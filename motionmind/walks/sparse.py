@@ -1,16 +1,16 @@
-"""Few of a corpus's moments that stand for all of them in the walks of a part of the body.
+"""Sparse walks: a subset of a corpus's samples that represents all of them in the walks of a body part.
 
-The sums over all walks (`motionmind.walks.marginals`) take time in proportion to the corpus. Of a large corpus they
-are taken over a few thousand moments, which are found by the tree of the part (`motionmind.learned.neighbours`):
+Sums over all walks (`motionmind.walks.marginals`) take time in proportion to the number of samples. In a large corpus
+they run over a few thousand samples, found with the tree of the part (`motionmind.learned.neighbours`):
 
-- those nearest to the first posture, others among the thousand that are near it, and those that follow on them in the
-  clips; as many near the last, and those that lead there;
-- for all others, one moment of each of a few hundred balls into which the tree is cut.
+- the samples nearest to the first posture, a selection of the thousand near it, and their successors in the clips; as
+  many near the last posture, and their predecessors;
+- for the rest, one sample from each of a few hundred balls into which the tree is cut.
 
-What is nearest stands for itself. All else that is chosen in a ball stands for the rest of it, and has its weight. So
-the weights add up to those of the corpus, and walks begin and end wherever they would. A step to a moment that is not
-chosen leads to one that stands for its ball: no walk is lost. A path to follow makes no difference to what is chosen:
-walks of the guide and those of the motion are over the same moments.
+The nearest samples represent only themselves. The other chosen samples of a ball share the weight of the rest of it, so
+the weights add up to those of the corpus, and walks may begin and end anywhere. A step to a sample that was not chosen
+leads to a representative of its ball: no walk is lost. The choice ignores any path to follow, so the guide's walks and
+those of the motion run over the same samples.
 """
 
 from __future__ import annotations
@@ -30,27 +30,27 @@ from motionmind.learned.neighbours import Neighbours
 from motionmind.walks.likelihood import distances_of, show
 from motionmind.walks.steps import follow, steps_at
 
-SPLITS = 384  # balls that are cut in two
-ENDS = 64  # moments near each end, with those that follow on them or lead to them
-NEAREST = 8  # of these, that are the nearest; the others are spread evenly, from near to far,
-AMONG = 1024  # over so many: of a large corpus hundreds are as near as the nearest, and what they do next differs
-ALONG = 12  # steps for which these are followed, at most: 1.2 s of a corpus of five postures a second
-KEPT = 32  # look-ups of parts that are kept: of a body of 16 parts those from stop to stop, twice
-HARDLY = 1e-200  # of the likeliest moment: sums of such chances might be 0
+SPLITS = 384  # times that a ball is cut in two
+ENDS = 64  # samples chosen near each end, and then followed along their clips
+NEAREST = 8  # the nearest of these; the others are evenly spaced ranks among
+AMONG = 1024  # neighbours: in a large corpus hundreds are about as near, and their continuations differ
+ALONG = 12  # steps for which to follow them, at most: 1.2 s in a corpus of five postures per second
+KEPT = 32  # cached look-ups: for a body of 16 parts, two pairs of stops
+HARDLY = 1e-200  # likelihood relative to the likeliest sample: sums of smaller ones might be 0
 
 
 class Chosen(NamedTuple):
-    """Few of the corpus's moments for the walks of one part of the body, and the steps between them.
+    """The samples chosen for the walks of one body part, and the steps between them.
 
     Attributes:
-        moments: their numbers, rising [n]; all of them where they are a slice.
-        weights: of the moments [n].
-        begins: which of them each step leads from [m].
-        ends: which it leads to [m].
-        shares: share of each step among those that leave the same moment [m].
-        clusters: their clusters, numbered from 0 [n].
-        near: which of them are near the first posture and the last, and stand there for themselves [n] each; None for
-            all.
+        moments: indices of the samples, increasing [n]; a slice means all.
+        weights: of the samples [n].
+        begins: position in `moments` that each step leads from [m].
+        ends: position that it leads to [m].
+        shares: share of each step among those that leave the same sample [m].
+        clusters: cluster of each sample, numbered from 0 [n].
+        near: which of them are nearest to the first posture and to the last, and represent only themselves, [n] each;
+            None for all.
     """
 
     moments: Ints | slice
@@ -63,19 +63,19 @@ class Chosen(NamedTuple):
 
 
 def all_of(carriage: Carriage, number: int) -> Chosen:
-    """Return all of the corpus's moments, for the walks of the part of that number."""
+    """Return all of the corpus's samples, for the walks of a part given by its index."""
     clusters = np.ascontiguousarray(carriage.clusters[:, number])
     steps = carriage.begins, carriage.ends, carriage.shares
     return Chosen(slice(None), carriage.weights, *steps, clusters, None)
 
 
 class Found(NamedTuple):
-    """The moments of one part's walks between two postures, and what they show of it.
+    """The samples of one part's walks between two postures, and the part's orientations in them.
 
     Attributes:
-        chosen: the moments.
-        shown: what these show of the part [m, n, 4].
-        off: their squared distances there from both postures [2, n], radians^2.
+        chosen: the samples.
+        shown: orientations of the part's joints in them [m, n, 4].
+        off: squared distances of the part from both postures [2, n], radians^2.
     """
 
     chosen: Chosen
@@ -84,15 +84,15 @@ class Found(NamedTuple):
 
 
 def _chosen(carriage: Carriage, number: int, near: Ints, nearest: Ints, balls: _Balls, steps: int) -> Chosen:
-    """Return the moments chosen for the walks of a part.
+    """Return the samples chosen for the walks of a part.
 
     Args:
-        carriage: all moments.
-        number: of the part.
-        near: moments near both ends, which are followed [2, n].
-        nearest: those of them that stand for themselves [2, m].
+        carriage: all samples.
+        number: index of the part.
+        near: samples near both ends, to follow along their clips [2, n].
+        nearest: those of them that represent only themselves [2, m].
         balls: of the part's tree.
-        steps: for which the moments are followed.
+        steps: number of steps to follow them.
     """
     chain = carriage.begins, carriage.ends, len(carriage.weights) - len(carriage.turn)
     ways = [follow(near[k], k == 0, steps, *chain) for k in range(2)]
@@ -100,7 +100,7 @@ def _chosen(carriage: Carriage, number: int, near: Ints, nearest: Ints, balls: _
     weights, stands = _shares(moments, nearest.ravel(), balls, carriage.weights)
     begins, leads, which = steps_at(moments, True, *chain)
     goals = np.minimum(np.searchsorted(moments, leads), len(moments) - 1)
-    others = np.flatnonzero(moments[goals] != leads)  # steps to what is not chosen lead to what stands for its ball
+    others = np.flatnonzero(moments[goals] != leads)  # steps to samples not chosen lead to their ball's representative
     goals[others] = stands[_balls_of(leads[others], balls)]
     clusters = np.unique(carriage.clusters[moments, number], return_inverse=True)[1].astype(np.int32)
     both = _among(moments, nearest[0]), _among(moments, nearest[1])
@@ -108,14 +108,14 @@ def _chosen(carriage: Carriage, number: int, near: Ints, nearest: Ints, balls: _
 
 
 def steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
-    """Return the steps of walks, as `posterior_marginals` takes them, of which some lead on from where walks begin.
+    """Return the steps of walks for `posterior_marginals`; at least some leave the samples where walks begin.
 
-    Of many performances of a dance, all moments near its last posture end clips. Then walks stay where a clip ends for
-    a step, after which they may go over to another.
+    In many performances of one dance, every sample near its last posture may end its clip. Then a walk stays at the
+    end of a clip for one step, after which it may jump to another.
 
     Args:
-        chosen: the moments, and the corpus's steps between them.
-        near: how likely walks begin in each moment [n].
+        chosen: the samples, and the corpus's steps between them.
+        near: likelihood that a walk begins in each sample [n].
     """
     if near[chosen.begins].max(initial=0.0) > HARDLY:
         return chosen.begins, chosen.ends, chosen.shares
@@ -127,7 +127,7 @@ def steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
 
 
 def merged(some: Ints, others: Ints) -> Ints:
-    """Return numbers that are among either of two, each of them rising."""
+    """Return the sorted union of two increasing arrays of indices."""
     return np.union1d(some, others)
 
 
@@ -137,7 +137,7 @@ _Found = TypeVar("_Found")
 
 
 class _Kept(Generic[_Owner, _Asked, _Found]):
-    """A function whose last results for each first argument are kept for as long as that is in use, and no longer."""
+    """A function that caches its last results per first argument, for that argument's lifetime."""
 
     def __init__(self, function: Callable[Concatenate[_Owner, _Asked], _Found]) -> None:
         self._function = function
@@ -149,7 +149,7 @@ class _Kept(Generic[_Owner, _Asked, _Found]):
         return self._kept[owner](*asked, **named)
 
     def _keeping(self, owner: ref[_Owner]) -> Callable[_Asked, _Found]:
-        """Return the function for an owner that what is kept does not keep in use."""
+        """Return the cached function for an owner, without keeping the owner alive."""
 
         def look(*asked: _Asked.args, **named: _Asked.kwargs) -> _Found:
             here = owner()
@@ -164,20 +164,20 @@ class _Kept(Generic[_Owner, _Asked, _Found]):
 
 
 def choose(carriage: Carriage, number: int, ends: Floats, steps: int) -> Found:
-    """Choose moments for the walks of one part of the body, and look at them.
+    """Choose samples for the walks of one body part, and measure their distances from the ends.
 
     Args:
-        carriage: the corpus's moments, with trees.
-        number: of the part.
+        carriage: the corpus's samples, with trees.
+        number: index of the part.
         ends: orientations of the joints in both given postures [2, J, 4].
-        steps: of a walk.
+        steps: number of steps in a walk.
     """
     return _found(carriage, number, ends.tobytes(), min(steps, ALONG))
 
 
-@_Kept  # of all parts; the guide of a search and its motion ask for the same
+@_Kept  # for all parts: the guide of a search and its motion need the same
 def _found(carriage: Carriage, number: int, ends: bytes, steps: int) -> Found:
-    """Return what `choose` does; the moments near the ends are followed for so many steps."""
+    """Implement `choose`, with hashable arguments; follow the samples near the ends for `steps` steps."""
     trees = carriage.trees
     assert trees is not None
     postures, part = np.frombuffer(ends).reshape(2, -1, 4), trees.parts[number]
@@ -192,13 +192,13 @@ def _found(carriage: Carriage, number: int, ends: bytes, steps: int) -> Found:
 
 
 class _Balls(NamedTuple):
-    """The balls that a part's tree is cut into, in its order.
+    """The balls into which a part's tree is cut, in the tree's order.
 
     Attributes:
-        starts: where they begin in that order [B].
-        weights: sums of their moments' weights [B].
-        middles: a moment of each [B].
-        ranks: where each of the corpus's moments is in that order [N].
+        starts: rank of each ball's first sample [B].
+        weights: total weight of each ball's samples [B].
+        middles: one sample of each ball [B].
+        ranks: rank of each of the corpus's samples [N].
     """
 
     starts: Int32s
@@ -209,7 +209,7 @@ class _Balls(NamedTuple):
 
 @_Kept
 def _balls(trees: Neighbours, number: int) -> _Balls:
-    """Return the balls that a part's tree is cut into."""
+    """Return the balls into which a part's tree is cut."""
     nodes = _cut(trees.bounds, trees.radii[number], trees.weights[number])
     starts, order = np.ascontiguousarray(trees.bounds[nodes, 0]), trees.order[number]
     middles = order[trees.bounds[nodes].sum(axis=1) // 2].astype(np.int64)
@@ -217,24 +217,24 @@ def _balls(trees: Neighbours, number: int) -> _Balls:
 
 
 def _among(moments: Ints, some: Ints) -> Bools:
-    """Return which of moments, that rise, are among some of them [n]."""
+    """Return a mask over increasing `moments` of those in `some`, a subset [n]."""
     out = np.zeros(len(moments), np.bool_)
     out[np.searchsorted(moments, some)] = True
     return out
 
 
 def _shares(moments: Ints, singles: Ints, balls: _Balls, counts: Floats) -> tuple[Floats, Ints]:
-    """Return the weights of chosen moments [n], and the first of them that stands for each ball [B].
+    """Return the weights of the chosen samples [n], and the position of the first that represents each ball [B].
 
     Args:
-        moments: their numbers, rising [n].
-        singles: those of them that stand for themselves.
+        moments: indices of the chosen samples, increasing [n].
+        singles: those of them that represent only themselves.
         balls: of the part's tree.
-        counts: weights of all moments [N].
+        counts: weights of all samples [N].
     """
     ball, own, alone = _balls_of(moments, balls), counts[moments], _among(moments, singles)
     shared = np.bincount(ball[~alone], own[~alone], len(balls.weights))
-    # Where none but what is near was chosen of a ball, that stands for what is left of it.
+    # If only near samples were chosen from a ball, they represent the rest of it, too.
     alone &= shared[ball] > 0.0
     shared, rest = np.bincount(ball[~alone], own[~alone], len(balls.weights)), balls.weights.copy()
     np.subtract.at(rest, ball[alone], own[alone])
@@ -246,12 +246,12 @@ def _shares(moments: Ints, singles: Ints, balls: _Balls, counts: Floats) -> tupl
 
 
 def _balls_of(moments: Ints, balls: _Balls) -> Ints:
-    """Return the ball that each moment is in [n]."""
+    """Return the ball of each sample [n]."""
     return np.searchsorted(balls.starts, balls.ranks[moments], side="right") - 1
 
 
 def _cut(bounds: Int32s, radii: Floats, weights: Floats) -> Ints:
-    """Cut a tree into balls, of which none is much wider or heavier: return their nodes in its order [n].
+    """Cut a tree into balls of similar width and weight; return their nodes in the tree's order [n].
 
     Args:
         bounds, radii, weights: of the nodes.

@@ -1,8 +1,8 @@
-"""Steps between a corpus's moments, found from some of them without a look at the others.
+"""Steps between a corpus's samples, looked up from given samples without a scan of the others.
 
-A corpus with N postures and M moves has N + M moments, the postures and then the middles of its moves, and 2 M steps:
-those from postures to middles, then those from middles to postures. Moves that lead on in their clips come first, and
-then those that lead back; in either the postures that they leave, and those that they lead to, rise.
+A corpus with N postures and M moves has N + M samples, the postures and then the middles of the moves, and 2 M steps:
+those from postures to middles, then those from middles to postures. Moves forward in their clips come first, then
+moves backward; within each group, the postures at both ends of the moves increase.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from motionmind._typing import Ints
 
 
 def follow(moments: Ints, ahead: bool, steps: int, begins: Ints, ends: Ints, postures: int) -> Ints:
-    """Return moments to which so many steps, or fewer, lead from others, or from which they lead there if not `ahead`;
-    some of them repeatedly [n]."""
+    """Return the samples [n] that at most `steps` steps reach from `moments`, or, if not `ahead`, from which they reach
+    `moments`; samples may repeat."""
     out, ways = [moments[:0]], _ways(ahead, begins, ends)
     for _ in range(steps):
         numbers = _steps(moments, ahead, begins, ends, postures, ways)
@@ -28,8 +28,8 @@ def follow(moments: Ints, ahead: bool, steps: int, begins: Ints, ends: Ints, pos
 
 
 def steps_at(moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int) -> tuple[Ints, Ints, Ints]:
-    """Return the steps that leave moments, or that lead to them if not `ahead`: at which of the moments [m], the moment
-    at each one's other end [m], and its number [m]."""
+    """Return the steps that leave `moments`, or lead to them if not `ahead`: each step's position in `moments` [m], the
+    sample at its other end [m], and its index [m]."""
     steps = _steps(moments, ahead, begins, ends, postures, _ways(ahead, begins, ends))
     at, numbers = np.flatnonzero(steps >= 0) // 2, steps[steps >= 0]
     return at, (ends if ahead else begins)[numbers], numbers
@@ -38,7 +38,7 @@ def steps_at(moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int
 def _steps(
     moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int, ways: Sequence[tuple[int, int]]
 ) -> Ints:
-    """Return the steps at each moment [n, 2], at most one forward in its clip and one backward; -1 for none."""
+    """Return the steps at each sample [n, 2]: one forward in its clip and one backward; -1 for none."""
     leaves, moves = begins if ahead else ends, len(begins) // 2
     out = np.full((len(moments), 2), -1)
     out[:, 0] = np.where(moments >= postures, moments - postures + ahead * moves, -1)
@@ -51,8 +51,8 @@ def _steps(
 
 
 def _ways(ahead: bool, begins: Ints, ends: Ints) -> list[tuple[int, int]]:
-    """Return where the steps from postures, or to them if not `ahead`, that are forward in their clips begin and end,
-    and those that are backward, if there are any."""
+    """Return the index ranges of the forward and the backward steps that leave postures, or lead to them if not
+    `ahead`; empty ranges are left out."""
     moves = len(begins) // 2
     first = 0 if ahead else moves
     turns = bisect_left(range(moves), True, key=lambda move: ends[moves + move] <= begins[move])

@@ -1,4 +1,4 @@
-"""Stops: the postures that a movement passes exactly, with the velocities there if they are known."""
+"""Stops: postures that a movement passes exactly, with their velocities if known."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from motionmind.learned.carriage import Carriage
 from motionmind.walks.steps import steps_at
 
 _ALL = slice(None)
-_SOON = 1e-3  # seconds over which a velocity of the body is taken apart into its chains'
+_SOON = 1e-3  # finite-difference step that splits the body's velocity into those of its joint chains, seconds
 
 
 class Rates(NamedTuple):
-    """Velocities of a body in one or more moments.
+    """Velocities of a body in one or more samples.
 
     Attributes:
-        joints: angular velocities of the joints [..., J, 3], radians a second, in their own frames; of the root without
-            the body's turning, where that is a chain of its own.
-        turn: the body's turning about the vertical [...], radians a second; 0 where that is no chain of its own.
-        travel: velocity of the root [..., 3], metres a second, in the body's own heading.
+        joints: angular velocities of the joints [..., J, 3], rad/s, in their own frames; the root's excludes the body's
+            turn where the facing is a chain of its own.
+        turn: turning rate of the body about the vertical [...], rad/s; 0 where the facing is no chain of its own.
+        travel: velocity of the root [..., 3], m/s, relative to the body's heading.
     """
 
     joints: Floats
@@ -35,7 +35,7 @@ class Rates(NamedTuple):
 
     @classmethod
     def of_chains(cls, chains: Floats, travel: Floats, joints: int) -> Rates:
-        """Return rates from those of all chains [..., L, 3], of which the first J are joints, and the travel."""
+        """Build rates from the angular velocities of all chains [..., L, 3], the J joints first, and the travel."""
         turn = chains[..., -1, 1] if chains.shape[-2] > joints else np.zeros(chains.shape[:-2])
         return cls(np.ascontiguousarray(chains[..., :joints, :]), turn, travel)
 
@@ -45,8 +45,8 @@ class Stop(NamedTuple):
 
     Attributes:
         chains: orientations of the chains [L, 4].
-        place: of the root [3], in heights of the body.
-        rates: its velocity; None if unknown.
+        place: position of the root [3], in body heights.
+        rates: velocities; None if unknown.
     """
 
     chains: Floats
@@ -55,7 +55,7 @@ class Stop(NamedTuple):
 
 
 def stop_at(corpus: Corpus, posture: Posture, velocity: Velocity | None = None) -> Stop:
-    """Return a stop at a posture of the corpus's skeleton that is passed with the given velocity."""
+    """Return a stop at a posture of the corpus's skeleton, with a velocity if given."""
     chains, place = corpus.to_chains(posture.rotations), posture.root / (posture.skeleton.height or 1.0)
     if velocity is None:
         return Stop(chains, place)
@@ -66,12 +66,12 @@ def stop_at(corpus: Corpus, posture: Posture, velocity: Velocity | None = None) 
 
 
 def moments_rates(corpus: Corpus, carriage: Carriage, moments: Ints | slice = _ALL) -> Rates:
-    """Return the velocities in moments of the corpus: means of the steps that lead there and on, in `Rates`.
+    """Return the velocities in samples of the corpus: means over the steps that arrive and leave.
 
     Args:
-        corpus: the movement that was learned from.
-        carriage: its moments.
-        moments: numbers of moments [n]; all of them where they are a slice.
+        corpus: the movement learned from.
+        carriage: posture statistics of its samples.
+        moments: indices of samples [n]; a slice means all.
     """
     if isinstance(moments, slice):
         return _all_rates(corpus, carriage)
@@ -82,7 +82,7 @@ def moments_rates(corpus: Corpus, carriage: Carriage, moments: Ints | slice = _A
 
 @lru_cache(maxsize=1)
 def _all_rates(corpus: Corpus, carriage: Carriage) -> Rates:
-    """Return the velocities in all of the corpus's moments."""
+    """Return the velocities in all of the corpus's samples."""
     steps = np.arange(len(carriage.begins))
     return _mean_rates(
         corpus, carriage, len(carriage.weights), [(at, steps) for at in (carriage.begins, carriage.ends)]
@@ -90,7 +90,7 @@ def _all_rates(corpus: Corpus, carriage: Carriage) -> Rates:
 
 
 def _mean_rates(corpus: Corpus, carriage: Carriage, count: int, steps: Sequence[tuple[Ints, Ints]]) -> Rates:
-    """Return the velocities in so many moments, means of those of steps: at which moment each is, and its number."""
+    """Return mean velocities in `count` samples; `steps` pairs the sample of each step with the step's index."""
     moves, means = len(carriage.turn), []
     counts = np.bincount(np.concatenate([at for at, _ in steps]), minlength=count)
     of_steps = [_velocities(corpus, carriage, numbers, moves) for _, numbers in steps]
@@ -103,7 +103,7 @@ def _mean_rates(corpus: Corpus, carriage: Carriage, count: int, steps: Sequence[
 
 
 def _velocities(corpus: Corpus, carriage: Carriage, steps: Ints, moves: int) -> tuple[Floats, Floats]:
-    """Return the velocities of the chains [m, L, 3] and of the root [m, 3] in some of the steps."""
+    """Return the velocities of the joint chains [m, L, 3] and of the root [m, 3] in the given steps."""
     seconds, shown = 0.5 * corpus.moves.take(steps % moves).seconds[:, None], carriage.orientations
     turned = rot.log(rot.inv_mul(shown[carriage.begins[steps]], shown[carriage.ends[steps]]))
     return turned / seconds[..., None], carriage.travel[steps % moves] / seconds
