@@ -1,4 +1,4 @@
-"""Carriage: how a corpus's bodies hold themselves, travel and stand, moment by moment."""
+"""Carriage: posture, travel and support in each sample of a corpus."""
 
 from __future__ import annotations
 
@@ -24,41 +24,39 @@ from motionmind.learned.percentiles import Percentile
 from motionmind.learned.sampled import BLOCK
 from motionmind.learned.trust import PRIOR, Trust
 
-SLIDES = 0.3  # metres a second at which a limb on the floor stands half as firmly as one at rest
-LEAVES = 0.06  # metres that a body's lowest point is off the floor in the air, at least; as long as it moves
-FIRM = 0.5  # how firmly a limb stands that bears
-RARE = 0.01  # share of postures in which limbs may be deeper in each other, or the weight farther out, than usual
+SLIDES = 0.3  # m/s: speed on the floor that halves a limb's firmness
+LEAVES = 0.06  # least clearance of a body in the air, metres; its lowest point must also move
+FIRM = 0.5  # least firmness of a supporting limb
+RARE = 0.01  # share of postures that may exceed the learned limb penetration or overhang
 USUAL = 0.08  # metres of overhang, for a corpus that shows none
-MOST = 0.15  # metres of overhang at most: dancers who lean farther are moving
+MOST = 0.15  # greatest overhang, metres: dancers who lean farther are moving
 
 
 @dataclass(frozen=True, eq=False)
 class Carriage:
-    """The carriage of a corpus's bodies: their pose, travel and stance in its postures and midway between them.
+    """Posture statistics of a corpus: orientations, travel and support in its N samples.
 
-    There are N moments: the postures, then the middle of each of the M moves. A step is half a move.
+    The samples are the postures, then the middle of each of the M moves. A step is half a move.
 
     Attributes:
-        orientations: orientations of the chains [N, L, 4].
-        weights: weight of each moment [N].
-        begins: moment that each step leads from [2 M].
-        ends: moment that it leads to [2 M].
-        shares: share of each step among those that leave the same moment [2 M].
-        clusters: number of the cluster that each part of the body is in at each moment [N, P] (see
-            `motionmind.learned.clusters`).
+        orientations: orientations of the joint chains [N, L, 4].
+        weights: weight of each sample [N].
+        begins: sample that each step leads from [2 M].
+        ends: sample that it leads to [2 M].
+        shares: share of each step among those that leave the same sample [2 M].
+        clusters: cluster of each body part in each sample [N, P] (see `motionmind.learned.clusters`).
         turn: turn about the vertical in each half of each move [M], radians.
-        travel: displacement of the root in the same, metres, in the body's heading midway [M, 3].
+        travel: displacement of the root in each half, metres, relative to the body's heading midway [M, 3].
         clearance: height of the lowest point above the clip's floor (`floor_height`) [N], metres, at least 0.
-        stands: how firmly each limb, and last the trunk, stands [N, limbs + 1]: 1 where its lowest point does not move
-            level, near 0 where it moves fast. A foot may be low and slide, as dancers' feet do.
-        aloft: whether the body is in the air at each moment [N], 0 or 1: its lowest point is off the floor, and moves.
-        overhang: how far the centre of mass is beyond its support while one limb bears it, but for RARE postures [1],
-            metres.
-        loose: whether each joint breaks its limits in the corpus [J].
-        touches: how deep limbs are in each other at most, but for RARE postures, by the pairs of `Capsules.pairs` [P],
-            metres.
-        trees: by which few of the moments are looked at; None where there are few, or an earlier version learned.
-        trust: which share of the departures of walks from the minimal movement is kept.
+        stands: firmness of each limb, then of the trunk [N, limbs + 1]: 1 if its lowest point does not move
+            horizontally, near 0 if it moves fast. A low foot may slide, as dancers' feet do.
+        aloft: 1 if the body is in the air [N], else 0: its lowest point is off the floor, and moves.
+        overhang: greatest distance of the centre of mass beyond a single supporting limb, except in the RARE most
+            extreme postures [1], metres.
+        loose: whether each joint exceeds its limits in the corpus [J].
+        touches: greatest penetration depth for each of `Capsules.pairs`, except in RARE postures [P], metres.
+        trees: neighbour trees over the samples; None if there are few samples, or in corpora of an earlier version.
+        trust: share of the walks' departure from the minimal movement to keep.
     """
 
     orientations: Floats
@@ -82,13 +80,13 @@ class Carriage:
 def learn_carriage(
     corpus: Corpus, workshop: Workshop | None = None, kept: Kept | None = None, before: Carriage | None = None
 ) -> Carriage:
-    """Learn how the bodies of a corpus hold themselves, travel and stand.
+    """Learn the posture statistics of a corpus.
 
     Args:
         corpus: the movement.
-        workshop: threads, and room for large arrays; None for this thread and memory.
-        kept: the clips that an earlier corpus has, too; None for no such corpus.
-        before: the carriage of that corpus, whose moments in these clips are taken as they are.
+        workshop: threads, and room for large arrays; None for the current thread and memory.
+        kept: the clips shared with an earlier corpus; None for no such corpus.
+        before: the carriage of that corpus; its samples in these clips are reused.
     """
     workshop = workshop or Workshop()
     moments = _join_moments(kept, before, workshop) if kept and before else _measure_moments(corpus, workshop)
@@ -116,11 +114,11 @@ def learn_carriage(
     )
 
 
-_OF_MOVES = "turn", "travel"  # what is known of moves alone, and not of postures
+_OF_MOVES = "turn", "travel"  # fields with a row per move, and none per posture
 
 
 class _Moments(NamedTuple):
-    """Arrays of Carriage that say of each clip what it shows by itself."""
+    """Arrays of Carriage that depend on each clip alone."""
 
     orientations: Floats
     clearance: Floats
@@ -131,7 +129,7 @@ class _Moments(NamedTuple):
 
 
 def _measure_moments(corpus: Corpus, workshop: Workshop) -> _Moments:
-    """Measure the moments of all clips."""
+    """Measure the samples of all clips."""
 
     def low_in(here: slice) -> Floats:
         return lowest_height(corpus.skeleton, corpus.rotations[here], corpus.root[here])
@@ -155,7 +153,7 @@ def _measure_moments(corpus: Corpus, workshop: Workshop) -> _Moments:
 
 
 def _join_moments(kept: Kept, before: Carriage, workshop: Workshop) -> _Moments:
-    """Join the moments of clips that are kept with those of new clips, which are measured."""
+    """Join the samples of kept clips with those of new clips, which are measured."""
     new = None if kept.new is None else _measure_moments(kept.new, workshop)
     moves = len(before.turn)
 
@@ -173,12 +171,12 @@ def _join_moments(kept: Kept, before: Carriage, workshop: Workshop) -> _Moments:
 
 
 def _blocks(count: int) -> Iterator[slice]:
-    """Yield slices of BLOCK from 0 to a count: what is measured of all postures at once would fill the memory."""
+    """Yield slices of BLOCK rows from 0 to a count: measuring all postures at once would exhaust memory."""
     return (slice(start, start + BLOCK) for start in range(0, count, BLOCK))
 
 
 def _orientations(corpus: Corpus, workshop: Workshop) -> Floats:
-    """Return the orientations of the chains in the postures, and midway in the moves [N + M, L, 4]."""
+    """Return orientations of the joint chains in the N postures and midway in the M moves [N + M, L, 4]."""
     count, begins, ends = len(corpus), corpus.moves.begins, corpus.moves.ends
     out = workshop.empty((count + len(begins), len(corpus.chains), 4))
 
@@ -194,7 +192,7 @@ def _orientations(corpus: Corpus, workshop: Workshop) -> Floats:
 
 
 def _touching(corpus: Corpus, workshop: Workshop) -> Floats:
-    """Return how deep pairs of limbs are in each other [P], metres, in all but RARE postures."""
+    """Return the greatest penetration depth of each pair of limbs [P], metres, except in RARE postures."""
     if not len(capsules_of(corpus.skeleton).pairs()):
         return np.zeros(0)
 
@@ -208,10 +206,10 @@ def _touching(corpus: Corpus, workshop: Workshop) -> Floats:
 
 
 def _standing(corpus: Corpus, workshop: Workshop) -> Floats:
-    """Return how firmly limbs and trunk stand [N, limbs + 1], as in Carriage.
+    """Return the firmness of limbs and trunk [N, limbs + 1], as in Carriage.
 
-    In a move 1 / (1 + (v / SLIDES)^2), with v the level speed of the limb's lowest point; in a posture the mean of the
-    moves that begin and end there.
+    In a move it is 1 / (1 + (v / SLIDES)^2), with v the horizontal speed of the limb's lowest point; in a posture, the
+    mean over the moves that begin or end there.
     """
     begins, ends = corpus.moves.begins, corpus.moves.ends
     limb = limb_of_points(corpus.skeleton)
@@ -238,19 +236,19 @@ def _standing(corpus: Corpus, workshop: Workshop) -> Floats:
 
 
 def _lowest_moved(before: Floats, after: Floats) -> Floats:
-    """Return how far the lowest of some points moves [n, 3], from where they are `before` to `after` [n, P, 3]."""
+    """Return the displacement [n, 3] of the lowest of P points, given `before` and `after` [n, P, 3]."""
     lowest, rows = np.argmin(before[..., 1] + after[..., 1], axis=1), np.arange(len(before))
     return np.asarray(after[rows, lowest] - before[rows, lowest])
 
 
 def _aloft(corpus: Corpus, clearance: Floats, workshop: Workshop) -> Floats:
-    """Return whether the body is in the air in each moment [N], 0 or 1, as in Carriage.
+    """Return whether the body is in the air in each sample [N], 0 or 1, as in Carriage.
 
-    A body on half-pointe, or whose recording's floor is a little off, is as high; but its lowest point hardly moves.
+    A body on half-pointe, or above a slightly misplaced floor, may be as high, but its lowest point hardly moves.
 
     Args:
         corpus: the movement.
-        clearance: height of the lowest point above the floor in the moments [N], metres.
+        clearance: height of the lowest point above the floor in the samples [N], metres.
         workshop: threads.
     """
     begins, ends, size = corpus.moves.begins, corpus.moves.ends, size_of(corpus.skeleton)
@@ -271,12 +269,12 @@ def _aloft(corpus: Corpus, clearance: Floats, workshop: Workshop) -> Floats:
 
 
 def _overhang(corpus: Corpus, stands: Floats, aloft: Floats, workshop: Workshop) -> Floats:
-    """Return how far beyond its support the corpus's bodies have their mass while one limb bears it, as in Carriage.
+    """Return the overhang of the corpus's bodies, as in Carriage.
 
     Args:
         corpus: the movement.
-        stands: how firmly each limb, and last the trunk, stands in its postures [N, limbs + 1].
-        aloft: whether the body is in the air there [N].
+        stands: firmness of each limb, then of the trunk, in its postures [N, limbs + 1].
+        aloft: whether the body is in the air in each posture [N].
         workshop: threads.
     """
     size = size_of(corpus.skeleton)
@@ -288,15 +286,13 @@ def _overhang(corpus: Corpus, stands: Floats, aloft: Floats, workshop: Workshop)
 
 
 def _overhangs(corpus: Corpus, here: slice, stands: Floats, aloft: Floats) -> Floats:
-    """Return how far beyond its support the body has its mass in those of some postures in which one limb bears it [n].
-
-    None of a body whose masses are not known.
+    """Return the overhang in each of T postures with a single supporting limb [n]; empty if the masses are unknown.
 
     Args:
         corpus: the movement.
-        here: which postures.
-        stands: how firmly each limb, and last the trunk, stands in them [T, limbs + 1].
-        aloft: whether the body is in the air there [T].
+        here: the T postures.
+        stands: firmness of each limb, then of the trunk, in them [T, limbs + 1].
+        aloft: whether the body is in the air in each [T].
     """
     body, rotations, root = corpus.skeleton, corpus.rotations[here], corpus.root[here]
     mass, near = centre_of_mass(body, rotations, root), NEAR * size_of(body)

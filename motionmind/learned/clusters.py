@@ -1,11 +1,10 @@
-"""Clusters of postures, part by part of the body: in time that grows with their number, and not with its square.
+"""Clusters of postures for each body part, in time proportional to the number of postures, not to its square.
 
-`squared_distance` of two postures is the squared distance between two points: their rotation matrices [m, 3, 3], over
-the square root of 2. Seen along a few directions it is never more; so a k-d tree of what is seen there names the
-founders of clusters that may be near (Bentley, "Multidimensional binary search trees used for associative searching",
-CACM 18:509, 1975), and these are compared, until no other can be nearer. Where postures differ in all their joints
-there are ever more that may be; no more than LOOKED_AT are compared, and the nearest of all may then be
-missed. In corpora of some thousand postures none is.
+`squared_distance` of two postures is the squared Euclidean distance between their rotation matrices [m, 3, 3], each
+divided by the square root of 2. A projection onto few directions never increases it. So a k-d tree of the projections
+(Bentley, "Multidimensional binary search trees used for associative searching", CACM 18:509, 1975) lists candidate
+founders of clusters, which are compared until no other can be nearer. Where postures differ in all joints, candidates
+are many: at most LOOKED_AT are compared, and the nearest may be missed. In corpora of some thousand postures none is.
 """
 
 from __future__ import annotations
@@ -23,27 +22,27 @@ from motionmind.geometry.distances import squared_distance, squared_turn
 from motionmind.jit import jit
 from motionmind.learned.neighbours import node_bounds
 
-ALIKE = 0.2  # radians a joint (root mean square) within which postures of a part are in one cluster
-DIRECTIONS = 6  # in which postures are seen by a tree; it finds little in more
-LOOKED_AT = 32  # founders that are compared with a posture at most, those that look nearest
-BLOCK = 2048  # postures that are compared at a time
-SHOWN = 4096  # postures that show the directions
-SLACK = 1e-6  # of rounding, in squared distances seen along few directions
-# Squared distances, radians^2, that differ by less are a tie. Rounding makes differences of 1e-15; of the 13,932
-# memberships in recordings of one dancer (cmu-05), two dozen went by these from one processor to another.
+ALIKE = 0.2  # radius of a cluster, RMS radians per joint
+DIRECTIONS = 6  # dimensions of the tree; more gain little
+LOOKED_AT = 32  # most founders compared with a posture, nearest projections first
+BLOCK = 2048  # postures compared at a time
+SHOWN = 4096  # postures from which the directions are computed
+SLACK = 1e-6  # allowance for rounding in squared distances of projections
+# Squared distances, radians^2, that differ by less are a tie. Rounding makes differences of 1e-15, by which two dozen of
+# the 13,932 memberships in recordings of one dancer (cmu-05) differed between two processors.
 TIE = 1e-12
 
 
 def clusters_of(skeleton: Skeleton, orientations: Floats, workshop: Workshop | None = None) -> Int32s:
-    """Cluster the postures of each part of a body: [N, P], with parts as in `parts_of` and clusters numbered from 0.
+    """Cluster the postures of each body part: [N, P], with parts as in `parts_of` and clusters numbered from 0.
 
-    In order, a posture founds a cluster unless a founder lies within ALIKE; then each joins its nearest founder, the
-    first of those that are equally near (TIE).
+    In order, a posture founds a cluster unless a founder lies within ALIKE. Then each posture joins its nearest
+    founder, or the first of several equally near (TIE).
 
     Args:
         skeleton: the body.
-        orientations: orientations of the chains [N, L, 4].
-        workshop: threads, for which each part is a job, and room for large arrays; None for this thread and memory.
+        orientations: orientations of the joint chains [N, L, 4].
+        workshop: threads, one job per part, and room for large arrays; None for the current thread and memory.
     """
     workshop, parts = workshop or Workshop(), parts_of(skeleton)
     out = workshop.empty((len(orientations), len(parts)), np.int32)
@@ -80,14 +79,14 @@ def clusters(orientations: Floats, within: float, workshop: Workshop | None = No
 
 
 class _Tree(NamedTuple):
-    """A k-d tree of K founders, by what is seen of them.
+    """A k-d tree of the projections of K founders.
 
     Attributes:
-        founders: postures by number, in the order in which they founded clusters [K].
-        order: their places in it, leaf after leaf [K].
-        points: what is seen of them, in the order of the leaves [K, d].
-        bounds: first place in that order of each node, and the one after its last (`neighbours.node_bounds`) [D, 2].
-        boxes: least and greatest of what is seen in each node [D, 2, d].
+        founders: indices of the founding postures, in the order in which they founded clusters [K].
+        order: positions in `founders`, leaf after leaf [K].
+        points: their projections, in the order of the leaves [K, d].
+        bounds: range of each node in that order, end excluded (`neighbours.node_bounds`) [D, 2].
+        boxes: least and greatest projections in each node [D, 2, d].
     """
 
     founders: Ints
@@ -98,8 +97,8 @@ class _Tree(NamedTuple):
 
 
 def _plant(forest: list[_Tree], founders: Ints, seen: Floats) -> None:
-    """Add founders [n], postures by number, to a forest: they join the trees before them that are no larger, so there
-    are few trees, and each founder is in few of those that are made."""
+    """Add founders [n], indices of postures, to a forest: they merge with the last trees that are no larger, which
+    keeps trees few and rebuilds rare."""
     if not len(founders):
         return
     while forest and len(forest[-1].founders) <= len(founders):
@@ -108,7 +107,7 @@ def _plant(forest: list[_Tree], founders: Ints, seen: Floats) -> None:
 
 
 def _grow(founders: Ints, seen: Floats) -> _Tree:
-    """Return the tree of founders [K], postures by number, of all of which [N, d] is seen."""
+    """Build the tree of founders [K], indices of postures, given the projections of all postures [N, d]."""
     bounds, points = node_bounds(len(founders)), seen[founders]
     order, boxes = np.arange(len(founders)), np.empty((len(bounds), 2, points.shape[1]))
     for node, (start, stop) in enumerate(bounds):
@@ -121,8 +120,8 @@ def _grow(founders: Ints, seen: Floats) -> _Tree:
 
 
 def _seen(orientations: Floats, workshop: Workshop) -> Floats:
-    """Return the postures along a few directions [N, d], those in which some of them differ most; distances are at most
-    the root of `squared_distance`."""
+    """Project the postures onto the directions of greatest variance [N, d]; distances are at most the root of
+    `squared_distance`."""
     shown = _points(orientations[:: max(len(orientations) // SHOWN, 1)])
     middle = shown.mean(axis=0)
     directions = np.linalg.eigh((shown - middle).T @ (shown - middle))[1][:, ::-1][:, :DIRECTIONS]
@@ -139,15 +138,15 @@ def _points(orientations: Floats) -> Floats:
 def _nearest(
     tree: _Tree, orientations: Floats, seen: Floats, postures: Ints, enough: float = -1.0
 ) -> tuple[Floats, Ints]:
-    """Return the least squared distance of each of n postures to a founder [n], and the place of the first founder that
-    is as near [n].
+    """Return each posture's least squared distance to a founder [n], and the position of the first founder that near
+    [n].
 
     Args:
         tree: of the founders.
         orientations: of all postures [N, m, 4].
-        seen: of all postures [N, d].
-        postures: by number [n].
-        enough: a squared distance that is near enough: of those whose least is more, only that is sure.
+        seen: projections of all postures [N, d].
+        postures: their indices [n].
+        enough: a squared distance that is near enough: a result above it is only known to be above it.
     """
     least, place = np.full(len(postures), np.inf), np.zeros(len(postures), dtype=np.int64)
     _search(*tree, orientations, seen, postures, enough, LOOKED_AT, least, place)
@@ -156,7 +155,7 @@ def _nearest(
 
 @jit
 def _look_along(orientations: Floats, middle: Floats, directions: Floats, out: Floats) -> None:
-    """Write `_points` less their middle [9 m], along directions [9 m, d]: [N, d]."""
+    """Write the projections [N, d] of `_points`, less their mean [9 m], onto directions [9 m, d]."""
     row, root = np.empty(9), np.sqrt(2.0)
     for n in range(len(orientations)):
         out[n] = 0.0
@@ -186,8 +185,8 @@ def _search(
     least: Floats,
     place: Ints,
 ) -> int:
-    """Write the least distances of postures, and the first founder each is of (`_nearest`); return how many founders
-    were compared. Those that look nearest are compared, `most` at most, until no other can be nearer."""
+    """Write the results of `_nearest`; return the number of founders compared: at most `most` per posture, nearest
+    projections first, until no other can be nearer."""
     compared, near, at, distances = 0, np.empty(most), np.empty(most, np.int64), np.empty(most)
     nodes, gaps = np.empty(64, np.int64), np.empty(64)  # twice as many as there are levels
     for i in range(len(postures)):
@@ -202,7 +201,7 @@ def _search(
                 continue
             if 2 * node + 2 < len(bounds):
                 one, other = _gap(boxes[2 * node + 1], here), _gap(boxes[2 * node + 2], here)
-                nearer = 2 * node + 1 if one <= other else 2 * node + 2  # looked at first, so last on the pile
+                nearer = 2 * node + 1 if one <= other else 2 * node + 2  # visited first, so pushed last
                 nodes[size], gaps[size] = 4 * node + 3 - nearer, max(one, other)
                 nodes[size + 1], gaps[size + 1] = nearer, min(one, other)
                 size += 2
@@ -234,7 +233,7 @@ def _search(
 
 @jit
 def _distance_within(a: Floats, b: Floats, most: float) -> float:
-    """Return `squared_distance` of postures [m, 4], or less, but more than `most`, where it is more."""
+    """Return `squared_distance` of postures [m, 4], or, where that exceeds `most`, any partial sum above `most`."""
     total = 0.0
     for j in range(len(a)):
         total += squared_turn(a[j], b[j])
@@ -255,8 +254,7 @@ def _gap(box: Floats, point: Floats) -> float:
 
 @jit
 def _insert(near: Floats, at: Ints, count: int, off: float, founder: int) -> int:
-    """Insert a founder at a squared distance among the nearest, in order; return their number, of which the farthest
-    falls out where there is no place for more."""
+    """Insert a founder into the sorted list of the nearest, dropping the farthest if it is full; return its length."""
     k = min(count, len(near) - 1)
     if k < count and off >= near[k]:
         return count
@@ -269,7 +267,7 @@ def _insert(near: Floats, at: Ints, count: int, off: float, founder: int) -> int
 
 @jit
 def _found(orientations: Floats, seen: Floats, within: float) -> Ints:
-    """Return which of n postures found clusters, in order, among themselves alone."""
+    """Return the indices of the postures, among n, that found clusters if no others exist."""
     founders = np.empty(len(orientations), np.int64)
     count = 0
     for i in range(len(orientations)):

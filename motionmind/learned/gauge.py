@@ -1,8 +1,8 @@
-"""A gauge of pace: what each clip of a corpus shows by itself, so that clips can be added and removed.
+"""A gauge of pace: measurements of each clip alone, so that clips can be added to a corpus and removed.
 
-The pace of a corpus (`motionmind.learned.pace`) is made of sums, percentiles and a fit over all of its clips.
-Percentiles of all do not follow from percentiles of each; so the steps between frames are kept, in single precision,
-and the pace is the same whether clips came one by one or at once.
+The pace of a corpus (`motionmind.learned.pace`) consists of sums, percentiles and a fit over all clips. Percentiles of
+clips cannot be combined, so the gauge keeps the steps between frames, in single precision. The pace is the same
+whether clips were added one by one or at once.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from motionmind.executors.workshop import Workshop
 
 @dataclass(frozen=True, eq=False)
 class Gauge:
-    """The pace that each of C clips shows by itself, at FPS frames a second; that of the corpus is refitted from it.
+    """Measurements of C clips, at FPS frames per second, from which the pace of their corpus is fitted.
 
     Attributes:
-        starts: where the steps, still moments and windows of each clip begin, and how many there are [C + 1, 3].
-        steps: from each frame to the next: as of `motionmind.learned.pace.steps_of`, then the displacement of the root,
+        starts: first step, resting frame and window of each clip, then their totals [C + 1, 3].
+        steps: from each frame to the next: `motionmind.learned.pace.steps_of`, then the root's displacement, body
             heights [T, J + 6].
-        stills: of the still moments, seconds in the recording and the speed of the mean joint, rad/s [S, 2].
-        windows: the ways between each two that are as far apart as a window: angles of the mean joint and of the
-            body's turning, radians, and its travel, heights; both speeds; seconds [W, 6].
+        stills: time of each resting frame in the recording, seconds, and its mean joint speed, rad/s [S, 2].
+        windows: for pairs of resting frames a window apart: mean joint angle and the body's turn, radians, its travel,
+            heights; both resting speeds; seconds between them [W, 6].
     """
 
     starts: Ints
@@ -38,22 +38,22 @@ class Gauge:
 
     @property
     def rows(self) -> tuple[NDArray[Any], ...]:
-        """All but where they begin."""
+        """The arrays other than `starts`."""
         return self.steps, self.stills, self.windows
 
     @property
     def counts(self) -> Ints:
-        """Numbers of steps, still moments and windows of each clip [C, 3]."""
+        """Numbers of steps, resting frames and windows of each clip [C, 3]."""
         return np.diff(self.starts, axis=0)
 
 
 def join_gauges(kept: Kept, old: Gauge, new: Gauge | None, workshop: Workshop) -> Gauge:
-    """Return what the clips of a corpus show, given that of the clips of an earlier one and of those that are new.
+    """Join the gauges of an earlier corpus and of new clips into that of a corpus.
 
     Args:
         kept: the corpus, and which of its clips are new.
-        old: of the earlier corpus.
-        new: of the new clips; None if there are none.
+        old: gauge of the earlier corpus.
+        new: gauge of the new clips; None if there are none.
         workshop: room for large arrays.
     """
     counts = np.zeros((len(kept.numbers), 3), dtype=np.int64)

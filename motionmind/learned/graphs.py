@@ -15,17 +15,16 @@ if TYPE_CHECKING:
     import networkx as nx
     from pgmpy.models import DiscreteBayesianNetwork
 
-LIKELIEST_PARENTS = 3  # states of the parent that a joint graph names beside a state
+LIKELIEST_PARENTS = 3  # parent states listed for each state of a joint graph
 
 
 def joint_graph(learned: LearnedCorpus, joint: str) -> nx.DiGraph:
     """Return the joint graph of a joint (or "facing") as a networkx graph.
 
-    Nodes are states, with `orientation` (x, y, z, w), `visits`, `label` and `given`: the states of the parent joint
-    that make it likeliest, each with P(state | parent's state), of those seen with it. Edges are attested transitions,
-    with `count`, `weight` (-log P(next | state), nats), `seconds`, and the postures of the corpus that they lead from
-    and to where first made, `attests` and `arrives`. The graph knows its `corpus`, `joint` and `parent`, None where it
-    has none.
+    Nodes are states, with `orientation` (x, y, z, w), `visits`, `label` and `given`: the attested parent states that
+    make the state likeliest, each with P(state | parent's state). Edges are attested transitions, with `count`,
+    `weight` (-log P(next | state), nats), `seconds`, and `attests` and `arrives`, the corpus's postures at either end
+    of the first occurrence. The graph's attributes are `corpus`, `joint` and `parent`, which may be None.
 
     Raises:
         SkeletonError: the corpus has no such joint.
@@ -45,7 +44,7 @@ def joint_graph(learned: LearnedCorpus, joint: str) -> nx.DiGraph:
 
 
 def network(learned: LearnedCorpus) -> DiscreteBayesianNetwork:
-    """Return the coordination as a pgmpy network over the joints: the one whose tables gave the search its costs."""
+    """Return the coordination as a pgmpy network over the joints, whose tables give the search its costs."""
     joints = len(learned.corpus.skeleton)
     parents, sizes = learned.corpus.chain_parents[:joints], learned.space.sizes[:joints]
     states, weights = np.asarray(learned.states[:, :joints]), learned.corpus.weights
@@ -53,7 +52,7 @@ def network(learned: LearnedCorpus) -> DiscreteBayesianNetwork:
 
 
 def _likeliest_parents(learned: LearnedCorpus, chain: int, parent: int) -> list[tuple[tuple[str, float], ...]]:
-    """Return for each state of a chain the parent's states that it goes with best, each with P(state | parent's)."""
+    """Return, for each state of a chain, the parent states that make it likeliest, each with P(state | parent's)."""
     if parent < 0:
         return [()] * int(learned.space.sizes[chain])
     pairs = learned.grammar.coordination

@@ -1,8 +1,8 @@
-"""Peaks: what the greatest speeds, and accelerations of the root, keep to in windows of some length.
+"""Peaks: limits on speeds and on the root's acceleration within windows of a given length.
 
-A movement of many seconds that is nowhere faster than all but a hundredth of a corpus's moments may still show more
-than any of the corpus that is as long, for quick clips are short. So the greatest of each part is taken of all windows
-of a length, and the hundredth of the windows that show most is left out.
+Quick clips are short: a long movement whose every frame is below the 99th percentile of a corpus's speeds may still be
+livelier than any stretch of the corpus that long. So each limit is the 99th percentile, over all windows of a length,
+of the greatest value in the window.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from motionmind.learned.percentiles import Percentile
 from motionmind.learned.sampled import FPS
 
 RARE = 99.0  # percentile of frames, or windows
-LENGTHS = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0  # seconds of the windows whose peaks are known
+LENGTHS = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0  # window lengths, seconds
 STRIDE = 6  # frames from window to window
-FEW = 10  # windows; where there are fewer, peaks are those of shorter ones
+FEW = 10  # least number of windows; with fewer, the peaks of shorter windows apply
 _SIZES = [round(seconds * FPS / STRIDE) for seconds in LENGTHS]  # of the windows, in strides
 
 
 class Peaks:
-    """The peaks of stretches of movement that come one after the other, at FPS frames a second.
+    """The peaks of stretches of movement added one after the other, at FPS frames per second.
 
     Args:
-        lengths: the numbers of steps of all stretches that will come [n].
+        lengths: numbers of steps of all stretches to be added [n].
     """
 
     def __init__(self, lengths: Ints) -> None:
@@ -40,7 +40,7 @@ class Peaks:
             moved: displacements of the root [T, 3], heights.
         """
         parts = np.column_stack([speeds, np.append(accelerations(moved, FPS), 0.0)])
-        # Each STRIDE frames are one, for the greatest is the same.
+        # Reduce each STRIDE frames to their maximum; the maxima of windows stay the same.
         parts = np.maximum.reduceat(parts, np.arange(0, len(parts), STRIDE))
         for size, windows in zip(_SIZES, self._windows, strict=True):
             if windows is not None and len(parts) >= size:
@@ -50,8 +50,8 @@ class Peaks:
         """Return the peaks of windows of each of LENGTHS [6, K + 1].
 
         Args:
-            most: of windows too few to tell, if there are no shorter ones [K + 1].
-            least: what no peak is less than [K + 1].
+            most: peaks to use if there are too few windows of any length [K + 1].
+            least: lower bounds of the peaks [K + 1].
         """
         peaks = []
         for windows in self._windows:
@@ -61,5 +61,5 @@ class Peaks:
 
 
 def accelerations(moved: Floats, fps: float) -> Floats:
-    """Return the accelerations between steps [T - 1], from displacements in each [T, 3], at so many a second."""
+    """Return the accelerations between steps [T - 1], from displacements per step [T, 3], at `fps` steps per second."""
     return np.asarray(fps**2 * np.linalg.norm(np.diff(moved, axis=0), axis=1))

@@ -1,4 +1,4 @@
-"""Percentiles of more numbers than memory holds: only the tail that decides is kept, so they are exact."""
+"""Exact percentiles of more numbers than memory holds: only the tail that decides them is kept."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from motionmind._typing import Floats
 
 
 class Percentile:
-    """A percentile of each column of rows that come bit by bit, in any order; as `numpy.percentile` of all at once.
+    """A percentile of each column of rows added in any order; equal to `numpy.percentile` of all rows.
 
     Args:
-        percent: which, 0 to 100; the nearer to either, the less memory it takes.
-        total: how many rows will come in all.
+        percent: the percentile, 0 to 100; the nearer to either end, the less memory it takes.
+        total: number of rows to be added in all.
     """
 
     def __init__(self, percent: float, total: int) -> None:
@@ -32,16 +32,16 @@ class Percentile:
             self._thin()
 
     def value(self) -> Floats:
-        """Return the percentile of each column [columns]; all rows must have come."""
+        """Return the percentile of each column [columns], once all rows have been added."""
         self._thin()
         tail = np.sort(self._sign * self._rows[0], axis=0)
         first = 0 if self._sign > 0.0 else self._below
         a, b = tail[first], tail[min(first + 1, len(tail) - 1)]
-        # The rounding is numpy's.
+        # Rounds as numpy does.
         return np.asarray(a + (b - a) * self._share if self._share < 0.5 else b - (b - a) * (1 - self._share))
 
     def _thin(self) -> None:
-        """Drop what is not among the greatest of its column."""
+        """Drop values that are not among the greatest of their column."""
         rows = np.concatenate(self._rows)
         if len(rows) > self._keep:
             rows = np.partition(rows, len(rows) - self._keep, axis=0)[len(rows) - self._keep :].copy()
