@@ -28,8 +28,8 @@ LOOKED_AT = 32  # most founders compared with a posture, nearest projections fir
 BLOCK = 2048  # postures compared at a time
 SHOWN = 4096  # postures from which the directions are computed
 SLACK = 1e-6  # allowance for rounding in squared distances of projections
-# Squared distances, radians^2, that differ by less are a tie. Rounding makes differences of 1e-15, by which two dozen of
-# the 13,932 memberships in recordings of one dancer (cmu-05) differed between two processors.
+# Squared distances, radians^2, that differ by less are a tie. Rounding makes differences of 1e-15, by which two dozen
+# of the 13,932 memberships in recordings of one dancer (cmu-05) differed between two processors.
 TIE = 1e-12
 
 

@@ -1,4 +1,4 @@
-"""Learning from a corpus: its states, grammar, carriage, pace and limits of plausibility."""
+"""Learning from a corpus: its states, grammar, posture statistics, pace and plausibility limits."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ from motionmind.learned.pace import Pace, measure_pace, refit_pace
 from motionmind.learned.plausibility import Plausibility, learn_plausibility
 from motionmind.walks.evidence import learn_trust
 
-MOST_STATES_LEARNED = 50_000  # of a joint: a search among them takes some 6 GB
-MOST_FACINGS = 10_000  # each of which makes all turns that any makes
+MOST_STATES_LEARNED = 50_000  # per joint: a search among them takes about 6 GB
+MOST_FACINGS = 10_000  # every facing shares the transitions of all others
 
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """The result of learning from a corpus of N postures, with L chains.
+    """The result of learning from a corpus of N postures, with L joint chains.
 
     Attributes:
-        corpus: the movement that was learned from.
+        corpus: the movement learned from.
         space: the states of each chain.
         states: states of the corpus's postures [N, L].
         grammar: joint graphs, bridges and coordination.
-        carriage: how the corpus's bodies hold themselves, travel and stand.
-        pace: how long they take for how far a way.
-        plausibility: what their movement shows a viewer at most.
-        gauge: what each clip shows of its pace; None if an earlier version learned.
-        code: names the code that learned (`motionmind.corpus.fingerprint`); "" if an earlier version did.
+        carriage: posture statistics: orientations, travel and support.
+        pace: speeds, and durations by displacement.
+        plausibility: limits of plausible movement.
+        gauge: measurements of pace per clip; None in corpora of an earlier version.
+        code: fingerprint of the code that learned (`motionmind.corpus.fingerprint`); "" for an earlier version.
     """
 
     corpus: Corpus
@@ -62,15 +62,15 @@ def learn(corpus: Corpus, discretization: Discretization, workshop: Workshop | N
 
     Args:
         corpus: the movement.
-        discretization: how orientations become states; only states with a posture in them are kept.
-        workshop: threads, and room for large arrays; None for this thread and memory. What is learned is the same.
+        discretization: maps orientations to states; states without a posture are dropped.
+        workshop: threads, and room for large arrays; None for the current thread and memory. It never changes results.
 
     Raises:
         CorpusError: a joint has more than MOST_STATES_LEARNED states, or the facing more than MOST_FACINGS.
         OSError: the workshop's disk is full.
     """
     joints = corpus.skeleton.names
-    # Tolerances do not depend on the postures, so one shows them, and faulty settings, before all are compared.
+    # Tolerances do not depend on the postures: fitting to one reveals them, and faulty settings, before the long fit.
     tolerances = discretization.fit(joints, corpus.to_chains(corpus.rotations[:1])[:, : len(joints)]).tolerances
     if corpus.facing == "free":
         _check_facing(corpus, float(tolerances[0]))
@@ -81,29 +81,28 @@ def learn(corpus: Corpus, discretization: Discretization, workshop: Workshop | N
 
 
 def learn_in(corpus: Corpus, space: StateSpace, workshop: Workshop | None = None) -> Learned:
-    """Learn from a corpus in states that are known, those of them with a posture in them.
+    """Learn from a corpus in known states; states without a posture are dropped.
 
     Args:
         corpus: the movement.
-        space: the states of each chain, as they were learned from a corpus on the same joints, facing alike.
-        workshop: as of `learn`.
+        space: the states of each chain, learned from a corpus with the same joints and kind of facing.
+        workshop: as in `learn`.
     """
     return _learn(Kept.none(corpus), lambda joint, _: space.alone(joint), workshop)
 
 
 def learn_changed(before: Learned, kept: Kept, workshop: Workshop | None = None) -> Learned:
-    """Learn from a corpus in the states of an earlier one: the same as `learn_in`, to the last bit.
+    """Learn from a changed corpus in the states of an earlier one: the same as `learn_in`, to the last bit.
 
-    Of clips that it had, what was found is taken as it is: the states that they are in, and how they are held and move.
-    So new clips alone are compared with states and measured, and what is learned of all clips together is refitted.
-    Where other code learned the earlier one, all is learned anew.
+    States and measurements of kept clips are reused. Only new clips are discretized and measured, and whatever depends
+    on all clips is refitted. If other code learned the earlier corpus, everything is learned anew.
 
     Args:
-        before: what was learned from the earlier corpus.
-        kept: the clips that the corpus has in common with it (`motionmind.corpus.kept`).
-        workshop: as of `learn`.
+        before: result for the earlier corpus.
+        kept: the clips shared with it (`motionmind.corpus.kept`).
+        workshop: as in `learn`.
     """
-    # Other code may have found something else in the same clips.
+    # Other code may have measured the same clips differently.
     if before.gauge is None or before.code != code_name() or kept.before is None:
         return learn_in(kept.corpus, before.space, workshop)
     return _learn(kept, lambda joint, _: before.space.alone(joint), workshop, before)
@@ -112,9 +111,9 @@ def learn_changed(before: Learned, kept: Kept, workshop: Workshop | None = None)
 def _learn(
     kept: Kept, fit: Callable[[int, Floats], StateSpace], workshop: Workshop | None, before: Learned | None = None
 ) -> Learned:
-    """Learn from a corpus; `fit` gives the states of a joint, of its index and its orientations in new clips [n, 4].
+    """Learn from a corpus; `fit` maps a joint's index and its orientations in new clips [n, 4] to its states.
 
-    What was learned `before` of clips that are kept stays.
+    Results in `before` for kept clips are reused.
     """
     workshop, corpus = workshop or Workshop(), kept.corpus
     states = workshop.empty((len(corpus), len(corpus.chains)), np.int32)
@@ -135,8 +134,8 @@ def _learn(
 
 
 def outside(corpus: Corpus, space: StateSpace) -> tuple[float, str, float]:
-    """Return the share of a corpus's orientations that are in no state of their joint, for they are farther from all of
-    them than its tolerance; the joint that is farthest, and by how many degrees.
+    """Return the share of a corpus's orientations farther from every state of their joint than its tolerance; the joint
+    that exceeds its tolerance most, and by how many degrees.
 
     Args:
         corpus: the movement.
@@ -154,13 +153,13 @@ def outside(corpus: Corpus, space: StateSpace) -> tuple[float, str, float]:
 
 
 def learn_from_states(corpus: Corpus, space: StateSpace, states: States, workshop: Workshop | None = None) -> Learned:
-    """Learn from a corpus whose postures have states.
+    """Learn from a corpus whose states are given.
 
     Args:
         corpus: the movement.
         space: the states of each chain.
         states: states of the corpus's postures [N, L].
-        workshop: as of `learn`.
+        workshop: as in `learn`.
     """
     return _learn_all(Kept.none(corpus), space, states, workshop or Workshop())
 
@@ -168,7 +167,7 @@ def learn_from_states(corpus: Corpus, space: StateSpace, states: States, worksho
 def _learn_all(
     kept: Kept, space: StateSpace, states: States, workshop: Workshop, before: Learned | None = None
 ) -> Learned:
-    """Learn from a corpus whose postures have states; what was learned `before` of clips that are kept stays."""
+    """Learn from a corpus whose states are given; reuse results in `before` for kept clips."""
     corpus = kept.corpus
     moves = corpus.moves
     grammar = learn_grammar(
@@ -190,7 +189,7 @@ def _learn_all(
         gauge = measure_pace(kept, gauge_before, workshop)
         return gauge, refit_pace(corpus, gauge)
 
-    # One calls NumPy for little at a time, and the other compiled loops for long, which leave the interpreter free.
+    # These overlap well: one makes many short NumPy calls, the other long compiled loops without the interpreter lock.
     (gauge, pace), carriage = workshop.both(pace_of, partial(learn_carriage, corpus, workshop, kept, carriage_before))
     carriage = replace(carriage, trust=learn_trust(corpus, carriage, workshop))
     plausibility = learn_plausibility(corpus, pace.fastest)
@@ -198,10 +197,8 @@ def _learn_all(
 
 
 def _keep_visited(space: StateSpace, states: States) -> tuple[StateSpace, States]:
-    """Return the state space of one joint without states that no posture is in, and its states [N] in that.
-
-    Nothing is known of a state without postures.
-    """
+    """Drop one joint's states without a posture, of which nothing is known; return the smaller space and the states [N]
+    renumbered in it."""
     seen = np.unique(states)
     labels = [[space.labels[0][s] for s in seen] if space.labels[0] else []]
     smaller = StateSpace.of_joints(
@@ -236,9 +233,9 @@ def _facings(tolerance: float) -> int:
 
 
 def _with_facing(space: StateSpace, turns: Floats) -> tuple[StateSpace, States]:
-    """Return the state space with a chain for the facing, and the states [N] in it of the corpus's turns [N, 4].
+    """Add a joint chain for the facing to a state space; return it with the facing states [N] of the turns [N, 4].
 
-    The facing's states are equal steps of a circle, about as wide as the root's tolerance.
+    The facing's states divide the circle evenly, into steps about as wide as the root's tolerance.
     """
     count = _facings(float(space.tolerances[0]))
     ring = rot.canonical(rot.about_vertical(np.arange(count) * 2.0 * np.pi / count))

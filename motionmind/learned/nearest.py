@@ -1,7 +1,7 @@
-"""Nearest: few moments of a corpus that are near a posture, found by the tree of a part of the body.
+"""Nearest: approximate nearest neighbours of a posture among a corpus's samples, by the tree of a body part.
 
-Bodies have so many joints that balls overlap, and a search that is to be certain of the nearest moment looks at most of
-them. This one looks at a fixed number of leaves, those first whose nearest moment is likely to be nearest.
+In so many dimensions balls overlap, and an exact search would visit most samples. This one visits a fixed number of
+leaves, most promising first.
 """
 
 from __future__ import annotations
@@ -15,28 +15,28 @@ from motionmind.geometry.distances import squared_distance, squared_turn
 from motionmind.jit import jit, read_only
 from motionmind.learned.neighbours import LEAF, WHOLE, Neighbours
 
-LEAVES = 48  # of a tree that are searched for near moments
-INSIDE = 0.6  # of a ball's radius: how much nearer than its centre its nearest moment is likely to be
+LEAVES = 48  # leaves visited per search
+INSIDE = 0.6  # radii by which a ball's nearest sample is likely to be nearer than its centre
 
 
 def find_near(
     trees: Neighbours, number: int, orientations: Floats, postures: Floats, count: int, leaves: int = LEAVES
 ) -> Ints:
-    """Return moments near each of some postures in one part of the body [K, n].
+    """Return samples near each of K postures in one body part [K, n], nearest first.
 
-    They are the `count` nearest moments of the leaves that promise most, the nearest first, or all of these leaves.
+    They are the `count` nearest in the most promising leaves, or all samples in these leaves if fewer.
 
     Args:
         trees: of the corpus.
-        number: of the part.
-        orientations: of the corpus's moments [N, L, 4].
-        postures: orientations of the chains, the joints' first [K, J, 4].
-        count: how many moments for each posture.
-        leaves: how many to search.
+        number: index of the part.
+        orientations: of the corpus's samples [N, L, 4].
+        postures: orientations of the joint chains, joints first [K, J, 4].
+        count: number of samples per posture.
+        leaves: number of leaves to visit.
     """
     tree, shown = _tree_of(trees, number), read_only(orientations)
     leaf = (len(tree.bounds) + 1) // 2
-    least = np.diff(tree.bounds[-leaf:]).min()  # so that each posture has as many
+    least = np.diff(tree.bounds[-leaf:]).min()  # so that each posture gets equally many
     count = min(count, leaves * least if leaves < leaf else len(tree.order))
     sought = np.ascontiguousarray(postures[:, tree.part])
     return np.stack([_nearest(*_leaves(shown, tree, posture, leaves), count) for posture in sought])
@@ -45,15 +45,15 @@ def find_near(
 def postures_near(
     trees: Neighbours, orientations: Floats, posture: Floats, count: int, below: int, leaves: int = LEAVES
 ) -> Ints:
-    """Return so many of the corpus's postures near to one, the nearest first, by the whole body.
+    """Return the corpus's postures near a given one in the whole body, nearest first.
 
     Args:
         trees: of the corpus.
-        orientations: of the corpus's moments [N, L, 4]; the postures come before the middles of its moves.
-        posture: orientations of the chains [L, 4].
-        count: how many, or as many as are found.
+        orientations: of the corpus's samples [N, L, 4]: postures, then middles of moves.
+        posture: orientations of the joint chains [L, 4].
+        count: number of postures to return, at most.
         below: number of the corpus's postures.
-        leaves: how many to search.
+        leaves: number of leaves to visit.
     """
     tree = _tree_of(trees, 0)
     moments, off = _leaves(read_only(orientations), tree, np.ascontiguousarray(posture[tree.part]), leaves)
@@ -61,11 +61,11 @@ def postures_near(
 
 
 class _Tree(NamedTuple):
-    """The tree of one part, as loops take it.
+    """The tree of one part, in the form that compiled loops take.
 
     Attributes:
-        part: the chains of the part [m].
-        codes, order, bounds, centres, radii: of `Neighbours`, those of the part.
+        part: the joint chains of the part [m].
+        codes, order, bounds, centres, radii: as in `Neighbours`, for this part.
     """
 
     part: Ints
@@ -89,15 +89,15 @@ def _tree_of(trees: Neighbours, number: int) -> _Tree:
 
 
 def _nearest(moments: Int32s, off: Singles, count: int) -> Ints:
-    """Return so many of some moments, or all, those that are least off, the nearest first [n]."""
+    """Return the `count` samples of least distance `off`, or all if fewer, nearest first [n]."""
     return moments[np.argsort(off, kind="stable")[:count]].astype(np.int64)
 
 
 @jit
 def _search(posture: Floats, bounds: Int32s, centres: Singles, radii: Floats, leaves: int) -> Ints:
-    """Return the leaves that promise most for a posture of the part [m, 4].
+    """Return the most promising leaves for a posture of the part [m, 4].
 
-    Nodes wait in a heap, those that promise more first; of equals, the first. With `heapq` it takes a quarter longer.
+    Nodes wait in a heap, most promising first; ties go by index. With `heapq` it takes a quarter longer.
     """
     found, many = np.empty(leaves, np.int64), 0
     promises, nodes, waiting = (
@@ -127,7 +127,7 @@ def _search(posture: Floats, bounds: Int32s, centres: Singles, radii: Floats, le
 
 @jit
 def _sink(promises: Floats, nodes: Ints, size: int, promise: float, node: int) -> None:
-    """Put a node in the place of the first of a heap of that size."""
+    """Replace the first node of a heap of `size` nodes."""
     at, below = 0, 1
     while below < size:
         if below + 1 < size and _is_before(promises[below + 1], nodes[below + 1], promises[below], nodes[below]):
@@ -141,7 +141,7 @@ def _sink(promises: Floats, nodes: Ints, size: int, promise: float, node: int) -
 
 @jit
 def _rise(promises: Floats, nodes: Ints, size: int, promise: float, node: int) -> None:
-    """Add a node to a heap of that size."""
+    """Add a node to a heap of `size` nodes."""
     at = size
     while at > 0 and _is_before(promise, node, promises[(at - 1) // 2], nodes[(at - 1) // 2]):
         promises[at], nodes[at] = promises[(at - 1) // 2], nodes[(at - 1) // 2]
@@ -151,14 +151,14 @@ def _rise(promises: Floats, nodes: Ints, size: int, promise: float, node: int) -
 
 @jit
 def _is_before(promise: float, node: int, other: float, its: int) -> bool:
-    """Return whether a node that promises so much comes before another."""
+    """Return whether a node comes before another in the heap."""
     return promise < other or (promise == other and node < its)
 
 
 @jit
 def _leaves(orientations: Floats, tree: _Tree, posture: Floats, leaves: int) -> tuple[Int32s, Singles]:
-    """Return the moments of so many leaves, those that promise most for a posture of the part [m, 4], and their squared
-    distances from it, in any unit."""
+    """Return the samples in the `leaves` most promising leaves for a posture of the part [m, 4], and their squared
+    distances from it, in arbitrary units."""
     best, many = _search(posture, tree.bounds, tree.centres, tree.radii, leaves), 0
     found, squared = np.empty(len(best) * LEAF, np.int32), np.empty(len(best) * LEAF, np.float32)
     sought, width = (WHOLE * posture).astype(np.float32), 4 * len(tree.part)
@@ -176,13 +176,13 @@ def _leaves(orientations: Floats, tree: _Tree, posture: Floats, leaves: int) -> 
 
 @jit
 def _measure(codes: Int8s, posture: Singles, out: Singles) -> None:
-    """Write the squared differences of the moments of a leaf [4 m, n] from a posture of the part [m, 4], both in
-    127ths, each joint's to the nearer sign, sums over joints [n]."""
+    """Write squared differences between a leaf's codes [4 m, n] and a posture of the part [m, 4], both in 127ths:
+    sums over joints [n], each with the nearer sign of the quaternion."""
     out[:] = 0.0
     whole = np.float32(WHOLE * WHOLE)
     for j in range(len(posture)):
         a, b, c, d = posture[j]
-        for k in range(len(out)):  # side by side, so that several are measured at once
+        for k in range(len(out)):  # contiguous, for vector instructions
             x, y = np.float32(codes[4 * j, k]), np.float32(codes[4 * j + 1, k])
             z, w = np.float32(codes[4 * j + 2, k]), np.float32(codes[4 * j + 3, k])
             along = abs(a * x + b * y + c * z + d * w)
@@ -191,8 +191,8 @@ def _measure(codes: Int8s, posture: Singles, out: Singles) -> None:
 
 @jit
 def _measure_apart(orientations: Floats, part: Ints, posture: Floats, moments: Int32s, out: Singles) -> None:
-    """Write the squared distances of moments [n] of all [N, L, 4] from a posture of the part [m, 4], sums [n]."""
-    for k in range(len(moments)):  # so that the memory of all is on its way before that of the first is waited for
+    """Write squared distances between samples [n], of all [N, L, 4], and a posture of the part [m, 4]: sums [n]."""
+    for k in range(len(moments)):  # prefetch: request the memory of all before waiting for the first
         touched = 0.0
         for j in range(0, len(part), 2):
             touched += orientations[moments[k], part[j], 0]

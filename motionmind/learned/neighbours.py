@@ -1,15 +1,14 @@
-"""Neighbours: a tree over a corpus's moments for each part of the body, by which a search looks at few of them.
+"""Neighbours: a ball tree over a corpus's samples for each body part, so that searches visit few samples.
 
 The distance of two postures of a part is the root mean square over its joints of 2 sin(angle / 2), radians: that of
-their rotation matrices, up to a factor. A node of a tree is a ball that holds its moments, and its children halve these
-by which of two that lie far apart they are nearer to. Source: Omohundro, "Five balltree construction algorithms", ICSI
-TR-89-063 (1989).
+their rotation matrices, up to a factor. A node is a ball around its samples. Its children halve these by which of two
+samples far apart they are nearer to. Source: Omohundro, "Five balltree construction algorithms", ICSI TR-89-063 (1989).
 
-What a leaf's moments show of the part lies together, a byte a number: a search (`motionmind.learned.nearest`) reads a
-leaf in one piece, where the moments' own orientations are scattered over gigabytes. By these bytes distances of near
-moments are off by about a hundredth of a radian a joint.
+A leaf stores its samples' orientations of the part contiguously, one byte per number: a search
+(`motionmind.learned.nearest`) reads a leaf in one piece, while the orientations themselves are scattered over
+gigabytes. The bytes distort distances of near samples by about 0.01 radians per joint.
 
-All parts' trees halve the same numbers of moments, so one table says where nodes begin and end: node n has the children
+The trees of all parts halve equal numbers of samples, so they share one table of node ranges: node n has the children
 2 n + 1 and 2 n + 2, and a node of the last level is a leaf.
 """
 
@@ -29,29 +28,29 @@ from motionmind.executors.workshop import Workshop
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit, read_only
 
-MANY = 8000  # moments of a corpus that has no trees, at most: all of them are looked at
-BLOCK = 2048  # moments that are copied at a time
-LEAF = 32  # moments of a leaf, at most
-SAMPLE = 64  # moments of a node by which it is halved, and of which its centre is the mean
-COPIED = 1 << 26  # bytes of centres at most that are copied for searches
-_SLACK = 1e-6  # radians: centres are rounded
-WHOLE = 127.0  # that codes have for 1
+MANY = 8000  # largest number of samples in a corpus without trees, searched in full
+BLOCK = 2048  # samples copied at a time
+LEAF = 32  # most samples in a leaf
+SAMPLE = 64  # samples of a node used to find its centre and to halve it
+COPIED = 1 << 26  # most bytes of centres to copy for searches
+_SLACK = 1e-6  # radians: allowance for rounded centres
+WHOLE = 127.0  # the code of 1
 
 
 @dataclass(frozen=True, eq=False)
 class Neighbours:
-    """The trees of P parts of the body over N moments, each of K nodes.
+    """The trees of P body parts over N samples, each of K nodes.
 
     Attributes:
         parts: joints of each part.
-        order: the moments of each part's tree, leaf after leaf [P, N].
-        ranks: where each moment is in that order [P, N].
-        bounds: first moment in the order of each node, and the one after its last [K, 2].
-        centres: centres of the nodes, one part's joints after another's [K, W, 4].
-        radii: their radii [P, K], radians.
-        weights: sums of their moments' weights [P, K].
-        codes: orientations of each part's moments, in 127ths, one part after another and leaf after leaf; a leaf of n
-            moments and m joints has 4 m rows of n numbers. Empty in corpora that were learned before these were kept.
+        order: the samples of each part's tree, leaf after leaf [P, N].
+        ranks: rank of each sample in that order [P, N].
+        bounds: range of each node in that order, end excluded [K, 2].
+        centres: centres of the nodes, with the joints of all parts concatenated [K, W, 4].
+        radii: radii of the nodes [P, K], radians.
+        weights: total weight of each node's samples [P, K].
+        codes: orientations of each part's samples, in 127ths, part after part and leaf after leaf; a leaf of n samples
+            and m joints has 4 m rows of n numbers. Empty in corpora of earlier versions.
     """
 
     parts: tuple[Ints, ...]
@@ -65,7 +64,7 @@ class Neighbours:
 
     @property
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """The arrays that there are, by name."""
+        """The arrays by name, `codes` only if not empty."""
         names = [field.name for field in fields(self) if field.name != "parts"]
         return {name: getattr(self, name) for name in names if name != "codes" or len(self.codes)}
 
@@ -78,25 +77,25 @@ class Neighbours:
     def centres_apart(self) -> tuple[Singles, ...]:
         """The centres of the nodes of each part's tree [K, m, 4], for searches.
 
-        Those of children lie side by side, and not a row of all parts apart: copies, unless they are large.
+        Unless they are large, they are copied to make sibling nodes contiguous.
         """
         own = [self.centres_of(number) for number in range(len(self.parts))]
         if self.centres.nbytes > COPIED:
             return tuple(own)
-        # With a joint to spare they are views, as those that are not copied: loops are compiled for one kind.
+        # A spare joint makes the copies views, like uncopied centres, so that loops compile for a single array type.
         roomy = [np.empty((len(one), one.shape[1] + 1, 4), np.float32)[:, :-1] for one in own]
         for copy, one in zip(roomy, own, strict=True):
             copy[:] = one
         return tuple(read_only(copy) for copy in roomy)
 
     def codes_of(self, number: int) -> Int8s:
-        """Return the codes of a part [N * m * 4]; none where none are kept."""
+        """Return the codes of a part [N * m * 4]; empty if the corpus has none."""
         start, stop = self._joints_of(number)
         numbers = 4 * self.order.shape[1]
         return self.codes[numbers * start : numbers * stop]
 
     def _joints_of(self, number: int) -> tuple[int, int]:
-        """Return where a part's joints begin and end among those of all parts, one after another."""
+        """Return the range of a part's joints among the concatenated joints of all parts."""
         start = sum(len(part) for part in self.parts[:number])
         return start, start + len(self.parts[number])
 
@@ -108,9 +107,9 @@ def build_neighbours(
 
     Args:
         skeleton: the body.
-        orientations: of the chains in N moments, the joints' first [N, L, 4].
-        weights: of the moments [N].
-        workshop: threads, for which each part is a job, and room for large arrays; None for this thread and memory.
+        orientations: of the joint chains in N samples, joints first [N, L, 4].
+        weights: of the samples [N].
+        workshop: threads, one job per part, and room for large arrays; None for the current thread and memory.
     """
     workshop = workshop or Workshop()
     parts, bounds = parts_of(skeleton), node_bounds(len(orientations))
@@ -133,12 +132,12 @@ def build_neighbours(
 
     workshop.do(grow, range(len(parts)))
     for array in trees.arrays.values():
-        array.setflags(write=False)  # as those that are loaded (see `read_only`)
+        array.setflags(write=False)  # like loaded arrays (see `read_only`)
     return trees
 
 
 def node_bounds(count: int) -> Int32s:
-    """Return where the nodes of a tree over so many moments begin and end [K, 2]."""
+    """Return the range of each node of a tree over `count` samples [K, 2]."""
     levels = [np.array([[0, count]])]
     while (np.diff(levels[-1]) > LEAF).any():
         start, stop = levels[-1].T
@@ -148,9 +147,9 @@ def node_bounds(count: int) -> Int32s:
 
 
 def _grow(shown: Singles, bounds: Int32s, order: Int32s, centres: Singles, radii: Floats) -> None:
-    """Grow the tree of a part that moments show [N, m, 4]: write its order [N], and its nodes' centres and radii.
+    """Grow the tree of a part, given its orientations [N, m, 4]: write the order [N] and the nodes' centres and radii.
 
-    What they show is put in that order, too: so memory is read as it lies.
+    The orientations are sorted into that order, too, so that memory is read sequentially.
     """
     order[:] = np.arange(len(order))
     keys = np.empty(len(order))
@@ -166,8 +165,10 @@ def _grow(shown: Singles, bounds: Int32s, order: Int32s, centres: Singles, radii
 
 @jit
 def _measure(own: Singles, centre: Singles, keys: Floats) -> float:
-    """Write a node's centre [m, 4], and by how much each of its moments [n, m, 4] is nearer to one that is far from the
-    centre, or if more than 0 to one that is far from that [n]; return its radius."""
+    """Write a node's centre [m, 4] and the keys that halve its n samples [n, m, 4]; return its radius.
+
+    A key is the squared distance from a sample far from the centre, less that from a sample far from the first [n].
+    """
     sample = own[:: max(1, len(own) // SAMPLE)]
     _centre(sample, centre)
     one = sample[_farthest(sample, centre)]
@@ -181,7 +182,7 @@ def _measure(own: Singles, centre: Singles, keys: Floats) -> float:
 
 @jit
 def _centre(shown: Singles, out: Singles) -> None:
-    """Write the normalised means of joints' orientations [n, m, 4], of the first one's sign [m, 4]."""
+    """Write the normalised means [m, 4] of orientations [n, m, 4], in the hemisphere of the first."""
     first = shown[0]
     for j in range(len(out)):
         mean = np.zeros(4)
@@ -197,7 +198,7 @@ def _centre(shown: Singles, out: Singles) -> None:
 
 @jit
 def _farthest(shown: Singles, posture: Singles) -> int:
-    """Return which of some moments [n, m, 4] is farthest from a posture of the part [m, 4]."""
+    """Return the index of the sample [n, m, 4] farthest from a posture of the part [m, 4]."""
     far, farthest = -1.0, 0
     for k in range(len(shown)):
         away = squared_distance(shown[k], posture)
@@ -207,7 +208,7 @@ def _farthest(shown: Singles, posture: Singles) -> int:
 
 
 def _encode(shown: Singles, bounds: Int32s, codes: Int8s) -> None:
-    """Write the codes [N * m * 4] of what moments show of a part, in its tree's order [N, m, 4]."""
+    """Write the codes [N * m * 4] of a part's orientations, given in its tree's order [N, m, 4]."""
     width = 4 * shown.shape[1]
     for start, stop in bounds[len(bounds) // 2 :]:
         own = shown[start:stop].reshape(-1, width).astype(np.float64)

@@ -1,4 +1,4 @@
-"""A clip's recording at an even rate, made block by block, so that hours of it take no more memory than minutes."""
+"""A clip's recording resampled at an even rate, block by block: hours take no more memory than minutes."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from motionmind.corpus.clip import Clip
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry.splines import natural_spline, rotation_spline
 
-FPS = 30.0  # at which movement is looked at where no other rate is said
-BLOCK = 3840  # frames that are made at a time
+FPS = 30.0  # default frame rate of measurements
+BLOCK = 3840  # frames resampled at a time
 
 
 class Sampled:
-    """The frames of `corpus.recording(clip).resample(rate)`, of which only those that are asked for are made.
+    """The frames of `corpus.recording(clip).resample(rate)`, computed on demand.
 
     Args:
         corpus: the movement.
         clip: one of its clips.
-        rate: frames a second.
-        smooth: whether frames of coarser recordings are on splines through theirs, as those of
-            `motionmind.body.plausibility.at_rate`, instead of on straight lines.
+        rate: frames per second.
+        smooth: whether to interpolate coarser recordings with splines, as `motionmind.body.plausibility.at_rate` does,
+            instead of linearly.
     """
 
     def __init__(self, corpus: Corpus, clip: Clip, rate: float, *, smooth: bool = False) -> None:
@@ -40,9 +40,9 @@ class Sampled:
         return len(self.times)
 
     def frames(self, start: int, stop: int) -> Motion:
-        """Return the frames from `start` up to, not including, `stop`; up to the last if there are not so many.
+        """Return the frames from `start` to `stop`, excluded, or to the last frame if that is earlier.
 
-        Of a clip of one block the frames are made once.
+        The frames of a clip that fits one block are cached.
         """
         return self._whole.slice(start, stop) if len(self) <= BLOCK else self._make(start, stop)
 
@@ -56,12 +56,12 @@ class Sampled:
         return self._corpus.recording(self.clip, max(int(first) - 1, 0), int(last) + 1).at(times)
 
     def blocks(self, size: int, overlap: int = 0) -> Iterator[Motion]:
-        """Yield all frames, `size` at a time, each block with so many of the frames before it."""
+        """Yield all frames, `size` at a time, each block preceded by `overlap` frames of the one before."""
         for start in range(0, len(self), size):
             yield self.frames(max(start - overlap, 0), start + size)
 
     def take(self, numbers: Ints) -> tuple[Floats, Floats]:
-        """Return rotations [n, J, 4] and root positions [n, 3], metres, of frames with these numbers [n], in order."""
+        """Return rotations [n, J, 4] and root positions [n, 3], metres, of frames given by increasing index [n]."""
         rotations = np.empty((len(numbers), len(self._corpus.skeleton), 4))
         root = np.empty((len(numbers), 3))
         for number in np.unique(numbers // BLOCK):
@@ -72,7 +72,7 @@ class Sampled:
         return rotations, root
 
     def danced(self, times: Floats) -> Bools:
-        """Return in which steps from one of some times [T] to the next nothing was reconstructed [T - 1]."""
+        """Return a mask of the steps between consecutive times [T] that contain no reconstructed movement [T - 1]."""
         known = np.ones(len(times) - 1, dtype=np.bool_)
         for repair in self.clip.repairs:
             if not repair.exact:

@@ -1,12 +1,12 @@
-"""Trust: which share of the movement that walks add to the minimal one a corpus has been found to know.
+"""Trust: the share of the walks' departure from the minimal movement that a corpus can predict.
 
 Walks through a corpus depart from the minimal movement between two postures (`motionmind.walks.minimal`). How much of
-the departure is true depends on how far both postures are from the corpus's nearest: in comparison with the way from
-one to the other, and with how far the corpus's postures are from each other. So a corpus is asked, clip by clip, what
-it would have made of a clip that it had not seen (`motionmind.walks.evidence`). The share that errs least is kept in a
-table, which this module fits and looks up.
+the departure is correct depends on the distance of both postures from the corpus's nearest ones, relative to the
+displacement from one to the other and to the spread of the corpus's postures. Leave-one-out reconstruction of the
+corpus's clips measures it (`motionmind.walks.evidence`). This module fits the share of least error as a table, and
+looks it up.
 
-How long a velocity at an end is felt is learned with it, for it differs as much: slow dancers go on for longer.
+It also holds the decay time of end velocities, which varies as much between corpora: slow dancers keep moving longer.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ import numpy as np
 
 from motionmind._typing import Floats
 
-NO_WAY = 1e-3  # radians a joint: nothing to go, but for the rounding of files
-RATIOS = np.array([0.0, 0.25, 0.5, 1.0, 2.0])  # of the distance from the corpus to the way to go
+NO_WAY = 1e-3  # radians per joint: a displacement of zero, but for the rounding of files
+RATIOS = np.array([0.0, 0.25, 0.5, 1.0, 2.0])  # of the distance from the corpus to the displacement
 
 
 @dataclass(frozen=True, eq=False)
 class Trust:
-    """The share of the walks' departure to keep, and how long velocities last.
+    """The share of the walks' departure to keep, and the decay time of end velocities.
 
     Attributes:
-        table: share by `RATIOS` [5], from 0 to 1.
-        lasts: seconds for which a velocity at an end is felt at most [1].
-        spread: distance between two random postures of the corpus, by part of the body [P], radians a joint, root mean
-            square: nothing is kept as far as that from all postures. Infinity if unknown.
+        table: share at each of `RATIOS` [5], from 0 to 1.
+        lasts: seconds for which a velocity at an end has effect, at most [1].
+        spread: distance between two random postures of the corpus, by body part [P], RMS radians per joint; at this
+            distance from every posture the share is 0. Infinity if unknown.
     """
 
     table: Floats
@@ -39,24 +39,24 @@ class Trust:
     spread: Floats
 
     def shares(self, off: Floats, ways: Floats) -> Floats:
-        """Return the share to keep by part of the body [P], from 0 to 1.
+        """Return the share to keep by body part [P], from 0 to 1.
 
         Args:
-            off: mean distance of both ends from the corpus's nearest posture of each part [P], radians a joint.
-            ways: distance from one end to the other [P], radians a joint.
+            off: mean distance of both ends from the corpus's nearest posture of each part [P], radians per joint.
+            ways: displacement from one end to the other [P], radians per joint.
         """
         return counts(off, ways, self.spread) @ self.table
 
 
 def counts(off: Floats, ways: Floats, spread: Floats) -> Floats:
-    """Return how much each entry of the table counts in the share of each part of the body [P, 5].
+    """Return the weight of each table entry in the share of each body part [P, 5].
 
-    The share goes in a straight line from entry to entry with w / (w + d), where d is the distance from the corpus and
-    w the way, and to 0 where there is no way. It is multiplied by 1 - (d / spread)^2, and 0 beyond the spread.
-    Arguments are those of `Trust.shares`.
+    The share is interpolated linearly between entries in w / (w + d), where d is the distance from the corpus and w the
+    displacement; it is 0 at w = 0. It is multiplied by 1 - (d / spread)^2, or 0 beyond the spread. Arguments are those
+    of `Trust.shares`.
     """
     nearness = np.where(ways < NO_WAY, 0.0, ways / np.maximum(ways + off, NO_WAY))
-    knots = np.append(1.0 / (1.0 + RATIOS), 0.0)[::-1]  # rising
+    knots = np.append(1.0 / (1.0 + RATIOS), 0.0)[::-1]  # increasing
     before = np.clip(np.searchsorted(knots, nearness, side="right") - 1, 0, len(knots) - 2)
     along = (nearness - knots[before]) / (knots[before + 1] - knots[before])
     out, parts = np.zeros((len(ways), len(knots))), np.arange(len(ways))
@@ -67,16 +67,16 @@ def counts(off: Floats, ways: Floats, spread: Floats) -> Floats:
 
 # --- fitting ----------------------------------------------------------------------------------------------------------
 
-# Of the prior, in mean squares of what one entry of the table makes; from next to nothing to nothing but the prior.
+# Strengths of the prior, relative to the mean diagonal of A; from almost none to the prior alone.
 STRENGTHS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, np.inf)
-SURE = 2.0  # standard errors by which a corpus's own table is to be better than one nearer to the prior: 95 %
+SURE = 2.0  # standard errors by which a table must beat one nearer to the prior: 95 %
 
 
 class Squares(NamedTuple):
     """Squared errors in some windows, as a quadratic function of the table.
 
-    With x_k the walks' departures, each joint's in the share in which entry k of the table counts for it, y the true
-    departures and c the table, the squared error is c'Ac - 2 b'c + q.
+    With x_k the walks' departures, each joint's times the weight of table entry k for it, y the true departures and c
+    the table, the squared error is c'Ac - 2 b'c + q.
 
     Attributes:
         inner: A, sums of <x_k, x_l> [5, 5].
@@ -99,7 +99,7 @@ class Squares(NamedTuple):
         return float(table @ self.inner @ table - 2.0 * table @ self.along + self.whole)
 
     def fitted(self, prior: Floats, strength: float) -> Floats:
-        """Return the table [5] that errs least, drawn to a prior one by a ridge of some strength."""
+        """Return the table [5] of least error, with a ridge penalty of given strength about a prior table."""
         if np.isinf(strength):
             return prior
         ridge = max(strength * float(np.trace(self.inner)) / len(prior), np.finfo(float).tiny) * np.eye(len(prior))
@@ -107,15 +107,15 @@ class Squares(NamedTuple):
 
 
 def fit_table(families: Sequence[Squares], prior: Floats) -> Floats:
-    """Return the table [5] for a corpus: a ridge regression about a prior one.
+    """Return the table [5] for a corpus: a ridge regression about a prior table.
 
-    Of the prior's strengths the greatest is taken whose error, on families that are left out of the fit, is not more
-    than the least by SURE standard errors over families: so a corpus departs from the prior only where its clips agree.
+    It takes the greatest strength whose error, on families left out of the fit, is within SURE standard errors over
+    families of the least error: so a corpus departs from the prior only where its clips agree.
     Source: Hastie, Tibshirani, Friedman, "The elements of statistical learning" (2009), sections 3.4.1 and 7.10.
 
     Args:
-        families: of clips that know nothing of each other.
-        prior: what is taken where they tell nothing [5].
+        families: squared errors per family of independent clips.
+        prior: table to use without evidence [5].
     """
     if len(families) < 2:
         return prior
@@ -132,6 +132,6 @@ def fit_table(families: Sequence[Squares], prior: Floats) -> Floats:
     return Squares.summed(families).fitted(prior, strength)
 
 
-# What cmu-05, cmu-16, cmu-29 and cmu-135 (mocap.cs.cmu.edu) show together, each counting the same:
+# Fitted to cmu-05, cmu-16, cmu-29 and cmu-135 (mocap.cs.cmu.edu) together, with equal weights:
 # python experiments/trust/prior.py
 PRIOR = Trust(np.array([1.0, 1.0, 0.35, 0.13, 0.01]), np.array([0.45]), np.array(np.inf))
