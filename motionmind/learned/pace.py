@@ -1,30 +1,30 @@
-"""Pace: how long a corpus's bodies take for how far a way, and how fast they move at most.
+"""Pace: durations of a corpus's movements by displacement, and limits on speed.
 
-A *way* leads from one posture to another: each joint turns, the body turns about the vertical, and the root travels.
-How long dancers take for it says little of the joints and much of the travel, in each corpus differently; so all parts
-of the way are brought to one unit first, the seconds that they take at the corpus's usual speeds:
+A displacement leads from one posture to another (`Way`): each joint turns, the body turns about the vertical, and the
+root travels. Its parts affect the duration differently in each corpus, so they are first converted to one unit,
+seconds at the corpus's usual speeds:
 
-    s = turning of the mean joint + hypot(travel, half the body's turn)
+    s = mean joint angle + hypot(travel, half the body's turn)
 
-for a body turns as it travels. And the same way is gone in less time in the midst of quick movement than from rest to
-rest. Between movements a body comes to a lull, but seldom stands still; the *lull* of a moment is the speed of the mean
-joint in the still moments before and after it, over its usual speed. The logarithm of a movement's duration is normal
-about
+since a body turns as it travels. The same displacement takes less time in the midst of quick movement than from rest to
+rest. Between movements a body slows down, but seldom stands still. The resting speed (*lull*) of a frame is the mean
+joint speed in the resting frames before and after it, divided by the usual speed. The logarithm of a movement's
+duration is normal about
 
     level + slope log(BEGINS + s) + pull log(STILL + lull),
 
-the lulls of both ends in the geometric mean. A longer way never takes less, and is gone the faster: durations grow by
-the square root at most, for what windows show beyond that holds for no others. It is learned from all pairs of still
-moments of a clip that are 0.3 to 5 s apart: between those somebody went from one posture to another and had arrived.
-Least squares, with a prior worth AS_MANY windows, for a corpus of one clip may have three of them, or none: LEVEL,
-SLOPE, PULL and SPREAD are those of the recorded corpora together (experiments/duration). Of a posture on its own nobody
-knows the lull: it is that of the corpus's postures most like it.
+with the geometric mean of the resting speeds at both ends. A longer displacement never takes less time, and durations
+grow at most as the square root: steeper slopes did not generalise. The law is fitted to all pairs of resting frames of
+a clip that are 0.3 to 5 s apart, between which the body went from one posture to another and arrived. It is a least
+squares fit with a prior worth AS_MANY windows, since a corpus of one clip may have three windows, or none: LEVEL,
+SLOPE, PULL and SPREAD come from the recorded corpora together (experiments/duration). A posture on its own takes the
+resting speed of the corpus's most similar postures.
 
-The fastest speeds are 99th percentiles of the corpus's frames at 30 a second, joint by joint. What hardly moves in the
-corpus is not forbidden to move: no joint counts as slower than a quarter of the median joint, or than everyday movement
-where that is at rest, and neither the body's turning nor its travel as slower than everyday movement. The *peaks*
-(`motionmind.learned.peaks`) are what the greatest of windows of 1 to 6 s keep to, accelerations of the root among them;
-none is less than the fastest speeds, or everyday movement.
+The fastest speeds are 99th percentiles over the corpus's frames at 30 per second, joint by joint. Parts that hardly
+move in the corpus may still move: the limit of a joint is at least a quarter of the median joint's, or everyday
+movement where that joint rests; those of the body's turn and travel are at least everyday movement. The *peaks*
+(`motionmind.learned.peaks`) are limits for windows of 1 to 6 s, including the root's acceleration; none is less than
+the fastest speeds, or everyday movement.
 """
 
 from __future__ import annotations
@@ -48,29 +48,29 @@ from motionmind.learned.peaks import LENGTHS, RARE, Peaks, accelerations
 from motionmind.learned.percentiles import Percentile
 from motionmind.learned.sampled import BLOCK, FPS, Sampled
 
-SHORTEST, LONGEST = 0.3, 5.0  # seconds between the still moments of a window
-SMOOTHED = 0.5  # seconds over which speeds are averaged to find still moments
-BEGINS = 0.3  # seconds at usual speeds that no way is shorter than, in effect: to begin and to end takes time
-STILL = 0.05  # usual speeds that no lull is slower than, in effect: no recording is without noise
-# Logarithms of seconds; of cmu-05, indian, cmu-16 and cmu-135 together.
+SHORTEST, LONGEST = 0.3, 5.0  # seconds between the resting frames of a window
+SMOOTHED = 0.5  # seconds over which speeds are averaged to find resting frames
+BEGINS = 0.3  # offset of a displacement, seconds at usual speeds: starting and stopping take time
+STILL = 0.05  # offset of a resting speed, in usual speeds: every recording has noise
+# Logarithms of seconds; fitted to cmu-05, indian, cmu-16 and cmu-135 together.
 LEVEL, SLOPE, PULL, SPREAD = 0.0, 0.5, -0.35, 0.6
-SLOPES = 0.15, 0.5  # the least and the greatest slope: a longer way takes longer, and is gone the faster
-PULLS = -0.5, 0.0  # of the pull, in the same way: who is in quick movement takes no longer
-ALIKE = 5  # of the corpus's postures, whose lulls say that of a posture
-AS_MANY = 20.0  # windows that the prior is worth
-SLOWEST_USUAL = 0.3, 0.2, 0.1  # rad/s of the mean joint, rad/s of turning, heights/s of travel: no usual speed is less
-OF_MEDIAN = 0.25  # of the median joint's fastest speed: no joint's is less
-EVERYDAY = 3.0, 2.0, 0.5  # rad/s of a joint where most rest; the least of turning, rad/s, and of travel, heights/s
-STARTS = 3.0  # heights/s^2 of the root, than which no peak is less: in three of four seconds recorded dancers show more
+SLOPES = 0.15, 0.5  # bounds of the slope: a longer displacement takes longer, at a higher speed
+PULLS = -0.5, 0.0  # bounds of the pull: movement that is quick at its ends takes no longer
+ALIKE = 5  # similar postures of the corpus that give a posture's resting speed
+AS_MANY = 20.0  # weight of the prior, in windows
+SLOWEST_USUAL = 0.3, 0.2, 0.1  # least usual speeds: mean joint, rad/s; turn, rad/s; travel, heights/s
+OF_MEDIAN = 0.25  # a joint's least fastest speed, relative to the median joint's
+EVERYDAY = 3.0, 2.0, 0.5  # least fastest speeds: a joint where most rest, rad/s; turn, rad/s; travel, heights/s
+STARTS = 3.0  # least peak acceleration of the root, heights/s^2: recorded dancers exceed it in 3 of 4 seconds
 
 
 class Way(NamedTuple):
-    """The ways from some postures to others.
+    """Displacements from some postures to others.
 
     Attributes:
-        joints: angles that the joints turn by [..., J], radians; the root's without the body's turning.
-        turn: angle that the body turns by about the vertical [...], radians.
-        travel: level distance that the root travels [...], in heights of the body.
+        joints: rotation angles of the joints [..., J], radians; the root's excludes the body's turn.
+        turn: angle of the body's turn about the vertical [...], radians.
+        travel: horizontal distance that the root travels [...], in body heights.
     """
 
     joints: Floats
@@ -79,18 +79,18 @@ class Way(NamedTuple):
 
     @property
     def parts(self) -> Floats:
-        """All of them, side by side [..., J + 2]."""
+        """All parts concatenated [..., J + 2]."""
         return np.concatenate([self.joints, self.turn[..., None], self.travel[..., None]], axis=-1)
 
 
 def ways(skeleton: Skeleton, rotations: tuple[Floats, Floats], roots: tuple[Floats, Floats]) -> Way:
-    """Return the ways from postures to others, of local rotations [..., J, 4] and root positions [..., 3], metres."""
+    """Return displacements between postures with local rotations [..., J, 4] and root positions [..., 3], metres."""
     first, last = (_faced(those[..., 0, :]) for those in rotations)
     return _way(skeleton, rot.angle(*rotations), first, last, roots[1] - roots[0])
 
 
 def _faced(root: Floats) -> tuple[Floats, Floats]:
-    """Return where a body whose root has these orientations [..., 4] faces [...], radians, and how it tilts there."""
+    """Split root orientations [..., 4] into headings [...], radians, and tilts [..., 4]."""
     headings = rot.heading(root)
     return headings, rot.mul(rot.about_vertical(-headings), root)
 
@@ -98,8 +98,8 @@ def _faced(root: Floats) -> tuple[Floats, Floats]:
 def _way(
     skeleton: Skeleton, joints: Floats, first: tuple[Floats, Floats], last: tuple[Floats, Floats], moved: Floats
 ) -> Way:
-    """Return ways by the joints' angles [..., J], radians, how the body is turned before and after them (`_faced`), and
-    how far its root moves [..., 3], metres."""
+    """Return displacements, given the joints' angles [..., J], radians, the heading and tilt before and after
+    (`_faced`), and the root's movement [..., 3], metres."""
     (faced, tilted), (faces, tilts) = first, last
     joints[..., 0] = rot.angle(tilted, tilts)
     turn = np.abs(np.angle(np.exp(1j * (faces - faced))))
@@ -108,12 +108,12 @@ def _way(
 
 
 def way_between(a: Posture, b: Posture) -> Way:
-    """Return the way from one posture to another on the same body."""
+    """Return the displacement from one posture to another on the same body."""
     return ways(a.skeleton, (a.rotations, b.rotations), (a.root, b.root))
 
 
 def way_of(motion: Motion) -> Way:
-    """Return the ways from each frame of a motion to the next [T - 1]."""
+    """Return the displacements from each frame of a motion to the next [T - 1]."""
     joints, (faces, tilts) = rot.angle(motion.rotations[:-1], motion.rotations[1:]), _faced(motion.rotations[:, 0])
     moved = np.diff(motion.root, axis=0)
     return _way(motion.skeleton, joints, (faces[:-1], tilts[:-1]), (faces[1:], tilts[1:]), moved)
@@ -124,13 +124,13 @@ class Pace:
     """The pace of a corpus of J joints.
 
     Attributes:
-        usual: usual speeds of the mean joint and of the body's turning, rad/s, and of its travel, heights/s [3].
-        fastest: fastest speeds of the joints, rad/s, of the body's turning and of its travel [J + 2].
-        greatest: greatest speeds of the same in any frame [J + 2].
-        slowest: the speed of the mean joint over a second, rad/s, that only a hundredth of all seconds is below [1].
-        peaks: greatest speeds of the same, and of the root's rise or fall, heights/s, and the root's greatest
-            acceleration, heights/s^2, in all windows of each of LENGTHS but a hundredth [6, J + 4].
-        lulls: of the corpus's N postures, usual speeds of the mean joint [N].
+        usual: usual mean joint speed and turning rate of the body, rad/s, and travel speed, heights/s [3].
+        fastest: fastest speeds of the joints, rad/s, of the body's turn, rad/s, and of its travel, heights/s [J + 2].
+        greatest: greatest speeds of the same parts in any frame [J + 2].
+        slowest: 1st percentile of the mean joint speed over a second, rad/s [1].
+        peaks: 99th percentiles, over windows of each of LENGTHS, of the greatest speeds of the same parts and of the
+            root's rise or fall, heights/s, and of the root's acceleration, heights/s^2 [6, J + 4].
+        lulls: resting speeds of the corpus's N postures, in usual mean joint speeds [N].
         law: level, slope, pull and spread of the logarithm of durations [4].
     """
 
@@ -144,35 +144,34 @@ class Pace:
 
     @property
     def spread(self) -> float:
-        """Standard deviation of the logarithm of a movement's duration, given its way."""
+        """Standard deviation of the logarithm of a movement's duration, given its displacement."""
         return float(self.law[3])
 
     def expected(self, way: Way, lulls: tuple[Floats, Floats]) -> Floats:
-        """Return the median duration of movements of such ways [...], seconds, between such lulls [...]."""
+        """Return the median duration, seconds, of movements with given displacements and resting speeds [...]."""
         level, slope, pull, _ = self.law
         return np.asarray(np.exp(level + slope * _effort(way, self.usual) + pull * _quickness(*lulls)))
 
     def peaks_in(self, seconds: float, pace: float = 1.0) -> Floats:
-        """Return the peaks of windows so long [J + 4], of movement at so many times the corpus's pace."""
+        """Return the peaks in windows of a duration [J + 4], for movement at a multiple of the corpus's pace."""
         peaks = pace * np.array([np.interp(pace * seconds, LENGTHS, part) for part in self.peaks.T])
-        peaks[-1] *= pace  # accelerations grow by the square
+        peaks[-1] *= pace  # accelerations scale with its square
         return peaks
 
     def lulls_of(self, postures: Floats, shown: Floats) -> Floats:
-        """Return the lulls of postures [n]: means of those of the corpus's postures that are most like each.
+        """Return the resting speeds of postures [n]: means over the corpus's most similar postures.
 
         Args:
-            postures: orientations of their joints [n, J, 4], as `motionmind.corpus.corpus.Corpus.to_chains` gives them.
-            shown: those of the corpus's postures, in the same way [N, J, 4].
+            postures: orientations of their joints [n, J, 4], from `motionmind.corpus.corpus.Corpus.to_chains`.
+            shown: orientations of the corpus's postures [N, J, 4].
         """
-        # The sum of squared cosines of half the angles. What is equal but for rounding is taken by number, on any
-        # machine.
+        # Similarity is the sum of squared cosines of half the angles. Ties, up to rounding, go by index on any machine.
         alike = (np.sum(np.einsum("njc,jc->nj", shown, one) ** 2, axis=1) for one in postures)
         order = (np.argsort(-np.round(one, 9), kind="stable") for one in alike)
         return np.array([self.lull_of(near[:ALIKE]) for near in order])
 
     def lull_of(self, numbers: Ints) -> float:
-        """Return the mean lull of some of the corpus's postures, by number [n]."""
+        """Return the mean resting speed of some of the corpus's postures, given by index [n]."""
         return float(np.exp(np.log(STILL + self.lulls[numbers]).mean()) - STILL)
 
 
@@ -182,11 +181,11 @@ def learn_pace(corpus: Corpus) -> Pace:
 
 
 def measure_pace(kept: Kept, before: Gauge | None = None, workshop: Workshop | None = None) -> Gauge:
-    """Return what the clips of a corpus show of their pace.
+    """Measure the pace of a corpus's clips.
 
     Args:
-        kept: the corpus, and which of its clips are new: these alone are measured.
-        before: what the clips of the earlier corpus show; None if there is none.
+        kept: the corpus, and which of its clips are new: only these are measured.
+        before: gauge of the earlier corpus; None if there is none.
         workshop: room for large arrays; None for memory.
     """
     workshop = workshop or Workshop()
@@ -207,7 +206,7 @@ def _measure(corpus: Corpus, workshop: Workshop) -> Gauge:
 
 
 def _show(corpus: Corpus, clip: Clip) -> tuple[Singles, Floats, Floats]:
-    """Return what a clip shows of its pace: steps, still moments and windows, as in Gauge; a single frame, none."""
+    """Return a clip's steps, resting frames and windows, as in Gauge; all empty for a single frame."""
     recording = Sampled(corpus, clip, FPS)
     if len(recording) < 2:
         return np.zeros((0, len(corpus.skeleton) + 6), np.float32), np.zeros((0, 2)), np.zeros((0, 6))
@@ -219,7 +218,7 @@ def _show(corpus: Corpus, clip: Clip) -> tuple[Singles, Floats, Floats]:
 
 
 def refit_pace(corpus: Corpus, gauge: Gauge) -> Pace:
-    """Return the pace of a corpus, given what its clips show."""
+    """Compute the pace of a corpus from the gauge of its clips."""
     joints = len(corpus.skeleton)
     counts = np.diff(gauge.starts[:, 0])
     shown = [(number, clip) for number, clip in enumerate(corpus.clips) if counts[number]]
@@ -233,7 +232,7 @@ def refit_pace(corpus: Corpus, gauge: Gauge) -> Pace:
     for (number, _), some in zip(shown, stretches, strict=True):
         steps = gauge.steps[gauge.starts[number, 0] : gauge.starts[number + 1, 0]].astype(np.float64)
         speeds, moved = FPS * steps[:, :-3], steps[:, -3:]
-        # Row after row, so that it does not matter how many clips there are.
+        # Summed in row order, so that the split into clips does not affect rounding.
         total = np.concatenate([total, _usual_parts(speeds, joints)]).sum(axis=0, keepdims=True)
         most = np.maximum(most, np.append(speeds.max(axis=0), accelerations(moved, FPS).max(initial=0.0)))
         rare.add(speeds[:, :-1])
@@ -246,7 +245,7 @@ def refit_pace(corpus: Corpus, gauge: Gauge) -> Pace:
         usual = np.maximum(total[0] / counts.sum(), usual)
         of_joints = rare.value()
         median = float(np.median(of_joints[:joints]))
-        least = OF_MEDIAN * median if median > SLOWEST_USUAL[0] else EVERYDAY[0]  # at rest there is noise
+        least = OF_MEDIAN * median if median > SLOWEST_USUAL[0] else EVERYDAY[0]  # speeds at rest are noise
         fastest = np.maximum(of_joints, [*[least] * joints, *EVERYDAY[1:]])
         greatest = np.maximum(most, np.append(fastest, [EVERYDAY[2], STARTS]))
         slowest = seconds.value()
@@ -260,54 +259,54 @@ def refit_pace(corpus: Corpus, gauge: Gauge) -> Pace:
 
 
 def _usual_parts(speeds: Floats, joints: int) -> Floats:
-    """Return the speeds of the mean joint, of the body's turning and of its travel [T, 3], from those of all parts."""
+    """Reduce the speeds of all parts to mean joint speed, turning rate and travel speed [T, 3]."""
     return np.column_stack([speeds[:, :joints].mean(axis=1), speeds[:, joints], speeds[:, joints + 1]])
 
 
 def steps_of(motion: Motion) -> Floats:
-    """Return all parts of the ways from each frame to the next, and how far the root rises or falls [T - 1, J + 3]."""
+    """Return the parts of each frame's displacement to the next, and the root's rise or fall [T - 1, J + 3]."""
     height = motion.skeleton.height if motion.skeleton.height > 0.0 else 1.0
     return np.column_stack([way_of(motion).parts, np.abs(np.diff(motion.root[:, 1])) / height])
 
 
 def moved_in(motion: Motion) -> Floats:
-    """Return the displacements of the root from each frame to the next [T - 1, 3], heights."""
+    """Return the root's displacements from each frame to the next [T - 1, 3], body heights."""
     height = motion.skeleton.height if motion.skeleton.height > 0.0 else 1.0
     return np.diff(motion.root, axis=0) / height
 
 
 def _danced(clip: Sampled) -> Ints:
-    """Return the stretches of a clip's steps of which nothing was reconstructed, from and to a step [n, 2]."""
+    """Return the stretches of a clip's steps without reconstructed movement, as ranges of steps [n, 2]."""
     known = np.zeros(len(clip) + 1, dtype=np.bool_)
     known[1:-1] = clip.danced(clip.times)
     return np.flatnonzero(np.diff(known)).reshape(-1, 2)
 
 
 def over_seconds(speeds: Floats, fps: float) -> Floats:
-    """Return the means of speeds [T] over every second of them, or over all of them if they are fewer."""
+    """Return the means of speeds [T] over each window of a second, or over all if there is less."""
     return np.asarray(np.lib.stride_tricks.sliding_window_view(speeds, min(round(fps), len(speeds))).mean(axis=1))
 
 
 def _effort(way: Way, usual: Floats) -> Floats:
-    """Return the logarithm of the seconds that ways take at usual speeds [...]."""
+    """Return the logarithm of displacements in seconds at usual speeds, plus BEGINS [...]."""
     joints, turn, travel = way.joints.mean(axis=-1) / usual[0], way.turn / usual[1], way.travel / usual[2]
     return np.asarray(np.log(BEGINS + joints + np.hypot(travel, 0.5 * turn)))
 
 
 def _quickness(first: Floats, last: Floats) -> Floats:
-    """Return the mean logarithm of the lulls [...] of the ends of ways [...]."""
+    """Return the mean logarithm of the resting speeds at both ends, each plus STILL [...]."""
     return np.asarray(0.5 * (np.log(STILL + first) + np.log(STILL + last)))
 
 
 def _windows(clip: Sampled, still: Ints, speeds: Floats) -> Floats:
-    """Return the windows between a clip's still moments, as of `_Shown` [W, 6].
+    """Return the windows between a clip's resting frames, as in Gauge [W, 6].
 
-    What was reconstructed in a recording nobody danced: no window leads over it.
+    No window spans reconstructed movement, which nobody danced.
 
     Args:
-        clip: at FPS frames a second.
-        still: its still moments, frames in order [S].
-        speeds: of the mean joint in them [S], rad/s.
+        clip: at FPS frames per second.
+        still: its resting frames, in order [S].
+        speeds: mean joint speed in them [S], rad/s.
     """
     rotations, root = clip.take(still)
     stops = np.searchsorted(still, still + LONGEST * FPS, side="right")
@@ -332,15 +331,15 @@ def _windows(clip: Sampled, still: Ints, speeds: Floats) -> Floats:
 
 
 def _fit_windows(windows: Floats, usual: Floats) -> Floats:
-    """Return the law [4] of windows [W, 6] (see `_Shown`) at usual speeds (see `Pace`)."""
+    """Fit the law [4] to windows [W, 6] (see `Gauge`), given usual speeds (see `Pace`)."""
     joints, turn, travel, first, last, seconds = windows.T
     efforts = _effort(Way(joints[:, None], turn, travel), usual)
     return _fit(efforts, _quickness(first / usual[0], last / usual[0]), np.log(seconds))
 
 
 def _lulls(steps: Floats) -> tuple[Ints, Floats]:
-    """Return a clip's still moments, frames in order [S], and the speeds of the mean joint in them [S], rad/s; the
-    first frame, with the clip's mean speed, where there are none.
+    """Return a clip's resting frames, in order [S], and the mean joint speed in them [S], rad/s; without any, the first
+    frame and the clip's mean speed.
 
     Args:
         steps: angle that the mean joint turns by from each frame to the next [T - 1], at FPS frames a second.
@@ -352,14 +351,13 @@ def _lulls(steps: Floats) -> tuple[Ints, Floats]:
 
 
 def find_still(steps: Floats) -> Ints:
-    """Return the frames in which a body is stiller than before and after: minima of its speed, smoothed.
+    """Return the resting frames: local minima of the smoothed mean joint speed.
 
     Args:
         steps: angle that the mean joint turns by from each frame to the next [T - 1], at FPS frames a second.
     """
-    # Keyframed joints turn evenly: their speeds are equal but for rounding, on any machine. A level stretch of them is
-    # still once, in its middle. SciPy's `find_peaks` finds the same, upside down; its import takes longer than learning
-    # a few clips.
+    # Keyframed joints turn evenly, at speeds equal up to rounding. A flat minimum yields one frame, its middle. SciPy's
+    # `find_peaks` finds the same in negated speeds, but its import takes longer than learning a few clips.
     speeds = np.round(_smooth(steps), 9)
     starts = np.flatnonzero(np.diff(speeds, prepend=np.inf))
     ends = np.append(starts[1:], len(speeds)) - 1
@@ -368,7 +366,7 @@ def find_still(steps: Floats) -> Ints:
 
 
 def _smooth(steps: Floats) -> Floats:
-    """Return the means of steps [T - 1] over SMOOTHED seconds about each frame; none of a clip that is shorter."""
+    """Smooth steps [T - 1] over SMOOTHED seconds about each frame; empty for a clip that is shorter."""
     window = np.hanning(round(SMOOTHED * FPS) + 2)[1:-1]
     if len(steps) < len(window):
         return np.zeros(0)
@@ -376,11 +374,11 @@ def _smooth(steps: Floats) -> Floats:
 
 
 def _fit(efforts: Floats, quickness: Floats, logs: Floats) -> Floats:
-    """Return level, slope, pull and spread [4] of the logarithms of durations [n].
+    """Fit level, slope, pull and spread [4] to the logarithms of durations [n].
 
     Args:
-        efforts: logarithms of the ways' seconds at usual speeds [n].
-        quickness: mean logarithms of the lulls of their ends [n].
+        efforts: logarithms of displacements in seconds at usual speeds [n].
+        quickness: mean logarithms of the resting speeds at both ends [n].
         logs: logarithms of the durations [n].
     """
     given = np.stack([efforts, quickness], axis=1)
@@ -388,7 +386,7 @@ def _fit(efforts: Floats, quickness: Floats, logs: Floats) -> Floats:
     prior = np.array([SLOPE, PULL])
     middle = (logs.sum() + AS_MANY * (LEVEL + prior @ mean)) / (len(logs) + AS_MANY)  # of the logs at the mean
     off = given - mean
-    # As if AS_MANY windows lay along the prior's plane, a standard deviation of the logs of 1 apart either way.
+    # The prior acts as AS_MANY windows on its plane, with a standard deviation of 1 in both regressors.
     products, sums = off.T @ off + AS_MANY * np.eye(2), off.T @ logs + AS_MANY * prior
     pull = float(np.clip(np.linalg.solve(products, sums)[1], *PULLS))
     slope = float(np.clip((sums[0] - products[0, 1] * pull) / products[0, 0], *SLOPES))

@@ -1,17 +1,17 @@
-"""The most that a corpus's own movement shows a viewer, beside which other movement is plausible or not.
+"""Limits of plausible movement, learned from a corpus.
 
-To the measures of `motionmind.body.plausibility` come two:
+Two measures extend those of `motionmind.body.plausibility`:
 
-- `pace`: how many times as fast as its fastest the fastest of all joints, the body's turning and its travel is, where
-  fastest is what that part exceeds in one of a hundred frames of the corpus (`motionmind.learned.pace`);
-- `sliding`: the share of a second in which some foot near the floor moves further, from frame to frame, than a foot
-  that stands (`motionmind.body.contact.skating`), of bodies as tall as people, with feet.
+- `pace`: the greatest ratio of speed to fastest speed over all joints, the body's turn and its travel, where the
+  fastest speed of a part is its 99th percentile over the corpus's frames (`motionmind.learned.pace`);
+- `sliding`: the share of a second in which a foot near the floor moves farther between frames than a stance foot
+  (`motionmind.body.contact.skating`), for bodies of human height with feet.
 
-The limit of each is the 99.5th percentile, over all stretches of a second of the corpus's clips, of the greatest that
-each shows. Shorter clips are a stretch each.
+The limit of each measure is the 99.5th percentile, over all one-second stretches of the corpus's clips, of its greatest
+value in a stretch. A shorter clip is one stretch.
 
-How fast feet are near the floor is no measure, but what tweens keep to: as fast as in all but a twentieth of these
-stretches. A few kicks are much faster in every corpus, and steps as fast as those are not how it walks.
+The speed of feet near the floor is not a measure but a limit for tweens: the 95th percentile over the same stretches. A
+few kicks are much faster in every corpus, but its steps are not.
 """
 
 from __future__ import annotations
@@ -42,23 +42,23 @@ ABOUT = {  # the unit of each, and what it is
 }
 STRETCH = 1.0  # seconds
 BEYOND = 99.5  # percentile of the corpus's own stretches
-SELDOM = 95.0  # the same, of the speed of feet near the floor
-EVERYDAY = 1.5  # heights/s, than which that is not less: somebody who walks slowly has feet as fast
-# What counts for nothing, whatever the corpus: metres, m/s^2, shares of gravity, metres, times as fast, and a share.
+SELDOM = 95.0  # percentile for the speed of feet near the floor
+EVERYDAY = 1.5  # least limit of that speed, heights/s: feet reach it in slow walking
+# Negligible values in any corpus: metres, m/s^2, share of gravity, metres, ratio of speeds, share.
 TRIFLES = np.array([0.02, 1.0, 0.2, 0.01, 1.0, 0.2])
-_MOST = 40_000  # frames of a corpus that are measured, about
+_MOST = 40_000  # approximate number of frames to measure
 _PIECE = BLOCK // 32  # frames of each piece of a corpus that has more
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """The most that a movement shows a viewer of something, beside a corpus.
+    """A movement's greatest value of a plausibility measure, and the corpus's limit.
 
     Attributes:
-        value: the most; None where the measure does not apply to the movement.
-        most: what stretches of a second of the corpus show at most; None where it tells nothing.
+        value: the greatest value; None where the measure does not apply to the movement.
+        most: the limit from one-second stretches of the corpus; None where the corpus sets none.
         unit: the unit of both; "" for shares and ratios.
-        part: the part of the body that shows it, where it is one part: a joint, "facing" or "travel"; else "".
+        part: the body part with the greatest value, if it is one part: a joint, "facing" or "travel"; else "".
 
     >>> from motionmind import Sighting
     >>> Sighting(31.0, 18.5, "m/s^2").is_beyond
@@ -72,7 +72,7 @@ class Sighting:
 
     @property
     def is_beyond(self) -> bool:
-        """Whether the movement shows more than the corpus does."""
+        """Whether the movement exceeds the corpus's limit."""
         return self.value is not None and self.most is not None and self.value > self.most
 
 
@@ -81,10 +81,10 @@ class Plausibility:
     """The limits of a corpus with J joints.
 
     Attributes:
-        fastest: fastest speeds of the joints, rad/s, of the body's turning and of its travel, heights/s [J + 2].
-        most: what its stretches show at most, in the order of `MEASURES` [M]; NaN where the corpus never shows it.
-        slides: speed of a foot near the floor that they seldom exceed, heights/s [1]; NaN of bodies without feet, and
-            of corpora that were built before it was learned.
+        fastest: fastest speeds of the joints, rad/s, of the body's turn, rad/s, and of its travel, heights/s [J + 2].
+        most: limits in the order of `MEASURES` [M]; NaN where a measure never applies in the corpus.
+        slides: limit on the speed of a foot near the floor, heights/s [1]; NaN for bodies without feet, and in corpora
+            of earlier versions.
     """
 
     fastest: Floats
@@ -92,7 +92,7 @@ class Plausibility:
     slides: Floats
 
     def shown(self, motion: Motion) -> dict[str, Sighting]:
-        """Return what a movement on the corpus's joints shows a viewer, by the names of the measures."""
+        """Measure a movement on the corpus's joints; return a `Sighting` for each measure, by name."""
         values, part = _summarise(motion, self.fastest, None)
         most = np.maximum(self.most, TRIFLES)  # NaN stays NaN
         return {
@@ -118,14 +118,14 @@ def learn_plausibility(corpus: Corpus, fastest: Floats) -> Plausibility:
 
 
 def summarise_shown(motion: Motion, fastest: Floats, floor: float) -> Floats:
-    """Return the most that a movement shows of each of `MEASURES` [M], above a floor at a height in metres."""
+    """Return a movement's greatest value of each of `MEASURES` [M], above a floor at a height in metres."""
     return _summarise(motion, fastest, floor)[0]
 
 
 def _summarise(motion: Motion, fastest: Floats, floor: float | None) -> tuple[Floats, str]:
-    """Return the most that a movement shows of each of `MEASURES` [M], and the name of its fastest part.
+    """Return a movement's greatest value of each of `MEASURES` [M], and the name of its fastest part.
 
-    The floor's height is in metres; None stands for 0, or lower where the body is.
+    The floor's height is in metres; None means 0, or lower if the body is lower.
     """
     sampled = at_rate(motion)
     if floor is None:
@@ -140,13 +140,13 @@ def _or_none(value: float) -> float | None:
 
 
 class _Shown(NamedTuple):
-    """Movement of T frames as it is seen, at 30 a second.
+    """Measures of a movement of T frames, at 30 per second.
 
     Attributes:
-        frames: in each frame [T, M].
-        speeds: how many times as fast as its fastest each part is between frames [T - 1, J + 2].
-        slides: the speed of the fastest foot near the floor up to each frame [T], heights/s; NaN of bodies that have no
-            feet or are small.
+        frames: the measures in each frame [T, M].
+        speeds: ratio of each part's speed between frames to its fastest speed [T - 1, J + 2].
+        slides: speed of the fastest foot near the floor up to each frame [T], heights/s; NaN for small bodies and those
+            without feet.
     """
 
     frames: Floats
@@ -155,7 +155,7 @@ class _Shown(NamedTuple):
 
 
 def _show(sampled: Motion, fastest: Floats, floor: float) -> _Shown:
-    """Return what movement shows above a floor at a height in metres, at 30 frames a second."""
+    """Measure movement at 30 frames per second, above a floor at a height in metres."""
     frames = implausibility(sampled.skeleton, sampled.rotations, sampled.root, RATE, floor)
     pace = np.full((len(sampled), 1), np.nan)
     speeds = RATE * way_of(sampled).parts / fastest
@@ -165,9 +165,9 @@ def _show(sampled: Motion, fastest: Floats, floor: float) -> _Shown:
 
 
 def _sliding(motion: Motion, floor: float) -> tuple[Floats, Floats]:
-    """Return the share of the second up to each frame in which a foot slides, and how fast one does (see `_Shown`) [T].
+    """Return the share of the second up to each frame in which a foot slides, and the speed (see `_Shown`) [T].
 
-    What comes before the movement does not slide.
+    Time before the movement counts as not sliding.
     """
     body = motion.skeleton
     if body.height < TALL or not find_feet(body):
@@ -179,10 +179,10 @@ def _sliding(motion: Motion, floor: float) -> tuple[Floats, Floats]:
 
 
 def _frames_of(corpus: Corpus, fastest: Floats) -> Iterator[Floats]:
-    """Yield what clips of a corpus show in each frame, and how fast feet are there, infinitely where nobody knows, for
-    it was reconstructed [T, M + 1].
+    """Yield the measures in each frame of a corpus's clips, and the speed of feet, infinite in reconstructed movement
+    [T, M + 1].
 
-    Of very long clips they are evenly spread pieces, _MOST frames in all.
+    A corpus with more than about _MOST frames is measured in evenly spread pieces, with about _MOST frames in all.
     """
     seconds = sum(corpus.times[clip.stop - 1] - corpus.times[clip.start] for clip in corpus.clips)
     every = int(np.ceil(RATE * seconds / _MOST))
@@ -193,7 +193,7 @@ def _frames_of(corpus: Corpus, fastest: Floats) -> Iterator[Floats]:
         many = -(-len(recording) // size)
         chosen = range(-pieces % every, many, every) if every > 1 else range(many)
         pieces += many
-        if len(chosen):  # else its floor is of no use, which takes all of its frames to find
+        if len(chosen):  # else skip the floor, which takes all frames to find
             kept, floor = _pieces_of(recording, size, chosen)
             for piece in kept:
                 shown, danced = _show(piece, fastest, floor), recording.danced(piece.times)
@@ -202,7 +202,7 @@ def _frames_of(corpus: Corpus, fastest: Floats) -> Iterator[Floats]:
 
 
 def _pieces_of(recording: Sampled, size: int, chosen: range) -> tuple[list[Motion], float]:
-    """Return pieces of a clip of so many frames, by number, and the height of its floor, metres."""
+    """Return the `chosen` pieces of a clip, cut every `size` frames, and the height of its floor, metres."""
     lowest: list[Floats] = []
     kept: list[Motion] = []
     numbers = count()
@@ -214,7 +214,7 @@ def _pieces_of(recording: Sampled, size: int, chosen: range) -> tuple[list[Motio
 
 
 def _greatest_of_stretches(values: Floats) -> Floats:
-    """Return the greatest of each column [T, M] in each stretch [stretches, M]; minus infinity where all are NaN."""
+    """Return the maximum of each column [T, M] in each stretch [stretches, M]; minus infinity if all are NaN."""
     known = np.where(np.isnan(values), -np.inf, values)
     windows = np.lib.stride_tricks.sliding_window_view(known, min(round(STRETCH * RATE), len(known)), axis=0)
     return np.asarray(windows.max(axis=-1))
