@@ -15,7 +15,7 @@ from motionmind.display import displayed
 from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.geometry import rotations as rot
 
-# Two orientations that turn into each other by less than this many radians are one state.
+# Orientations less than this many radians apart are one state.
 SAME = 1e-5
 # Cosines of half angles that differ by less than this are a tie. BLAS adds in an order of its own, and a score's
 # angles often lie exactly midway between two states: without a margin the last bit would decide. The margin is far
@@ -38,9 +38,9 @@ class StateSpace:
         centres: unit quaternions x, y, z, w [S_0 + ... + S_(J-1), 4], canonical sign, joint after joint.
         starts: index of each joint's first state in `centres` [J + 1]; the last entry is the number of states.
         kind: the kind of discretization that made them, such as "codebook".
-        tolerances: degrees [J] within which a state stands for an orientation. All kinds but the expert library
-            keep every orientation that they were fitted to within it; in an expert library, orientations further off
-            are not in the vocabulary.
+        tolerances: greatest angle between an orientation and its state's centre [J], degrees. All kinds but the expert
+            library keep every orientation that they were fitted to within it; in an expert library, orientations
+            farther off are not in the vocabulary.
         labels: names of the states [S_j] of each joint [J]; empty for a joint whose states have no names.
     """
 
@@ -112,7 +112,7 @@ class StateSpace:
 
     @classmethod
     def joined(cls, spaces: Sequence[StateSpace]) -> StateSpace:
-        """Make one state space of some, one at least, of one kind and on different joints, in their order."""
+        """Concatenate one or more state spaces of the same kind, on different joints."""
         starts = np.concatenate([[0], np.cumsum(np.concatenate([space.sizes for space in spaces]))])
         return cls(
             tuple(name for space in spaces for name in space.names),
@@ -142,7 +142,7 @@ class StateSpace:
         return len(self.names)
 
     def index(self, joint: str) -> int:
-        """Return the index of the joint called `joint`; SkeletonError, which says which there are, if none is."""
+        """Return the index of the joint called `joint`; a SkeletonError lists the joints if there is none."""
         if joint not in self.names:
             raise SkeletonError(f"no joint {joint!r} among the states{suggest_joint(joint, self.names)}")
         return self.names.index(joint)
@@ -160,7 +160,7 @@ class StateSpace:
         return self.labels[j][state] if self.labels[j] else f"state {state}"
 
     def assign(self, rotations: Floats) -> States:
-        """Return the nearest state [N, J] of every orientation in `rotations` [N, J, 4]; of ties the lowest index.
+        """Return the nearest state [N, J] of every orientation [N, J, 4]; ties go to the lowest index.
 
         Raises:
             MotionMindError: the shape is wrong, or a quaternion is not a unit quaternion.
@@ -198,7 +198,7 @@ class StateSpace:
 
 
 def nearest(rotations: Floats, centres: Floats, *, block: int = _BLOCK) -> tuple[States, Floats]:
-    """Find the nearest state of each orientation of one joint; of ties the lowest index.
+    """Find the nearest state of each orientation of one joint; ties go to the lowest index.
 
     The angle between unit quaternions a and b is 2 acos |a . b|, so the nearest centre has the largest |a . b|, which
     also makes q and -q the same.
@@ -206,7 +206,7 @@ def nearest(rotations: Floats, centres: Floats, *, block: int = _BLOCK) -> tuple
     Args:
         rotations: orientations of the joint [N, 4].
         centres: orientations of its states [S, 4].
-        block: number of products that are held in memory at a time.
+        block: number of products held in memory at a time.
 
     Returns:
         The index of the nearest state [N], and the cosine of half the angle to it [N].

@@ -47,7 +47,7 @@ class Transitions:
     arrives: Int32s
     seconds: Floats
 
-    # What each tween asks for is kept: it takes time in proportion to all transitions.
+    # Cached for all tweens: it takes time in proportion to all transitions.
 
     @cached_property
     def sources(self) -> Ints:
@@ -62,12 +62,12 @@ class Transitions:
 
     @cached_property
     def _keys(self) -> Ints:
-        """A number for each transition that rises with its row, and with its target in each row [E]."""
+        """A key for each transition, increasing with its row and, within a row, with its target [E]."""
         return np.asarray(self.sources * self._width + self.targets)
 
     @property
     def _width(self) -> int:
-        """More than the number of states in any chain."""
+        """A number greater than that of the states in any chain."""
         return int(self.sizes().max()) + 1
 
     def graph(self, chain: int) -> nx.DiGraph:
@@ -169,15 +169,15 @@ def count_transitions(
     Args:
         states: state of each chain in each posture [N, L].
         sizes: number of states in each chain [L].
-        begins: the posture that each move leads from, within one clip [M]; of the moves that attest a transition the
-            first in this order is kept.
+        begins: the posture that each move leads from, within one clip [M]; the first move in this order that attests a
+            transition is kept.
         seconds: duration of each move [M].
         pooled: a chain whose states are equal steps of a circle. Its transitions are counted by the number of steps
-            that they turn, whatever state they leave, and hold from every state alike.
+            that they turn, and apply from every state.
         ends: the posture that each move leads to [M]; None for the next one.
         weights: weight of each move [M]; None for 1.
         posture_weights: weight of each posture [N]; None for 1.
-        team: threads, for which each chain is a job; None for this one.
+        team: threads, one job per chain; None for the current thread.
     """
     ends = begins + 1 if ends is None else ends
     weights = np.ones(len(begins)) if weights is None else weights
@@ -251,7 +251,7 @@ def _count(
 
 
 def _pool(turns: _Counted, size: int) -> _Counted:
-    """Let every state of a circle of `size` states make the turns that were counted as transitions from state 0."""
+    """Copy the transitions from state 0 of a circle of `size` states to every state."""
     targets = (np.arange(size)[:, None] + turns.targets[None, :]) % size
     order = np.argsort(targets, axis=1)
     return _Counted(

@@ -1,7 +1,7 @@
-"""Keeping on disk what was learned from a corpus, and finding it again.
+"""Saving and loading of learned corpora.
 
-A built corpus is a folder of arrays with a manifest (`motionmind.corpus.store`). What is learned from a corpus that
-people wrote, a bundled one above all, is kept in a cache, under a name that is a fingerprint of all that it depends on.
+A built corpus is a folder of arrays with a manifest (`motionmind.corpus.store`). The result of learning from a
+hand-written corpus, such as a bundled one, is cached under a fingerprint of everything that it depends on.
 """
 
 from __future__ import annotations
@@ -77,11 +77,11 @@ _PARTS = {
 
 
 def save(learned: Learned, folder: str | os.PathLike[str]) -> None:
-    """Write all that was learned to a folder, whole or not at all.
+    """Write a learned corpus to a folder, atomically.
 
     Args:
-        learned: what to write.
-        folder: where; a built corpus that is there is replaced.
+        learned: the learned corpus.
+        folder: the destination; a built corpus there is replaced.
 
     Raises:
         CorpusError: the folder cannot be written, or holds anything but a built corpus.
@@ -99,15 +99,15 @@ def save(learned: Learned, folder: str | os.PathLike[str]) -> None:
 
 
 def save_movement(learned: Learned, folder: str | os.PathLike[str]) -> None:
-    """Write a corpus's movement and its states alone, as `save`: `load_movement` learns all else from them again."""
+    """Write only a corpus's movement and states, as `save` does; `load_movement` learns the rest again."""
     store.save(Path(folder), _manifest(learned), _movement(learned))
 
 
 def load_movement(folder: str | os.PathLike[str]) -> Learned:
-    """Load the movement and the states of a built corpus, and learn all else from them.
+    """Load the movement and the states of a built corpus, and learn the rest from them.
 
     Args:
-        folder: as `save` or `save_movement` wrote it, in this version or an earlier one.
+        folder: written by `save` or `save_movement`, in this version or an earlier one.
 
     Raises:
         FormatError: it cannot be read, or is not valid.
@@ -116,7 +116,7 @@ def load_movement(folder: str | os.PathLike[str]) -> Learned:
 
 
 def _movement(learned: Learned) -> dict[str, NDArray[Any]]:
-    """Return the arrays from which all that was learned can be learned again, by name."""
+    """Return the arrays from which everything else can be learned again, by name."""
     corpus = learned.corpus
     clips, faults = Packed.of(map(_clip_entry, corpus.clips)), Packed.of(corpus.faults)
     entries = {"clips": {**clips._asdict(), **corpus.columns._asdict()}, "faults": faults._asdict()}
@@ -159,7 +159,7 @@ def _manifest(learned: Learned) -> dict[str, Any]:
 
 
 def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:
-    """Load what was learned from a corpus; a bundled corpus is learned on first use and kept in the cache.
+    """Load a learned corpus; a bundled corpus is learned on first use and cached.
 
     Args:
         name: of the corpus, or its folder.
@@ -174,7 +174,7 @@ def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:
     if stored.is_current:
         return _open(folder, stored)
     if stored.manifest["format"] == store.BUILT:
-        # Of what an earlier version kept, the movement and its states are taken; all else is learned again.
+        # From a corpus of an earlier version, only the movement and its states are loaded; the rest is learned again.
         files = [folder / store.MANIFEST, *stored.files]
         return _kept(folder, files, lambda: learn_from_states(*_read_movement(folder, stored)))
     source = parse_manifest(stored.manifest, SourceManifest, folder / store.MANIFEST)
@@ -182,19 +182,19 @@ def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:
 
 
 def _kept(folder: Path, files: Iterable[Path], learn_it: Callable[[], Learned]) -> Learned:
-    """Return what is learned from a corpus of these files: from the cache, or else learned and kept there."""
+    """Return the learned corpus of these files from the cache; if missing, learn and cache it."""
     built = store.cache() / f"{folder.name}-{fingerprint(files)}"
     try:
         return _open(built, store.load(built))
-    except MotionMindError:  # it is not there yet, or is damaged
+    except MotionMindError:  # not cached yet, or damaged
         learned = learn_it()
-    with suppress(MotionMindError):  # nowhere to keep it: it is learned again next time
+    with suppress(MotionMindError):  # the cache is not writable: learn again next time
         save(learned, built)
     return learned
 
 
 def _open(folder: Path, stored: store.Stored) -> Learned:
-    """Return what was learned, of what a folder holds; FormatError if something lacks or is not valid."""
+    """Build the learned corpus from a folder's contents; FormatError if something is missing or not valid."""
     arrays: Mapping[str, NDArray[Any]] = stored.arrays
     if not stored.measures_feet:
         arrays = {**arrays, "plausibility.slides": np.array([np.nan])}
@@ -303,7 +303,7 @@ def _packed(name: str, arrays: Mapping[str, NDArray[Any]]) -> Packed:
 
 
 def _part(kind: type[_Part], name: str, arrays: Mapping[str, NDArray[Any]]) -> _Part:
-    """Return a part of what was learned from its arrays, which are named after its fields."""
+    """Build a part of a learned corpus from its arrays, which are named after its fields."""
     values: dict[str, Any] = {key: arrays[f"{name}.{key}"] for key in _array_names(kind)}
     return kind(**values)
 
@@ -314,7 +314,7 @@ def _array_names(kind: type[_Part]) -> list[str]:
 
 
 def _trees(arrays: Mapping[str, NDArray[Any]], skeleton: Skeleton) -> Neighbours | None:
-    """Return the trees over a corpus's moments; None where it has none."""
+    """Return the trees over a corpus's samples; None if it has none."""
     own = {name.partition(".")[2]: array for name, array in arrays.items() if name in TREES}
     if own:
         own.setdefault("codes", np.zeros(0, np.int8))
@@ -322,14 +322,14 @@ def _trees(arrays: Mapping[str, NDArray[Any]], skeleton: Skeleton) -> Neighbours
 
 
 def _trust(arrays: Mapping[str, NDArray[Any]], corpus: Corpus, carriage: Carriage) -> Trust:
-    """Return how far a corpus's walks are to be trusted; the prior if an earlier version learned."""
+    """Return the trust in a corpus's walks; the prior for a corpus of an earlier version."""
     if arrays.keys() >= TRUST.keys():
         return _part(Trust, "trust", arrays)
     return replace(PRIOR, spread=spread_of(corpus, carriage))
 
 
 def _clip_entry(clip: Clip) -> dict[str, Any]:
-    """Return a clip's entry, without values at their defaults: there may be thousands of clips."""
+    """Return a clip's manifest entry without default values: there may be thousands of clips."""
     values = {field.name: (getattr(clip, field.name), field.default) for field in fields(clip)}
     return {name: value for name, (value, default) in values.items() if value != default}
 
@@ -338,7 +338,7 @@ def _clip_entry(clip: Clip) -> dict[str, Any]:
 
 
 def _learned_files(folder: Path, manifest: SourceManifest) -> list[Path]:
-    """Return all files that a corpus which people wrote is learned from."""
+    """Return all source files of a hand-written corpus."""
     library = manifest.discretization.get("library")
     return [
         folder / store.MANIFEST,
@@ -349,8 +349,8 @@ def _learned_files(folder: Path, manifest: SourceManifest) -> list[Path]:
 
 
 def _read_source(folder: Path, manifest: SourceManifest) -> tuple[Corpus, Discretization]:
-    """Read a corpus that people wrote: its movement, and the discretization that its manifest names."""
-    # Imported here, for a corpus that is already built takes no scores.
+    """Read a hand-written corpus: its movement, and the discretization that its manifest names."""
+    # Imported here, since a built corpus needs no scores.
     from motionmind.notation.compose import motions
     from motionmind.notation.read import read_scores
 
