@@ -182,7 +182,8 @@ def _remedies(
 def _mirrored(grammar: Grammar, corpus: Corpus, space: StateSpace, chain: int) -> csr_array | None:
     """Mirror the moves of a chain's partner onto the chain's own states.
 
-    Return None if the body has no mirror image, or the chain's image is more than its partner's reflection."""
+    Return None if the body has no mirror image, or the chain's image is more than its partner's reflection.
+    """
     graph = grammar.transitions
     if grammar.chains[chain] == FACING:
         partner, image = chain, space.of(chain) * np.array([-1.0, -1.0, -1.0, 1.0])

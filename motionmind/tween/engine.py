@@ -230,11 +230,11 @@ class Engine(LearnedCorpus):
             raise self._no_path(formulation) from error
 
     def _no_path(self, formulation: Formulation) -> NoPathError:
-        """Return the error that says why a formulated request has no path: its constraints, or the corpus."""
+        """Return the error that explains why a formulated request has no path: its constraints, or the corpus."""
         model, problem = formulation.model, formulation.problem
         if conflicts := find_conflicts(self.grammar.chains, model, problem, formulation.constraints):
             return NoPathError(conflicts, {"restrictions": conflicts})
-        # Imported here, for SciPy's graphs are slow to import.
+        # Imported here because SciPy's graphs are slow to import.
         from motionmind.tween.diagnosis import diagnose
 
         strict = formulation.request.strict
@@ -387,15 +387,15 @@ def _end(
     around: Motion | None,
     body: Skeleton,
 ) -> tuple[Posture, Motion | None]:
-    """Return the posture at an end, which may be given by a name, and the movement on its other side, if known.
+    """Return the posture at an end, given as itself or by name, and the movement on its other side, if known.
 
-    Movement in a file comes as a whole to the `body` of a corpus of people: it shows more than a posture does of which
-    axis is up, and of how a rig's joints are turned.
+    A named file is retargeted as a whole to the `body` of a corpus of people: a movement reveals the up axis and the
+    orientation of a rig's joints better than one posture does.
     """
     check_type(argument, end, Posture, str, wanted="a Posture or the name of one")
     if isinstance(end, Posture):
         return end, around
-    # Imported here, for scores are slow to import, and most postures are no names.
+    # Imported here because scores are slow to import, and most callers give no names.
     from motionmind.names.ends import find_end
 
     is_human = human23().difference(body) is None

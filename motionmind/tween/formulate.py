@@ -40,7 +40,7 @@ from motionmind.walks.passages import Place
 
 _Movement = TypeVar("_Movement", Motion, Posture)
 
-_SAME_POSTURE = 1.0  # degrees: frames that lead up to a posture end in it, but for the rounding of files
+_SAME_POSTURE = 1.0  # degrees: tolerance for the rounding of files, between a posture and the frames that end in it
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,26 +50,26 @@ class Formulation:
     Attributes:
         a: posture A on the corpus's skeleton.
         b: posture B on the corpus's skeleton.
-        leaving: the velocity with which the body leaves A, on the corpus's skeleton; None where it is not given.
-        arriving: the velocity with which the body arrives at B, as `leaving`.
+        leaving: the body's velocity at A, on the corpus's skeleton; None if unknown.
+        arriving: the body's velocity at B, in the same form.
         before: seconds of the movement before A that shows `leaving`; None for none.
         after: seconds of the movement after B that shows `arriving`; None for none.
         through: postures to pass through on the corpus's skeleton, in order.
-        request: what is asked.
+        request: the request.
         snap_degrees: angle between the orientations of A, the postures to pass through and B, and their states
             [2 + K, L].
-        nearest: the corpus's postures nearest to A and B, for a search of whole postures; None for one of joints.
-        constraints: what pins, holds and avoided states allow.
+        nearest: the corpus's postures nearest to A and B, for a search of whole postures; None for a search of joints.
+        constraints: the pins, held joints and states to avoid.
         model: the costs before any constraint.
         problem: the constrained problem over states of joints.
         searched: the problem to search: `problem`, or the same with moves in place of states, where joints coordinate
             by their moves.
         coordination: the network in the costs of `searched`.
         times: the corpus's usual time from each stop to the next [1 + K].
-        usual_moves: how many moves of the corpus's usual length a given duration holds, where that is too few to lead
-            to B, and more are made; None elsewhere.
-        detours: whether what the corpus does before and after such postures fills time that is left over.
-        place: where the passage begins that it is to be danced like; None for any.
+        usual_moves: number of moves of the corpus's usual length in the given duration, if too few to reach B, so that
+            the tween makes more; else None.
+        detours: whether movement that the corpus shows after postures like A and before ones like B fills spare time.
+        place: where the passage to follow begins; None for any passage.
     """
 
     a: Posture
@@ -94,7 +94,7 @@ class Formulation:
 
     @property
     def wished(self) -> Bools:
-        """Which chains the request asks something of, beside the ends and the length, so that it should be seen [L]."""
+        """Whether the request restricts each chain beyond the ends and the length, which the motion should show [L]."""
         request = self.request
         if request.unlike or request.sample or request.novelty or not request.kappa:
             return np.ones(len(self.constrained), dtype=np.bool_)
@@ -102,14 +102,14 @@ class Formulation:
 
     @property
     def constrained(self) -> Bools:
-        """Which chains may not be in all of their states on the way [L]."""
+        """Whether each chain has a state that the constraints forbid between A and B [L]."""
         chains = self.problem.model.starts[:-1]
         allowed = np.logical_and.reduce([constraint.allowed for constraint in self.constraints], axis=0)
         return np.add.reduceat(~np.broadcast_to(allowed, self.problem.model.allowed.shape), chains) > 0
 
     @property
     def stays(self) -> bool:
-        """Whether no move at all is best: A is B to within rounding, does not move, and nothing is asked of the way."""
+        """Whether staying is best: A equals B to within rounding, is at rest, and the request asks nothing between."""
         request, moving = self.request, self.leaving is not None or self.arriving is not None
         return not (request.fixes_length or request.via or request.unlike or moving) and _same(self.a, self.b)
 
@@ -125,10 +125,11 @@ def formulate(
     """Bring the postures onto the corpus's skeleton and states, and build the constrained problem from its grammar.
 
     Raises:
-        SkeletonError: a posture or a movement is on another skeleton than the corpus, or has no such joint.
-        NoPathError: a joint to be held has different states in A and B.
-        MotionMindError: the request does not fit the corpus, such as a duration that is too long for it; the movement
-            before A does not end in A, or the one after B begin in B; or it has one frame, which shows no velocity.
+        SkeletonError: a posture or a movement has another skeleton than the corpus, or lacks a joint.
+        NoPathError: a held joint has different states in A and B.
+        MotionMindError: the request does not suit the corpus, for instance its duration is too long; the movement
+            before A does not end in A, the one after B does not begin in B, or one of them has a single frame, which
+            shows no velocity.
     """
     shortest, longest = _move_range(learned, request)
     rules = Rules(request.beta, request.tau, shortest, longest, request.nodes(len(learned.space)))
@@ -210,13 +211,16 @@ def formulate(
 def _grammar_model(
     grammar: Grammar, weights: Weights, coordination: float, bridge_price: float | None, novelty: float
 ) -> Model:
-    """Return `build_model` of the same arguments: it is kept while one request after another asks for the same."""
+    """Call `build_model`, and cache its result for further requests with the same arguments."""
     return build_model(grammar, weights, coordination, bridge_price, novelty)
 
 
 def _move_range(learned: LearnedCorpus, request: TweenRequest) -> tuple[int, int]:
-    """Return the least and the greatest number of moves: what is asked, that of the tweens to differ from, or the
-    nearest number of moves of the corpus's usual length that a duration holds."""
+    """Return the least and greatest number of moves.
+
+    They come from the request, from the tweens to differ from, or from the duration divided by the corpus's usual
+    length of a move.
+    """
     theirs = len(request.unlike[0].path) - 1 if request.unlike else None
     if request.duration is None:
         return request.move_range if theirs is None else (theirs, theirs)
@@ -236,7 +240,7 @@ def _move_range(learned: LearnedCorpus, request: TweenRequest) -> tuple[int, int
 
 
 def _lifted(learned: LearnedCorpus, problem: Problem, factor: float) -> tuple[Problem, Coordination]:
-    """Return the same problem with moves in place of states, and the network over moves."""
+    """Return the same problem over moves instead of states, and the network over moves."""
     held = problem.model_with_waits()
     count = np.diff(held.starts) + np.diff(held.indptr[held.starts])  # of each chain's states
     if count.max() > MOST_STATES_OF_CHAIN:
@@ -263,7 +267,8 @@ def _lifted(learned: LearnedCorpus, problem: Problem, factor: float) -> tuple[Pr
 def _leading_to(learned: LearnedCorpus, a: Posture, before: Motion) -> Motion | None:
     """Return the movement before posture A on the corpus's skeleton.
 
-    It counts from the last flip of a joint on, since A is as given. None, with a warning, if one flips right before A.
+    Drop everything before the last flip of a joint, since A is as given. If a joint flips right before A, warn and
+    return None.
     """
     before = _on_skeleton(learned, before, "the movement before A")
     _check_posture(before.posture(-1), a, "the movement before A does not end in A")
@@ -294,12 +299,12 @@ def _warn_of(flip: JointFlip, which: str) -> None:
 
 
 def _seconds(motion: Motion | None) -> float | None:
-    """Return how long a motion lasts, seconds; None for none."""
+    """Return the duration of a motion in seconds; None for None."""
     return None if motion is None else float(motion.times[-1] - motion.times[0])
 
 
 def _check_posture(found: Posture, expected: Posture, fault: str) -> None:
-    """Check that two postures are one, wherever they stand; MotionMindError with the `fault` names the worst joint."""
+    """Check that two postures agree, wherever they stand; else a MotionMindError gives `fault` and the worst joint."""
     degrees = np.degrees(rot.angle(found.rotations, expected.rotations))
     worst = int(degrees.argmax())
     if degrees[worst] > _SAME_POSTURE:
@@ -318,5 +323,5 @@ def _on_skeleton(learned: LearnedCorpus, movement: _Movement, which: str) -> _Mo
 
 
 def _same(a: Posture, b: Posture) -> bool:
-    """Return whether two postures are one, to within rounding."""
+    """Return whether two postures are equal to within rounding."""
     return bool(np.all(rot.angle(a.rotations, b.rotations) < 1e-6) and np.all(np.abs(a.root - b.root) < 1e-6))

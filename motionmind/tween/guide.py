@@ -1,15 +1,15 @@
-"""The guide: what a path pays for departing from the movement that walks through the corpus expect.
+"""The guide: the cost of a path's departure from the movement that corpus walks expect.
 
-A likeliest path of chains that each know their last state alone is not the likeliest movement: on its own clock every
-joint freezes and rushes. The walks know whole limbs and bodies. For T moves from A to B they expect an orientation
-m_j(t) of each chain at each move (`motionmind.walks.expectation`), and a state x_j(t) pays
+If each chain depends on its last state alone, the likeliest path is not the likeliest movement: every joint freezes
+and rushes on its own clock. Corpus walks cover whole limbs and bodies. For T moves from A to B they expect an
+orientation m_j(t) of each chain at each move (`motionmind.walks.expectation`), and a state x_j(t) pays
 
     kappa (seconds of a move / 0.2) (angle(x_j(t), m_j(t)) / width)^2   nats,
 
-the -log of a Gaussian about the walks' mean but for a constant. So likelihoods of the chains, coordination and walks
-multiply. The width is the chain's tolerance, or the angle to the nearest of its states where all are farther: in a
-sparse vocabulary the guide chooses among the states that there are, and does not force unattested moves between them.
-The time of a move makes the whole independent of the corpus's rate.
+the -log of a Gaussian about the walks' mean, up to a constant. So the likelihoods of chains, coordination and walks
+multiply. The width is the chain's tolerance, or the angle to its nearest state if that is larger: in a sparse
+vocabulary the guide chooses among the existing states and does not force unattested moves between them. The factor for
+the time of a move makes the total independent of the corpus's sampling rate.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from motionmind.walks.expectation import expect
 from motionmind.walks.passages import Place, dance
 from motionmind.walks.stops import Stop, stop_at
 
-CREEPING = 0.25  # share of the time in which walks may creep
-SELDOM = 2.0  # standard deviations: dancers seldom, one time in forty, take so long for so far a way
-MOVE = 0.2  # seconds of a move that pays kappa for a tolerance's departure
+CREEPING = 0.25  # share of the time that corpus walks may creep
+SELDOM = 2.0  # standard deviations of log duration for a distance: dancers take longer one time in forty
+MOVE = 0.2  # seconds: a move of this length pays kappa for a departure of one tolerance
 
 
 def make_guide(
@@ -51,24 +51,24 @@ def make_guide(
 ) -> Callable[[int], Floats]:
     """Return the guide of a search from one posture to another, as `motionmind.search.problem.Problem` takes it.
 
-    It depends on both ends and on the number of moves, not on pins, vias or other wishes: answers that differ in these
-    are judged by one energy.
+    It depends on both ends and the number of moves, but not on pins, vias or other restrictions, so that answers under
+    different restrictions share one energy.
     Args:
         learned: the corpus.
         ends: postures A and B on its skeleton.
-        velocities: those of the ends; None where unknown.
+        velocities: velocities at A and B; None where unknown.
         kappa: nats for a chain that is off by its tolerance for 0.2 s.
-        duration: seconds of the whole; None for moves of the corpus's usual length.
-        rows: the row of the grammar's states that each row of the searched model is at [G].
-        path: orientations of the joints that walks are to be near to, after each move of the corpus's usual length
-            that the duration holds, as `find_detour` gives them; None for all walks.
-        liveliness: of the motion, from 0 to 1: the guide is danced as the motion will be.
-        place: where in the corpus a passage begins that the path is to follow, in place of the mean; None for none.
+        duration: total seconds; None for moves of the corpus's usual length.
+        rows: row of the grammar's states for each row of the searched model [G].
+        path: joint orientations that the walks should stay near, after each move of the corpus's usual length within
+            the duration, as `find_detour` returns them; None for all walks.
+        liveliness: liveliness of the motion, from 0 to 1, which the guide shares.
+        place: start in the corpus of a passage to follow instead of the mean; None for the mean.
     """
     space, seconds = learned.space, usual(learned.grammar.transitions)
     stops = [stop_at(learned.corpus, *end) for end in zip(ends, velocities, strict=True)]
 
-    @lru_cache(maxsize=1)  # of the last number of moves, for its path is taken apart once it is found
+    @lru_cache(maxsize=1)  # the cost breakdown needs the last number of moves again
     def costs(moves: int) -> Floats:
         length = moves * seconds if duration is None else duration
         walked = max(1, round(length / seconds))
@@ -77,7 +77,7 @@ def make_guide(
         expected = expect(learned.corpus, learned.carriage, passed, half_steps, path, duration is None)
         at = np.linspace(0.0, length, moves + 1)[1:-1]
         chains = expected.chains(learned.corpus, at)
-        if path is not None:  # the walks near it are its mean with what is like it, and move less
+        if path is not None:  # follow it exactly: the mean of walks near it moves less
             chains[:, : path.shape[1]] = rotation_spline(half_steps[::2], path, at)
         else:
             met: dict[float, Stop] = {0.0: stops[0], length: stops[1]}
@@ -96,17 +96,19 @@ def find_detour(
     velocities: tuple[Velocity | None, Velocity | None],
     duration: float,
 ) -> Floats | None:
-    """Return a detour that fills the time [T + 1, J, 4] (`motionmind.realise.detour`), by moves of the usual length;
-    None where walks from one posture to the other do not creep in that time, or dancers might well take it.
+    """Return a detour that fills spare time, in moves of the usual length [T + 1, J, 4] (`motionmind.realise.detour`).
+
+    Return None if corpus walks between the postures do not creep in that time, or the duration is common for the
+    distance.
 
     Args:
         learned: the corpus.
         ends: postures A and B on its skeleton.
-        velocities: those of the ends; None where unknown.
-        duration: seconds of the whole.
+        velocities: velocities at A and B; None where unknown.
+        duration: total seconds.
     """
     seconds, way = usual(learned.grammar.transitions), way_between(*ends)
-    if way.parts.max() < NO_WAY:  # who is to end as they began holds still
+    if way.parts.max() < NO_WAY:  # equal ends: hold still
         return None
     (own,) = (time.median for time in usual_times(learned, ends))
     if np.log(duration / own) <= SELDOM * learned.pace.spread:
@@ -127,7 +129,7 @@ def creeps(learned: LearnedCorpus, poses: Floats, times: Floats) -> float:
     Args:
         learned: the corpus.
         poses: orientations of the joints [S + 1, J, 4].
-        times: of these, evenly spaced [S + 1], seconds.
+        times: evenly spaced times of the poses [S + 1], seconds.
     """
     steps = np.diff(times)
     speeds = rot.angle(poses[:-1], poses[1:]).mean(axis=1) / steps
@@ -135,13 +137,13 @@ def creeps(learned: LearnedCorpus, poses: Floats, times: Floats) -> float:
 
 
 def departures(expected: Floats, centres: Floats, starts: Ints, tolerances: Floats) -> Floats:
-    """Return the squared angle between each state and what is expected of its chain, in units of the width [K, G].
+    """Return the squared angle between each state and its chain's expected orientation, in units of the width [K, G].
 
     Args:
         expected: orientations of the chains [K, L, 4].
         centres: orientations of the states, chain after chain [G, 4].
         starts: first row of each chain's states [L + 1].
-        tolerances: of the chains [L], radians.
+        tolerances: tolerance of each chain [L], radians.
     """
     out = np.empty((len(expected), len(centres)))
     for chain, tolerance in enumerate(tolerances):

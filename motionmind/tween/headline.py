@@ -1,4 +1,4 @@
-"""A tween in a few words: what a choreographer wants to know of it first, and where a viewer would wince."""
+"""A tween in a few words: the facts that a choreographer wants first, and the flaws that make a viewer wince."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from motionmind.errors import enumerated
 from motionmind.learned.plausibility import Sighting
 from motionmind.tween.result import Tween
 
-_FAR = 30.0  # degrees; nobody sees that a smaller move of a joint is a bridge
+_FAR = 30.0  # degrees; nobody notices a smaller bridge
 _SIDES = ("left", "right")
 
 # Words for what a movement shows a viewer: its greatest value, the corpus's greatest and the part of the body; and the
@@ -26,17 +26,17 @@ _SHOWN = {
     "sliding": ("feet slide: near the floor one moves in {0} of a second, in the corpus in {1} at most", 0, "%"),
     "pace": ("{2} is {0} times as fast as is fast in the corpus, where nothing is more than {1} times", 1, "f"),
 }
-# Words for residuals of the solve, and from how much on a viewer sees them: centimetres and degrees.
+# Words for residuals of the solve, and the visible thresholds in centimetres and degrees.
 _GAVE = {
     "Contacts": ("a part that stands is {0:.0f} cm off its place at {1:.1f} s", 4.0),
     "Floor": ("a part is {0:.0f} cm under the floor at {1:.1f} s", 2.0),
     "Limits": ("a joint is {0:.0f} degrees beyond its limit at {1:.1f} s", 8.0),
 }
-_MORE_DIGITS = 3  # at most, where two numbers would look alike
+_MORE_DIGITS = 3  # most extra digits to tell two numbers apart
 
 
 def headline(tween: Tween) -> str:
-    """Return a tween in a line: its length, whether the corpus knows its moves, what is proven, what the feet do.
+    """Summarise a tween in a line: its length, whether the corpus attests its moves, the proof, and the feet.
 
     >>> from motionmind import Engine
     >>> from motionmind.tween.headline import headline
@@ -52,7 +52,7 @@ def headline(tween: Tween) -> str:
 
 
 def beyond(tween: Tween) -> list[str]:
-    """Say where a tween goes beyond all that the corpus shows, so that a viewer would wince; each in a line."""
+    """List, one per line, the ways in which a tween exceeds everything in the corpus and makes a viewer wince."""
     said = [shown_beyond(name, one) for name, one in tween.shown.items() if one.is_beyond]
     said += [
         _GAVE[one.term][0].format(one.most, one.at)
@@ -69,11 +69,11 @@ def beyond(tween: Tween) -> list[str]:
 
 
 def shown_beyond(name: str, one: Sighting) -> str:
-    """Say in words what goes beyond all that a corpus shows, and by how much.
+    """Describe a measure that exceeds everything in the corpus, and by how much.
 
     Args:
-        name: of the measure, one of `motionmind.learned.plausibility.MEASURES`.
-        one: a movement's sighting of it, which is beyond.
+        name: name of the measure, one of `motionmind.learned.plausibility.MEASURES`.
+        one: the movement's sighting of it, which exceeds the corpus's.
     """
     words, digits, kind = _SHOWN[name]
     for more in range(_MORE_DIGITS + 1):
@@ -84,7 +84,7 @@ def shown_beyond(name: str, one: Sighting) -> str:
 
 
 def seen_in(tween: Tween) -> str:
-    """Say whether the corpus attests the moves: "every one seen in ballet"."""
+    """Describe whether the corpus attests the moves: "every one seen in ballet"."""
     sources = (source for row in tween.sources for source in row if source is not None)
     times = Counter(source.corpus for source in sources)
     corpora = enumerated((displayed(name) for name, _ in times.most_common()), 3) or "the corpus"
@@ -95,7 +95,7 @@ def seen_in(tween: Tween) -> str:
 
 
 def _proof(tween: Tween) -> str:
-    """Say what is proven of the cost."""
+    """Describe the proof of the cost."""
     kind = "of those that differ so much" if tween.differs else "of its kind"
     if tween.status == "sampled":
         return "drawn at random"
@@ -109,7 +109,7 @@ def _proof(tween: Tween) -> str:
 
 
 def feet_staying(motion: Motion) -> list[str]:
-    """Say which feet stay in their places, if any do."""
+    """List the feet that stay in place, if any."""
     feet = [motion.skeleton.names[joint] for joint in find_feet(motion.skeleton)]
     if len(motion) < 2 or not feet:
         return []

@@ -1,4 +1,4 @@
-"""Passages by name, and those that lead from A to B in quite different ways: the first alternatives to a movement."""
+"""Named passages, and a search for different passages from A to B: the first alternatives to a movement."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from motionmind.walks.modes import find_modes
 from motionmind.walks.passages import Place
 from motionmind.walks.stops import stop_at
 
-COMPARED = 11  # postures of a movement, at even times, by which it is compared with others
-ROUNDED_S = 1e-3  # seconds by which a name may be off its place
+COMPARED = 11  # postures, evenly spaced in time, for comparing movements
+ROUNDED_S = 1e-3  # rounding of the time in a passage's name
 _PASSAGE = re.compile(r"(.+)@(\d+(?:\.\d*)?|\.\d+)s?", re.ASCII | re.DOTALL)
 
 
 def find_place(corpus: Corpus, passage: str) -> Place:
-    """Return the place that a passage's name stands for, such as "adagio@3.2s".
+    """Return the place of a named passage, such as "adagio@3.2s".
 
     Raises:
-        MotionMindError: it is no such name, the corpus has no such clip, or it does not last so long.
+        MotionMindError: the name is malformed, the corpus has no such clip, or the time lies outside the clip.
     """
     found = _PASSAGE.fullmatch(passage)
     if found is None:
@@ -49,13 +49,13 @@ def find_place(corpus: Corpus, passage: str) -> Place:
 
 
 class Modes:
-    """Passages that lead from A to B, each in another way than the movements that are known by then.
+    """Passages from A to B, each different from all movements known so far.
 
     Args:
         learned: the corpus.
-        first: a movement from A to B, which is known.
-        leaves: whether it is given how it leaves A.
-        arrives: whether it is given how it arrives at B.
+        first: a known movement from A to B.
+        leaves: whether the velocity at A is given.
+        arrives: whether the velocity at B is given.
     """
 
     def __init__(self, learned: LearnedCorpus, first: Motion, leaves: bool, arrives: bool) -> None:
@@ -70,7 +70,7 @@ class Modes:
         self._places = find_modes(learned.corpus, learned.carriage, stops, seconds, self._known)
 
     def know(self, motion: Motion) -> None:
-        """Take a movement for known."""
+        """Add a movement to the known ones."""
         times = np.linspace(motion.times[0], motion.times[-1], COMPARED)
         chains = self._corpus.to_chains(rotation_spline(motion.times, motion.rotations, times))
         self._known.append(chains[:, : len(motion.skeleton)])

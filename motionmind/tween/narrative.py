@@ -1,4 +1,4 @@
-"""A report in words: for each move, what each joint does, how likely that is, where it was recorded, what it costs."""
+"""A report in words: for each move, each joint's part, its likelihood, its source and its cost."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ class JointStep(msgspec.Struct, frozen=True):
 
     Attributes:
         joint: the joint's name.
-        before: name of the state that it leaves.
-        after: name of the state that it arrives in.
-        moved: whether they differ.
+        before: name of the state before the move.
+        after: name of the state after it.
+        moved: whether the two states differ.
         degrees: angle between them.
-        how: whether the corpus attests the move, it is a wait at the goal, or a bridge.
-        likelihood: P(state arrived in | state left), as the corpus counts it; 0 where it attests no such move.
+        how: the kind of move: attested by the corpus, a wait at the goal, or a bridge.
+        likelihood: P(next state | state), as counted in the corpus; 0 where it attests no such move.
         cost: nats for the move.
-        coordination: nats for the state arrived in beside its parent's.
-        guide: nats for the departure of the state arrived in from what walks expect.
+        coordination: nats for the new state given its parent's.
+        guide: nats for the departure of the new state from the orientation that corpus walks expect.
         followed: whether the motion is within the tolerance of both states.
-        source: a place in the corpus that attests it; None where none does, or the motion does not follow.
+        source: a place in the corpus that attests the move; None if there is none, or the motion does not follow.
     """
 
     joint: str
@@ -52,8 +52,8 @@ class ExplainedMove(msgspec.Struct, frozen=True):
 
     Attributes:
         move: its number, from 1.
-        begins: seconds from the beginning.
-        ends: seconds from the beginning.
+        begins: start of the move, seconds from the beginning.
+        ends: end of the move, seconds from the beginning.
         cost: nats.
         joints: every joint's part in it [L].
     """
@@ -76,7 +76,7 @@ class Explanation(msgspec.Struct, frozen=True):
         seconds: length of the motion.
         moved: part of the cost for the joints' moves, nats.
         coordinated: part of the cost for how joints coordinate, nats.
-        guided: part of the cost for departures from what walks expect, nats.
+        guided: part of the cost for departures from the corpus walks, nats.
         tolls: part of the cost for the number of moves, nats.
         moves: the moves.
 
@@ -105,7 +105,7 @@ class Explanation(msgspec.Struct, frozen=True):
         return values
 
     def __str__(self) -> str:
-        """Return the explanation as text: for each move the joints that move, the farthest first."""
+        """Return the explanation as text: for each move, the joints that move, farthest first."""
         return "\n".join(_lines(self))
 
 
@@ -180,7 +180,7 @@ def _lines(explanation: Explanation) -> Iterator[str]:
 
 
 def _joint_lines(move: ExplainedMove) -> Iterator[str]:
-    """Yield a line for each joint that moves, and one for those that are still, wait, or coordinate unlikely."""
+    """Yield a line for each moving joint, and lines that list still, waiting and unusually coordinated joints."""
     moving = sorted((step for step in move.joints if step.moved), key=lambda step: -step.degrees)
     still = [step for step in move.joints if not step.moved]
     cells = [
@@ -224,6 +224,6 @@ def _place(step: JointStep) -> str:
 
 
 def _clip(source: Source) -> str:
-    """Return a clip by its corpus and name: "ballet: jump (mirrored, reversed)"."""
+    """Return the corpus and name of a clip: "ballet: jump (mirrored, reversed)"."""
     changes = ", ".join(["mirrored"] * source.mirrored + ["reversed"] * source.reversed)
     return f"{displayed(source.corpus)}: {displayed(source.clip)}" + (f" ({changes})" if changes else "")

@@ -1,4 +1,4 @@
-"""Tweens through whole postures of a corpus: the nearest posture, and the diagnosis where there is no path."""
+"""Tweens through whole postures of a corpus: the nearest posture, and the diagnosis when there is no path."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from motionmind.geometry import rotations as rot
 from motionmind.search.problem import Rules
 from motionmind.tween.whole_body import Bodies
 
-_COMPARED = 4000  # postures that are compared with as many others at most, to say which come nearest
+_COMPARED = 4000  # greatest number of postures on each side when looking for the nearest pair
 
 
 def nearest_posture(corpus: Corpus, rotations: Floats) -> int:
-    """Return the number of the corpus's posture nearest to `rotations` [J, 4]: the one with the least sum of squared
-    angles between joints, wherever it faces if the facing is free."""
+    """Return the number of the corpus's posture nearest to `rotations` [J, 4], ignoring its facing if that is free.
+
+    The nearest posture has the least sum of squared angles between joints.
+    """
     count = len(corpus.skeleton)
     angles = rot.angle(corpus.to_chains(corpus.rotations)[:, :count], corpus.to_chains(rotations)[:count])
     return int(np.argmin(np.sum(angles**2, axis=1)))
@@ -44,7 +46,7 @@ def diagnose_posturewise(corpus: Corpus, bodies: Bodies, near: tuple[int, int], 
     found, led = one[np.isfinite(ahead)], one[np.isfinite(back)]
     joints = corpus.to_chains(corpus.rotations)[:, : len(corpus.skeleton)]
     some, others = (which[:: 1 + len(which) // _COMPARED] for which in (found, led))
-    # The sum over joints of (q . p)^2 = cos^2 of half the angle is a product of what each posture brings to it.
+    # The sum over joints of (q . p)^2 = cos^2 of half the angle is a product of one factor from each posture.
     squares = [(q[..., :, None] * q[..., None, :]).reshape(len(q), -1) for q in (joints[some], joints[others])]
     i, k = np.unravel_index(int(np.argmax(squares[0] @ squares[1].T)), (len(some), len(others)))
     degrees = np.degrees(rot.angle(joints[some[i]], joints[others[k]])).mean()

@@ -1,18 +1,18 @@
-"""Pacing: how many moves to make for so far a way, in the search's terms.
+"""Pacing: a cost for the number of moves, given the distance to cover.
 
 A likeliest path hurries: every move costs something, so the energy alone prefers as few as the states' graphs allow.
-The corpus's bodies take their time (`motionmind.learned.pace`). So a segment of T moves, of u seconds each, pays a toll
+Dancers take their time (`motionmind.learned.pace`). So a segment of T moves, of u seconds each, pays a toll
 
     w L (log(T u / d) / spread)^2 / 2 + HURRIES max(0, least / (T u) - 1)   nats
 
 beside its haste (`motionmind.search.length`):
 
-- the first term is the duration's -log density in the corpus, given the way, but for a constant; d is the median. Haste
-  adds up over the L chains, each of which counts on its own, so the duration counts w times for each chain too;
-- `least` is the time in which no joint need turn, nor the body turn or travel, faster than all but the corpus's fastest
-  hundredth of moments. The peak of a smooth movement is above its mean: 15/8 of it where jerk is least (Flash and
-  Hogan, J. Neuroscience 5:1688, 1985). The toll is as good as a prohibition, but one that gives way where the number
-  of moves is bounded from above.
+- the first term is the duration's -log density in the corpus, given the displacement, up to a constant; d is the
+  median. Haste adds up over the L chains, so the duration counts w times for each chain too;
+- `least` is the shortest time in which every joint can turn, and the body turn and travel, at no more than the 99th
+  percentile of the corpus's speeds. The peak speed of a smooth movement is 15/8 of its mean where jerk is least (Flash
+  and Hogan, J. Neuroscience 5:1688, 1985). The toll amounts to a prohibition, but gives way where the number of moves
+  is bounded from above.
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ from motionmind.learned.nearest import postures_near
 from motionmind.learned.pace import ALIKE, over_seconds, way_between, way_of
 from motionmind.realise.timeline import usual
 
-A_CHAIN = 10.0  # w: how often the duration's density counts for each chain
+A_CHAIN = 10.0  # w: weight of the duration's density for each chain
 HURRIES = 1e4  # nats for half of the least time
-WORST = 3  # parts of the body that are named as faster than ever
-BEYOND = 1.2  # times the corpus's greatest speed: what is no faster than that is not worth a word
-PEAK = 15.0 / 8.0  # of a smooth movement's speed over its mean
+WORST = 3  # most body parts to name as faster than ever
+BEYOND = 1.2  # multiple of the corpus's greatest speed below which a body part is not reported
+PEAK = 15.0 / 8.0  # peak speed of a smooth movement over its mean
 
 
 @dataclass(frozen=True)
 class UsualTime:
-    """The time that a corpus's bodies take for the way from one stop to the next.
+    """The usual time in the corpus for the displacement from one stop to the next.
 
     Attributes:
-        median: of movements that go so far, seconds.
-        least: seconds in which no part of the body need be faster than all but the corpus's fastest hundredth.
-        slowest: the part that needs them: a joint, "turning" or "travel".
+        median: median duration of movements with this displacement, seconds.
+        least: shortest time in which no body part need exceed the 99th percentile of its speed in the corpus, seconds.
+        slowest: the body part that determines `least`: a joint, "turning" or "travel".
     """
 
     median: float
@@ -55,7 +55,7 @@ class UsualTime:
 
 
 def usual_times(learned: LearnedCorpus, stops: Sequence[Posture]) -> tuple[UsualTime, ...]:
-    """Return the corpus's usual time from each of the postures to the next."""
+    """Return the corpus's usual time from each posture to the next."""
     parts = _parts(learned)
     lulls = lulls_of(learned, np.stack([posture.rotations for posture in stops]))
     out = []
@@ -69,7 +69,7 @@ def usual_times(learned: LearnedCorpus, stops: Sequence[Posture]) -> tuple[Usual
 
 
 def lulls_of(learned: LearnedCorpus, rotations: Floats) -> Floats:
-    """Return the lulls of postures of rotations [n, J, 4], as far as the corpus knows them [n] (`Pace.lulls_of`)."""
+    """Return the resting speeds of postures [n, J, 4], as far as the corpus knows them [n] (`Pace.lulls_of`)."""
     corpus, joints = learned.corpus, len(learned.corpus.skeleton)
     shown, trees = learned.carriage.orientations, learned.carriage.trees
     postures = corpus.to_chains(rotations)[:, :joints]
@@ -80,26 +80,26 @@ def lulls_of(learned: LearnedCorpus, rotations: Floats) -> Floats:
 
 
 class FasterPart(msgspec.Struct, frozen=True):
-    """A part of the body, by its name, that is so many times as fast as it ever is in the corpus."""
+    """The name of a body part, and its speed as a multiple of its greatest speed in the corpus."""
 
     part: str
     times: float
 
 
 class Tempo(msgspec.Struct, frozen=True):
-    """The time that a tween takes, beside the corpus's.
+    """The timing of a tween compared with the corpus's.
 
     Attributes:
-        usual: the corpus's median for ways as far, seconds.
-        least: seconds in which nothing need be faster than all but the corpus's fastest hundredth of moments.
-        slowest: the part that needs them: a joint, "turning" or "travel".
-        usual_moves: how many moves of the corpus's usual length a given duration holds, where that is fewer than lead
-            to B, so that more are made in that time; None elsewhere.
-        faster: the parts that move faster than ever in the corpus, the worst first, a few of them.
+        usual: the corpus's median duration for this displacement, seconds.
+        least: shortest time in which no body part need exceed the 99th percentile of its speed in the corpus, seconds.
+        slowest: the body part that determines `least`: a joint, "turning" or "travel".
+        usual_moves: number of moves of the corpus's usual length in the given duration, if too few to reach B, so that
+            the tween makes more; else None.
+        faster: the few body parts that most exceed their greatest speed in the corpus, worst first.
         creeps: share of the time in which the body is slower than in all but the slowest hundredth of the corpus's
             seconds.
-        detours: whether there was so much time that what the corpus does after a posture like A, and before one like B,
-            fills it; the first reports with a tempo do not say so.
+        detours: whether movement that the corpus shows after postures like A and before ones like B fills spare time;
+            missing from the first reports with a tempo.
     """
 
     usual: float
@@ -114,7 +114,7 @@ class Tempo(msgspec.Struct, frozen=True):
 def tempo_of(
     learned: LearnedCorpus, times: Sequence[UsualTime], usual_moves: int | None, detours: bool, motion: Motion
 ) -> Tempo:
-    """Compare a motion's time with the corpus's.
+    """Compare a motion's timing with the corpus's.
 
     Args:
         learned: the corpus.
@@ -140,12 +140,12 @@ def tempo_of(
 
 
 def worded(faster: Sequence[FasterPart]) -> str:
-    """Return parts that are faster than ever in words: "left_knee 2.1 times, travel 1.4 times"."""
+    """Describe body parts that are faster than ever: "left_knee 2.1 times, travel 1.4 times"."""
     return ", ".join(f"{displayed(one.part)} {one.times:.1f} times" for one in faster)
 
 
 def _parts(learned: LearnedCorpus) -> tuple[str, ...]:
-    """Return the names of the parts of a way."""
+    """Return the names of the components of a displacement."""
     return (*learned.corpus.skeleton.names, "turning", "travel")
 
 

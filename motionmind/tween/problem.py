@@ -23,11 +23,11 @@ def build_model(
     """Build the costs of a grammar.
 
     Args:
-        grammar: what was learned.
+        grammar: the learned grammar.
         weights: scheme of the transitions' costs.
         coordination: lambda, the factor of the network's -log P.
         bridge_price: nats for each degree that a bridge spans; None leaves bridges out.
-        novelty: from 0, where frequent transitions are cheap, to 1, where all attested from a state cost the same.
+        novelty: from 0 (frequent transitions are cheap) to 1 (all transitions attested from a state cost the same).
     """
     graph, bridges, net = grammar.transitions, grammar.bridges, grammar.coordination
     rows, targets, costs = graph.sources, graph.targets, graph.weights(weights, novelty)
@@ -41,7 +41,7 @@ def build_model(
     indptr = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(graph.visits)))]).astype(np.int64)
 
     return Model(
-        starts=np.array(graph.starts),  # a copy, for what was loaded is mapped read-only: another type to compile for
+        starts=np.array(graph.starts),  # a copy: a loaded array is read-only, which Numba compiles for separately
         **couplings(net, graph.starts, coordination)._asdict(),
         indptr=indptr,
         targets=targets,
@@ -52,7 +52,7 @@ def build_model(
 
 
 class Couplings(NamedTuple):
-    """The couplings between the chains of a Model; attributes as there."""
+    """The couplings between the chains of a Model, with the same attributes."""
 
     parents: Ints
     unary: Floats
@@ -91,12 +91,12 @@ def couplings(net: Coordination, starts: Ints, factor: float) -> Couplings:
 
 
 def kinds_of(edges: Ints, is_at_goal: Bools, weights: Floats, wait: float) -> Ints:
-    """Return the kind of each move, an index of `KINDS`: at its goal a chain waits where that is cheaper than to hold.
+    """Return the kind of each move, an index of `KINDS`; at its goal a chain waits if that is cheaper than an edge.
 
     Args:
         edges: index of the transition that attests each move, of any shape; -1 where none does.
-        is_at_goal: whether it stays in the goal's state, in the same shape.
-        weights: weight of each transition in the scheme that is searched, nats [E].
+        is_at_goal: whether the move stays in the goal's state, in the same shape.
+        weights: weight of each transition in the scheme of the search, nats [E].
         wait: nats for each move that a chain waits at its goal.
     """
     attested = np.append(weights, np.inf)[edges]  # infinite where nothing attests the move
@@ -115,10 +115,10 @@ def ingredients_of(
     """Return the ingredients of a problem's costs: the kind of each edge, and the parts of the network.
 
     Args:
-        problem: the problem that is searched; its states are the grammar's, or moves between these.
-        grammar: what was learned.
+        problem: the problem to search; its states are the grammar's, or moves between these.
+        grammar: the learned grammar.
         weights: scheme of the transitions' costs.
-        network: how the chains' states of the problem coordinate.
+        network: the coordination network over the problem's states.
         factor: factor of the network's -log P in the problem's costs.
         wait: nats for each move that a chain waits at its goal.
         novelty: as for `build_model`.

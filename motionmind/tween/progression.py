@@ -2,8 +2,8 @@
 
 In the lifted model, a chain's states are the moves of its joint graph, and each leads to the moves that start where it
 ends. The weight of a move is the cost of the edge into it; its coordination with the parent's move is a coupling
-between two states, as between postures. So whatever searches a model can search this one. Each state of the joint graph
-adds one more state, without edges into it: being there before any move, where a path starts.
+between two states, as between postures. So any search of a model works on this one. Each state of the joint graph adds
+one more state without incoming edges: the position before any move, where a path starts.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from motionmind.tween.problem import couplings
 def lift_to_moves(model: Model, net: Coordination, lambda_: float) -> Model:
     """Return the model whose states are moves of `model`.
 
-    State s of a chain is being at s before any move; state S + k is the k-th of the chain's moves. `place` gives the
-    state of `model` that each stands for.
+    State s of a chain means being at s before any move; state S + k is the chain's k-th move. `place` maps each of
+    them to its state of `model`.
 
     Args:
         model: the costs over states.
