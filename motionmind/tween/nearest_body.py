@@ -24,7 +24,7 @@ def nearest_posture(corpus: Corpus, rotations: Floats) -> int:
 
 
 def diagnose_posturewise(corpus: Corpus, bodies: Bodies, near: tuple[int, int], rules: Rules) -> str:
-    """Say why no whole postures lead between the corpus's postures nearest to A and B, and which come nearest."""
+    """Explain why no whole postures join the corpus's postures nearest to A and B, and name the nearest pair."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import shortest_path
 
@@ -41,7 +41,7 @@ def diagnose_posturewise(corpus: Corpus, bodies: Bodies, near: tuple[int, int], 
         if ahead[goal] <= rules.longest:
             needs += f", but not in as many as were asked for, or the {FACING} does not come round in them"
         return f"{first}\n  {needs}"
-    # One posture of each body is enough to tell how far apart they are.
+    # One posture of each body is enough to measure distances.
     one = np.unique(bodies.of, return_index=True)[1]
     found, led = one[np.isfinite(ahead)], one[np.isfinite(back)]
     joints = corpus.to_chains(corpus.rotations)[:, : len(corpus.skeleton)]

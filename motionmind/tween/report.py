@@ -1,4 +1,4 @@
-"""The report of a tween: one schema, by which it is written and read."""
+"""The report of a tween: one schema for writing and reading."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from motionmind.tween.what_if import WhatIf
 
 
 class PassedPosture(msgspec.Struct, frozen=True):
-    """A posture to pass through: the move at which it is passed, and the angle of each joint to its state, degrees."""
+    """A posture to pass through: the move at which the path passes it, and each joint's angle to its state, degrees."""
 
     move: int
     snap_degrees: dict[str, float]
 
 
 class ReportedCosts(msgspec.Struct, frozen=True):
-    """The cost taken apart, nats: of each joint's move [T][L], of its coordination [T][L], of each move, and of each
-    joint's departure from what walks expect [T][L]."""
+    """The parts of the cost, nats: each joint's moves [T][L], its coordination [T][L], the price of a move, and each
+    joint's departure from the corpus walks [T][L]."""
 
     moves: list[list[float]]
     coordination: list[list[float]]
@@ -42,49 +42,50 @@ class ReportedCosts(msgspec.Struct, frozen=True):
 
 
 class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
-    """All of a tween but its movement. Rows are by move or posture, then by joint.
+    """Everything about a tween except its movement. Rows are by move or posture, then by joint.
 
     Attributes:
-        asked: the request, see `TweenRequest`; `before` and `after` are seconds of the movement that was given before A
-            and after B, or null.
+        asked: the request, see `TweenRequest`; `before` and `after` are the seconds of movement given before A and
+            after B, or null.
         status: "optimal", "bounded", "interrupted" or "sampled".
-        cost: of the path, nats; the `costs` add up to it.
+        cost: cost of the path, nats; the `costs` add up to it.
         lower_bound: no path that fulfils the request costs less, nats.
         gap: (cost - lower bound) / cost.
         moves: number of moves T.
-        length: how that number was chosen, by what paths cost without the guide; null where it was given.
-        tempo: how the time compares with the corpus's; null in reports of 0.1.
+        length: how that number was chosen, from the costs of paths without the guide; null if it was given.
+        tempo: comparison of the timing with the corpus's; null in reports of 0.1.
         expansions: nodes that A* expanded.
         peak_nodes: greatest number of nodes that A* held.
-        node_budget: number of nodes that it might hold.
-        seconds: seconds spent on each step; measured.
+        node_budget: number of nodes that A* was allowed to hold.
+        seconds: measured seconds for each step.
         joints: names of the joint chains [L].
         path: states [T + 1][L].
         attested: share of the joints' moves that the corpus attests.
-        bridges: moves that it does not attest.
+        bridges: moves that the corpus does not attest.
         waits: moves spent waiting at the goal.
-        differs: share of the joints' states on the way by which it differs from each tween to differ from.
-        what_if: what each restriction costs, where that was asked.
+        differs: share of the joints' states between A and B that differ from each tween in `unlike`.
+        what_if: cost of each restriction, if requested.
         vias: postures to pass through.
         snap_degrees: angle of each joint to its state in A and in B.
-        path_degrees: "mean" and "most" angle between the motion and the path's states on the way; empty without a way.
+        path_degrees: "mean" and "most" angle between the motion and the path's states between A and B; empty if there
+            are none.
         followed: whether the motion is within the tolerance of each joint's state at each move [T + 1][L].
-        sources: a place in the corpus that attests each move of each joint; null where none does, or the motion is not
-            within the tolerance of both of its states [T][L].
-        detail: places in the corpus of the passage that the motion is danced like, one for each tenth of a second.
-        left_out: share of the corpus's walks that begin or end in postures for which others stand, about; 0 of a small
-            corpus.
-        gave: what had to give so that the body stands, falls and turns as bodies do: the largest residual of each term
-            of the synthesis, its unit, and its time, seconds; empty in reports of 0.1.
-        shown: what the motion shows a viewer, beside what the corpus shows at most: "balance", "bounce", "flight",
-            "crossed_limbs" and "pace"; empty in reports of 0.1.
-        times: of the moves [T + 1], seconds.
-        names: of the states [T + 1][L].
+        sources: a place in the corpus that attests each joint's move; null if there is none, or the motion is not
+            within the tolerance of both states [T][L].
+        detail: places in the corpus of the passage that the motion follows, one for each tenth of a second.
+        left_out: approximate share of the corpus walks that begin or end in postures represented by others; 0 for a
+            small corpus.
+        gave: the largest residual of each term of the synthesis (balance, gravity, joint limits...), with its unit and
+            its time in seconds; empty in reports of 0.1.
+        shown: the motion's greatest "balance", "bounce", "flight", "crossed_limbs" and "pace" beside the corpus's;
+            empty in reports of 0.1.
+        times: times of the moves [T + 1], seconds.
+        names: names of the states [T + 1][L].
         degrees: angle of each joint's move [T][L].
-        likelihood: P(state arrived in | state left) of each joint's move; 0 where it is not attested [T][L].
-        costs: the cost taken apart.
-        credits: whose movement it is made of; null in reports of 0.1.
-        motion_sha256: hash of the file that the movement was written to with the report; null where none was.
+        likelihood: P(next state | state) of each joint's move; 0 if unattested [T][L].
+        costs: the parts of the cost.
+        credits: the sources of the movement, by share; null in reports of 0.1.
+        motion_sha256: hash of the movement's file, written with the report; null if there is none.
 
     >>> from motionmind import Engine, read_report
     >>> engine = Engine.load("ballet")
@@ -134,7 +135,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     motion_sha256: str | None = None
 
     def __post_init__(self) -> None:
-        """Check that every table has a row a move or a posture, and every row an entry a joint."""
+        """Check that every table has one row per move or posture, and every row one entry per joint."""
         moves, joints = len(self.path) - 1, len(self.joints)
         tables: list[tuple[Sequence[Sequence[object]], int]] = [(self.path, moves + 1), (self.names, moves + 1)]
         costs = (self.costs.moves, self.costs.coordination)
@@ -148,8 +149,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class NoPathReport(msgspec.Struct, frozen=True):
-    """The report of a tween that was not found: the reason in words, and as plain values where joints move on their
-    own."""
+    """The report of a request without a path: the reason in words, and as plain values if joints move independently."""
 
     status: Literal["no path"]
     message: str
@@ -171,7 +171,7 @@ def read_report(path: FilePath) -> TweenReport:
     """Read the report of a tween.
 
     Raises:
-        FormatError: there is no such file, or it is no report of a tween; the message says what is wrong.
+        FormatError: the file does not exist or is not the report of a tween; the message gives the reason.
 
     >>> from motionmind import Engine, read_report
     >>> engine = Engine.load("ballet")
@@ -190,13 +190,13 @@ def read_report(path: FilePath) -> TweenReport:
 
 
 def read_any_report(path: FilePath) -> TweenReport | NoPathReport:
-    """Read the report of a tween, or of one that was not found; arguments and errors as of `read_report`."""
+    """Read the report of a tween, or of a request without a path; arguments and errors as for `read_report`."""
     check_path("path", path)
     text = read_bytes(path)
     try:
         return msgspec.json.decode(text, type=NoPathReport)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-        pass  # as nearly always
+        pass  # the usual case
     try:
         return msgspec.json.decode(text, type=TweenReport)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
@@ -211,7 +211,7 @@ def _fault(error: Exception, path: Path) -> str:
         return fault
     if "`status`" in fault:  # as movement does
         word, path = "tween writes one", path.with_name(f"{path.stem}-report.json")
-    else:  # as a report of 0.1 from before `explain` does
+    else:  # a report of 0.1 from before `explain`
         word = "write it again"
     again = f"{word}: motionmind tween A B --corpus NAME --report {shlex.quote(os.fspath(path))}"
     return f"{fault.replace(lacks, 'there is no key')}; {again}"

@@ -1,4 +1,4 @@
-"""The request: everything that can be asked of a tween beside its two postures, in one validated description.
+"""The request: everything that a tween depends on besides its two postures, validated.
 
 The command line's options, the report's `asked` and the options that `vary` accepts are derived from its fields.
 """
@@ -31,16 +31,16 @@ if TYPE_CHECKING:
     from motionmind._typing import States
     from motionmind.body.motion import Posture
 
-MOST_MOVES = 10_000  # more is a slip of the keyboard, and more than memory holds
+MOST_MOVES = 10_000  # more is a typing error, and exceeds memory
 MOST_NODES = 1_000_000_000
 MOST_MEMORY = 1 << 50  # bytes
-MOST_NATS = 1e6  # of any factor or price: sums of more lose the costs beside them, and then overflow
-SLOWEST = 0.01  # frames a second
-PACES = 0.05, 20.0  # times as fast as the corpus, the least and the most
+MOST_NATS = 1e6  # greatest factor or price: larger sums lose the other costs to rounding, and then overflow
+SLOWEST = 0.01  # frames per second
+PACES = 0.05, 20.0  # least and greatest multiple of the corpus's pace
 
 
 class HasPath(Protocol):
-    """A tween, of which only the path counts."""
+    """Any object with the path of a tween."""
 
     @property
     def path(self) -> States:
@@ -54,50 +54,50 @@ class TweenRequest:
     Attributes:
         moves: number of moves, or the least and the greatest number; None lets the search find the best number.
         max_moves: greatest number of moves that the search may find.
-        duration: length of the motion in seconds, exact; where `moves` is None it also fixes the number of moves, each
-            as long as the corpus's usual.
-        pace: how many times as fast as its own the motion is, where `duration` leaves that open: 1.2 takes 1/1.2 of the
-            time for the same moves.
+        duration: exact length of the motion in seconds; if `moves` is None it also fixes the number of moves, each of
+            the corpus's usual length.
+        pace: factor on the motion's natural speed, where `duration` is open: 1.2 takes 1/1.2 of the time for the same
+            moves.
         pin: joints pinned to an end: "A" keeps A's state until the last move, "B" has B's from the first move on.
-        hold: joints that keep their state all the way, such as a standing leg; A and B must agree there.
-        avoid: joints, each with a state to avoid on the way, by number or name.
-        via: postures to pass through, in this order; each at any move, or as (posture, move) at that one.
-        unlike: tweens to differ from, of one number of moves, which this one has too.
-        differ: share of the joints' states on the way that has to be other than in each tween of `unlike`, compared
+        hold: joints that keep their state from A to B, such as a standing leg; A and B must agree there.
+        avoid: joints, each with a state to avoid between A and B, by number or name.
+        via: postures to pass through in this order, each at any move, or at a given move as (posture, move).
+        unlike: tweens to differ from; all have the same number of moves, as does this one.
+        differ: least share of the joints' states between A and B that must differ from each tween in `unlike`, compared
             move by move, from 0 to 1.
-        within: share by which a tween that differs from others may cost more than is proven of all that do; 0 seeks the
-            best of them.
+        within: share by which the cost of a tween that differs from others may exceed the proven lower bound; 0 finds
+            the best.
         what_if: search again without each pin, held joint, state to avoid and via, and without the given length, and
-            report what each costs.
-        sample: sample a path with probability proportional to exp(-cost), instead of finding the best one; it has as
-            many moves as the best. `motionmind.search.sample` says how close to that distribution it comes.
+            report the cost of each.
+        sample: sample a path with probability proportional to exp(-cost) instead of finding the best one; it has as
+            many moves as the best. See `motionmind.search.sample` for the accuracy of the distribution.
         seed: seed of the sample, at least 0.
         strict: forbid bridges: every move of every joint is attested, or a wait at its goal.
-        posturewise: use whole postures of the corpus in their recorded order alone, from the one nearest to A to the
-            one nearest to B: the search of 1998, as a baseline.
-        node_budget: nodes that the search may hold at once; it stops after as many expansions.
-        memory: bytes that these nodes may take, instead of `node_budget`.
-        weights: cost of a transition: "conditional", -log P(next state | state), or "printed", as the papers print it.
-        novelty: from 0, where frequent moves are cheap, to 1, where all moves attested from a state cost the same.
-        coordination: what a joint coordinates with: "posture", P(joint's state | parent's state); "progression",
+        posturewise: search whole postures of the corpus in their recorded order, from the one nearest to A to the one
+            nearest to B: the search of 1998, as a baseline.
+        node_budget: nodes that the search may hold at once; it also stops after this many expansions.
+        memory: bytes for these nodes, instead of `node_budget`.
+        weights: cost of a transition: "conditional", -log P(next state | state), or "printed", as in the papers.
+        novelty: from 0 (frequent moves are cheap) to 1 (all moves attested from a state cost the same).
+        coordination: model of a joint's coordination: "posture", P(joint's state | parent's state); "progression",
             P(joint's next state | its state, parent's state and next state), as in [C98]; or "none".
         lambda_: factor of the coordination's -log P.
         beta: nats for each move that a joint waits at its goal.
         tau: nats for each move.
         bridge_price: nats for each degree of an unattested move.
-        guide: kappa, nats for a joint that is off what walks through the corpus expect by its tolerance for 0.2 s; 0
-            leaves their guide out. It shrinks as novelty grows, and a search of whole postures has none.
-        liveliness: from 0, where the motion is the mean of what the corpus does on such a way, to 1, where it is one
-            passage of the corpus, displaced to lead from A to B; between these it has the mean's slow movement, and the
-            passage's quick one.
-        passage: a passage of the corpus that the movement follows in place of the mean, by its clip and the time at
-            which it begins there: "adagio@3.2s"; None for none.
+        guide: kappa, nats for a joint that is one tolerance away from the corpus walks for 0.2 s; 0 turns the guide
+            off. It shrinks as novelty grows; a search of whole postures has no guide.
+        liveliness: from 0 (the motion is the mean of the corpus walks for this displacement) to 1 (one passage of the
+            corpus, adapted to lead from A to B); between them, slow movement comes from the mean and quick movement
+            from the passage.
+        passage: a passage of the corpus to follow instead of the mean, by its clip and start time: "adagio@3.2s"; None
+            for the mean.
         without: parts of the synthesis to leave out: see `motionmind.footing.corrections`.
-        fps: frames a second of the motion.
+        fps: frames per second of the motion.
 
     Raises:
-        WrongTypeError: a value is of another type.
-        MotionMindError: a value is out of its range, or two of them contradict each other.
+        WrongTypeError: a value has the wrong type.
+        MotionMindError: a value is out of range, or two values contradict each other.
 
     >>> from motionmind import TweenRequest
     >>> TweenRequest(duration=2.0, hold=["left_ankle"]).duration
@@ -140,7 +140,7 @@ class TweenRequest:
 
     def __post_init__(self) -> None:
         self._check_types()
-        # Copies, so that what is asked stays as it was when the caller's own lists change.
+        # Copy, so that the request stays the same when the caller's lists change.
         object.__setattr__(self, "pin", MappingProxyType(dict(self.pin)))
         for name in ("hold", "avoid", "via", "unlike", "without"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
@@ -242,7 +242,7 @@ class TweenRequest:
         """Return `request` (the default one if None) with some options changed.
 
         Raises:
-            WrongTypeError: there is no such option, or `request` is none.
+            WrongTypeError: an option does not exist, or `request` is not a TweenRequest.
             MotionMindError: as for the constructor.
         """
         check_type("request", request, TweenRequest, or_none=True)
@@ -261,37 +261,36 @@ class TweenRequest:
 
     @property
     def fixes_length(self) -> bool:
-        """Whether the number of moves or the duration is given, so that even equal postures are to be moved between."""
+        """Whether the number of moves or the duration is given, so that the body moves even if A equals B."""
         return self.moves is not None or self.duration is not None
 
     @property
     def paced(self) -> bool:
-        """Whether the number of moves is chosen by the corpus's pace too: a search of whole postures is as it was."""
+        """Whether the corpus's pace helps to choose the number of moves; not in a search of whole postures."""
         return not self.posturewise and "pace" not in self.without
 
     @property
     def vias(self) -> list[tuple[Posture, int | None]]:
-        """Postures to pass through, each with its move or None."""
+        """The postures to pass through, each with its move or None."""
         return [given if isinstance(given, tuple) else (given, None) for given in self.via]
 
     @property
     def takes_passages(self) -> bool:
-        """Whether alternatives may be danced like other passages: none is asked for, and the search has a guide."""
+        """Whether alternatives may follow other passages: the request names none, and the search has a guide."""
         return self.kappa > 0.0 and self.passage is None and not self.sample
 
     @property
     def kappa(self) -> float:
-        """Factor of the guide: as asked, less as novelty grows, for what walks expect is the corpus's habit; 0 where
-        whole postures are searched."""
+        """Factor of the guide: shrinks as novelty grows, since corpus walks are habits; 0 for whole postures."""
         return 0.0 if self.posturewise else self.guide * (1.0 - self.novelty)
 
     @property
     def coordination_factor(self) -> float:
-        """Factor of the coordination's -log P: lambda, or 0 where joints move each on its own."""
+        """Factor of the coordination's -log P: lambda, or 0 if joints move independently."""
         return 0.0 if self.coordination == "none" else self.lambda_
 
     def nodes(self, chains: int) -> int:
-        """Return how many nodes the search may hold, for a body of so many joint chains."""
+        """Return the number of nodes that the search may hold, for a body with this many joint chains."""
         check_integer("chains", chains)
         if self.memory is None:
             return self.node_budget
@@ -303,10 +302,10 @@ class TweenRequest:
         return min(nodes, MOST_NODES)
 
     def plain(self, chains: int) -> dict[str, Any]:
-        """Return the request as plain values for JSON, as a report's `asked` has it.
+        """Return the request as plain values for JSON, as in a report's `asked`.
 
-        The node budget is filled in, for a body of so many joint chains. Postures to pass through are given by their
-        moves, tweens to differ from by their number.
+        Fill in the node budget for a body with this many joint chains. Give postures to pass through by their moves,
+        and the tweens in `unlike` by their number.
         """
         values = {one.name.rstrip("_"): getattr(self, one.name) for one in fields(self)}
         return values | {
@@ -334,5 +333,5 @@ def _check_choice(name: str, value: str, choices: Sequence[str]) -> None:
 
 
 def _is_whole(value: object, least: int, most: float) -> bool:
-    """Return whether a value is a whole number in a range; NumPy's integers count."""
+    """Return whether a value is an integer in a range; NumPy's integers count."""
     return isinstance(value, Integral) and least <= int(value) <= most

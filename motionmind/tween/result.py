@@ -1,4 +1,4 @@
-"""The answer: a motion, the path behind it, and how good it provably is."""
+"""The answer: a motion, its path, and the proof of its quality."""
 
 from __future__ import annotations
 
@@ -33,41 +33,40 @@ class Tween:
         motion: the movement; its first and last frames are A and B, and its one insertion leads from one to the other.
         joints: names of the joint chains [L]: the skeleton's joints, then "facing" where that is a chain of its own.
         path: states of the chains [moves + 1, L].
-        status: "optimal" where the cost is proven least to 1e-6 nats, else "bounded"; "interrupted" if the search was
-            ended before its time, "sampled" if the path was sampled.
+        status: "optimal" if the cost is proven least to 1e-6 nats, else "bounded"; "interrupted" if the caller ended
+            the search, "sampled" if the path was sampled.
         cost: cost of the path, nats.
         lower_bound: no path that fulfils the request costs less, nats.
         attested: share of the joints' moves that the corpus attests.
-        bridges: the moves that it does not attest, but for waits.
+        bridges: the moves that the corpus does not attest, except waits.
         waits: moves spent waiting at the goal.
-        differs: share of the joints' states on the way by which it differs from each tween to differ from [K].
-        what_if: what each restriction costs, where that was asked.
+        differs: share of the joints' states between A and B that differ from each tween in `unlike` [K].
+        what_if: cost of each restriction, if requested.
         passed: the moves at which the path passes the postures to pass through [K].
         snap_degrees: angle between A's (row 0) and B's (row 1) orientations and their states [2, L].
         path_degrees: angle between the motion's orientations at each move and the states of the path [moves + 1, L].
         followed: whether that angle is within the chain's tolerance [moves + 1, L].
         via_degrees: angle between the orientations of the postures to pass through and their states [K, L].
-        sources: for each move and chain, a place in the corpus that attests it; None where none does, and where the
-            motion is not within the tolerance of the states that the move joins [moves][L].
-        detail: places in the corpus of the passage that the motion is danced like, one for each tenth of a second;
-            empty where it is danced like none.
-        left_out: share of the corpus's walks that begin or end in postures for which others stand, about, in the part
-            of the body where it is greatest; 0 of a small corpus, of which every posture counts for itself.
-        gave: what had to give so that the body stands, falls and turns as bodies do: the largest residual of each term.
+        sources: a place in the corpus that attests each chain's move; None if there is none, or the motion is not
+            within the tolerance of both states [moves][L].
+        detail: places in the corpus of the passage that the motion follows, one for each tenth of a second; empty if it
+            follows none.
+        left_out: approximate share of the corpus walks that begin or end in postures represented by others, for the
+            body part where it is greatest; 0 for a small corpus, where every posture counts.
+        gave: the largest residual of each term of the synthesis (balance, gravity, joint limits...).
         expansions: nodes that A* expanded.
         peak_nodes: greatest number of nodes that A* held.
         costs: the cost, joint by joint and move by move.
-        seconds: seconds spent on "load", "problem", "bound", "search" and "realise"; measured, so they differ from run
-            to run.
+        seconds: measured seconds for "load", "problem", "bound", "search" and "realise"; they vary from run to run.
         search_problem: the problem that was searched.
         ingredients: returns the ingredients of its costs.
-        request: what was asked.
-        length: how the number of moves was chosen; None where it was given, and without a guide.
-        times: the corpus's usual time from each posture that is passed exactly to the next.
-        tempo: how the time that the tween takes compares with the corpus's.
-        before: seconds of the movement before A that shows its velocity; None where A was given alone.
-        after: seconds of the movement after B that shows its velocity; None where B was given alone.
-        plausibility: what the corpus's own movement shows a viewer at most.
+        request: the request.
+        length: how the number of moves was chosen; None if it was given, or there was no guide.
+        times: the corpus's usual time from each exactly passed posture to the next.
+        tempo: comparison of the tween's timing with the corpus's.
+        before: seconds of movement given before A to show its velocity; None if A was given alone.
+        after: seconds of movement given after B to show its velocity; None if B was given alone.
+        plausibility: the greatest values of each plausibility measure in the corpus.
 
     >>> from motionmind import Engine
     >>> engine = Engine.load("ballet")
@@ -128,12 +127,12 @@ class Tween:
 
     @cached_property
     def shown(self) -> dict[str, Sighting]:
-        """The most that the motion shows a viewer of each of `learned.plausibility.MEASURES`, beside the corpus."""
+        """The motion's greatest value of each of `learned.plausibility.MEASURES`, beside the corpus's."""
         return self.plausibility.shown(self.motion)
 
     @property
     def gap(self) -> float:
-        """(cost - lower bound) / cost: 0 is proven optimal."""
+        """(cost - lower bound) / cost; 0 means proven optimal."""
         return gap_of(self.cost, self.lower_bound)
 
     @property
@@ -143,7 +142,7 @@ class Tween:
 
     @property
     def node_budget(self) -> int:
-        """Number of nodes that A* might hold."""
+        """Number of nodes that A* was allowed to hold."""
         return self.request.nodes(len(self.joints))
 
     @property
@@ -152,15 +151,15 @@ class Tween:
         return self.request.plain(len(self.joints)) | {"before": self.before, "after": self.after}
 
     def report(self) -> dict[str, Any]:
-        """Return all but the movement itself as plain values for JSON: the fields of `TweenReport`."""
+        """Return everything except the movement as plain values for JSON: the fields of `TweenReport`."""
         return plain(report_of(self))
 
     def problem(self) -> str:
-        """Return the problem of this number of moves in toulbar2's cfn format; its optimum should be `cost`.
+        """Return the problem with this number of moves in toulbar2's cfn format; its optimum should be `cost`.
 
-        Each ingredient of the cost has functions of its own, which docs/formats.md names. Postures to pass through are
-        passed at the moves at which this tween passes them. Two conditions are not written, so that the optimum may be
-        less: that an alternative differs from other tweens, and that a `posturewise` one keeps to whole postures.
+        Each ingredient of the cost has its own functions, named in docs/formats.md. Postures to pass through keep the
+        moves at which this tween passes them. The format omits two conditions, so the optimum may be lower: that an
+        alternative differs from other tweens, and that a `posturewise` one keeps to whole postures.
         """
         vias = [Via(via.states, move) for via, move in zip(self.search_problem.vias, self.passed, strict=True)]
         problem = replace(self.search_problem, vias=tuple(vias))
@@ -168,7 +167,7 @@ class Tween:
 
 
 def report_of(tween: Tween, motion_sha256: str | None = None) -> TweenReport:
-    """Return the report of a tween; `motion_sha256` is the hash of the file that its movement was written to."""
+    """Return the report of a tween; `motion_sha256` is the hash of the movement's file."""
     costs, inner = tween.costs, tween.path_degrees[1:-1]
 
     def by_joint(row: Sequence[float]) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""The price of each restriction: the same request without it is searched again, and the two certificates compared."""
+"""The price of each restriction: search again without it, and compare the two certificates."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ Compared = Literal["cost", "haste and pace", "costs without the guide"]
 
 @dataclass(frozen=True)
 class WhatIf:
-    """The price of a restriction: how much less the answer costs without it.
+    """The price of a restriction: the saving in cost without it.
 
     Attributes:
-        without: the restriction by its name, such as "pin left_wrist=B".
-        least: it costs at least this, nats.
-        most: it costs at most this, nats.
-        proven: whether the two agree to 1e-6 nats a search.
-        moves: how many moves the answer has more without it; negative for fewer.
-        compared: which costs these are: "cost", the tween's own; or of a length or a duration, in another of which
-            there is another guide, "haste and pace", and without pace "costs without the guide".
+        without: the restriction's name, such as "pin left_wrist=B".
+        least: lower bound on its price, nats.
+        most: upper bound on its price, nats.
+        proven: whether the two bounds agree to 1e-6 nats per search.
+        moves: number of moves that the answer gains without it; negative for fewer.
+        compared: the costs compared: "cost", the tween's own; or, for a length or duration, since another length has
+            another guide, "haste and pace", or "costs without the guide" if the request has no pace.
     """
 
     without: str
@@ -41,7 +41,7 @@ class WhatIf:
 
 
 class Answer(NamedTuple):
-    """A request, the problem that it became, and the certificate of its best path."""
+    """A request, its search problem, and the certificate of the best path."""
 
     request: TweenRequest
     problem: Problem
@@ -49,14 +49,14 @@ class Answer(NamedTuple):
 
 
 def find_what_if(asked: Answer, answer: Callable[[TweenRequest], Answer]) -> tuple[WhatIf, ...]:
-    """Find what each pin, held joint, state to avoid and via costs, and what the given length does.
+    """Find the price of each pin, held joint, state to avoid and via, and of the given length.
 
-    Where the length is open and paced, it may be another without a restriction, and so may the moves at which vias are
-    passed; then the costs are those without it in as many moves, and with the other vias where the answer has them.
+    Where the length is open and paced, dropping a restriction may change the number of moves and the moves at which
+    the path passes vias. Then compare costs at the same number of moves, with the other vias at the answer's moves.
 
     Args:
-        asked: the request, answered.
-        answer: answers another request between the same ends. Once a search is interrupted, no more are made.
+        asked: the request, with its answer.
+        answer: answers another request between the same ends. Stop after an interrupted search.
     """
     out, open_length = [], asked.problem.tolls is not None and not asked.request.fixes_length
     stops = [(posture, move) for (posture, _), move in zip(asked.request.vias, asked.certificate.passed, strict=True)]
@@ -79,7 +79,7 @@ def _moves(answer: Answer) -> int:
 
 
 def _without_each(asked: Answer) -> Iterator[tuple[str, TweenRequest]]:
-    """Yield each restriction by its name, with the request without it."""
+    """Yield the name of each restriction, and the request without it."""
     request = asked.request
     for joint, end in request.pin.items():
         others = {other: request.pin[other] for other in request.pin if other != joint}
@@ -108,9 +108,9 @@ def _length_name(request: TweenRequest) -> str:
 
 
 def _compare(name: str, asked: Answer, freed: Answer, moves: int) -> WhatIf:
-    """Bound the difference of two optima from below and above, of which the second makes so many `moves` more.
+    """Bound the difference between two optima from below and above; the second makes `moves` more moves.
 
-    Every path that keeps a restriction is also one without it, so the difference is never negative.
+    Every path that keeps a restriction is also valid without it, so the difference is never negative.
     """
     same = _moves(asked) == _moves(freed) and asked.request.duration == freed.request.duration
     compared: Compared = "cost" if same else "haste and pace"
@@ -123,12 +123,12 @@ def _compare(name: str, asked: Answer, freed: Answer, moves: int) -> WhatIf:
 
 
 def _cost(answer: Answer) -> tuple[float, float]:
-    """Return what an answer costs, and the bound on it, nats."""
+    """Return an answer's cost and its lower bound, nats."""
     return answer.certificate.cost, answer.certificate.lower_bound
 
 
 def _paced(answer: Answer) -> tuple[float, float]:
-    """Return the haste and the tolls of an answer's number of moves, nats; twice, for they are exact."""
+    """Return haste plus tolls of an answer's number of moves, nats, as both cost and bound, since it is exact."""
     if _moves(answer) == 0:  # to stay is free
         return 0.0, 0.0
     cost = choose_length(answer.problem).cost
@@ -136,7 +136,7 @@ def _paced(answer: Answer) -> tuple[float, float]:
 
 
 def _unguided(answer: Answer) -> tuple[float, float]:
-    """Return what the cheapest path without the guide costs, and the bound on it, nats."""
+    """Return the cost of the cheapest path without the guide, and its lower bound, nats."""
     if _moves(answer) == 0:  # to stay is free
         return 0.0, 0.0
     found = solve(replace(answer.problem, guide=None))

@@ -1,8 +1,8 @@
-"""The search that the papers began with, as a baseline: whole postures of a corpus, in the order they were recorded.
+"""The earliest search in the papers, as a baseline: whole postures of a corpus, in their recorded order.
 
-Nodes are whole bodies, states of all chains at once, and edges the moves that the corpus made between them. Both cost
-what they cost the search that moves chains on their own, so this is that search restricted, and no path of it is
-cheaper. Chains beyond those of the nodes (the facing, which no tree couples) travel on their own.
+Nodes are whole bodies (states of all chains at once), and edges are the corpus's moves between them. Both cost the same
+as in the search that moves chains independently, so this is a restriction of that search and finds no cheaper path.
+Chains outside the nodes (the facing, which no tree couples) move independently.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Bodies(NamedTuple):
 
     Attributes:
         states: states of the first K chains, each body once [P, K].
-        of: the body that each posture of the corpus is [N].
+        of: the body of each posture of the corpus [N].
         indptr: moves from each body [P + 1]; `targets` from `indptr[body]` to `indptr[body + 1]`.
         targets: the body that a move leads to [M].
     """
@@ -56,7 +56,7 @@ def solve_posturewise(problem: Problem, bodies: Bodies) -> Certificate:
     with the costs of the model. It is exact: no path through whole bodies costs less.
 
     Args:
-        problem: a problem without vias whose start and goal are bodies; its restrictions are not looked at.
+        problem: a problem without vias whose start and goal are bodies; its restrictions are ignored.
         bodies: whole bodies of the first K chains.
 
     Raises:
@@ -91,9 +91,9 @@ def solve_posturewise(problem: Problem, bodies: Bodies) -> Certificate:
 def _values(
     bodies: Bodies, costs: Floats, alone: Floats, a: int, b: int, rules: Rules
 ) -> tuple[list[Floats], float, int]:
-    """Return V up to the number of moves that needs to be looked at, the least cost from body a to b, and its moves.
+    """Return V up to the last number of moves that may matter, the least cost from body a to b, and its moves.
 
-    `alone` is what all chains beyond the bodies and the moves themselves cost, by number of moves [longest + 1].
+    `alone` is the cost of the moves themselves and of all chains outside the bodies, by number of moves [longest + 1].
     """
     rows = np.flatnonzero(np.diff(bodies.indptr))
     value = [np.where(np.arange(len(bodies.states)) == b, 0.0, np.inf)]
@@ -104,7 +104,7 @@ def _values(
         value[-1][rows] = np.minimum.reduceat(through, bodies.indptr[rows]) if len(rows) else np.inf
         if k >= rules.shortest and value[-1][a] + alone[k] < best:
             best, moves = float(value[-1][a] + alone[k]), k
-        # A lower bound on any longer path: its last k moves, and those before.
+        # Lower bound on any longer path: its last k moves plus the earlier ones.
         if value[-1].min() + rules.per_move * k + least * (rules.longest - k) >= best or np.isinf(value[-1].min()):
             break
     return value, best, moves
@@ -116,7 +116,7 @@ def _body(bodies: Bodies, states: Ints) -> int:
 
 
 def _costs(model: Model, bodies: Bodies) -> Floats:
-    """Return the cost of each move [M] in nats: its chains' moves, and the body that it leads to."""
+    """Return the cost of each move [M] in nats: its chains' moves plus the body that it leads to."""
     sources, states = bodies.sources, bodies.states.astype(np.int64)
     span = int(np.diff(model.starts).max())
     edges = np.repeat(np.arange(len(model.indptr) - 1), np.diff(model.indptr)) * span + model.targets
