@@ -1,14 +1,14 @@
-"""Find the cheapest path that differs by enough from earlier paths, with a bound on all that do.
+"""Find the cheapest path that differs enough from earlier paths, with a lower bound on all such paths.
 
-Two paths of T moves differ by the share of the (T - 1) L states on the way that are not the same. To differ from K
-paths ties all states of a path together, so it is relaxed: to agree with path k at a move costs mu_k nats for each
-chain that does, one more cost of states by their move, and what may agree is refunded. For mu >= 0
+The difference of two paths of T moves is the share of the (T - 1) L states between the ends that are not the same.
+Since this constraint ties all states of a path together, relax it: each chain that agrees with path k at a move costs
+mu_k nats (one more cost of states by move), and the allowed agreement is refunded. For mu >= 0
 
     D(mu) = min over x of  E(x) + sum over k of mu_k (agree_k(x) - allowed)
 
-is a lower bound on the cost of every path that agrees with each path k in `allowed` states at most. Any of these
-that is met, or that a path met is improved to, is an upper bound. D is concave, and each path x bounds it from above by
-a linear function of mu; the mu where the least of those found so far is greatest is tried next.
+is a lower bound on the cost of every path that agrees with each path k in at most `allowed` states. Every such path
+found on the way, or made from one, gives an upper bound. D is concave, and each path x bounds it from above by a linear
+function of mu; the next mu to try maximises the least of the functions found so far.
 
 Sources: Fisher, "The Lagrangian relaxation method for solving integer programming problems", Management Science 27(1),
 1981; Batra, Yadollahpour, Guzman-Rivera and Shakhnarovich, "Diverse M-best solutions in Markov random fields", ECCV
@@ -36,14 +36,14 @@ from motionmind.search.problem import Problem, places
 from motionmind.search.solve import Certificate, Progress, Status, Watch, solve
 from motionmind.search.trellis import Trellis, locate, segment_trellises, states_of
 
-ROUNDS = 30  # prices tried at most; real ballet takes 6 for one earlier path, 22 for three
-DEARER = tuple(1.2**k for k in range(1, 12))  # multiples of the prices at which a path is made to differ by enough
-CHANGED = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0)  # multiples of the prices at which it is improved
-LEARNING_RATE = 4.0  # of the weights of earlier paths, while a path is sought that differs from all
+ROUNDS = 30  # most prices to try; real ballet takes 6 for one earlier path, 22 for three
+DEARER = tuple(1.2**k for k in range(1, 12))  # multiples of the prices for making a path differ enough
+CHANGED = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0)  # multiples of the prices for improving it
+LEARNING_RATE = 4.0  # of the weights of earlier paths in the search for any path that differs from all of them
 
 
 class TooAlikeError(InfeasibleError):
-    """No path was found that differs by enough from all earlier ones.
+    """No path was found that differs enough from all earlier ones.
 
     Attributes:
         most: no path differs from each of them by more than this share.
@@ -55,7 +55,7 @@ class TooAlikeError(InfeasibleError):
 
 
 def difference(path: Int32s, other: Int32s) -> float:
-    """Return the share of states on the way that are not the same in two paths [T + 1, L]; 0 without a way."""
+    """Return the share of states between the ends that differ in two paths [T + 1, L]; 0 if there are none."""
     return float((path[1:-1] != other[1:-1]).mean()) if len(path) > 2 else 0.0
 
 
@@ -67,16 +67,16 @@ def solve_apart(
     Args:
         problem: what to solve, in a given number of moves T.
         earlier: places of earlier paths [T + 1, L] each, at least one.
-        share: from 0 to 1.
-        watch: as for `solve`; its costs are those of paths that differ by enough.
-        within: the search ends where the cost is proven to be at most this share above the least.
+        share: least difference, from 0 to 1.
+        watch: as for `solve`; its costs are those of paths that differ enough.
+        within: end the search once the cost is proven to be at most this share above the least.
 
     Returns:
-        The certificate. Cost and bound are the problem's own, without any price of agreement. It is "optimal" where
-        they agree to 1e-6 nats; else it is "bounded", and the gap includes what the relaxation cannot close.
+        The certificate. Cost and bound are the problem's own, without any price of agreement. It is "optimal" if they
+        agree to 1e-6 nats; else it is "bounded", and the gap includes the relaxation's duality gap.
 
     Raises:
-        InfeasibleError: no path satisfies the problem; a TooAlikeError if none was found that differs by so much.
+        InfeasibleError: no path satisfies the problem; a TooAlikeError if no path was found that differs enough.
     """
     began = perf_counter()
     search = _Search(problem, earlier, share, watch, within)
@@ -101,7 +101,7 @@ class _Path(NamedTuple):
 
 
 class _Cut(NamedTuple):
-    """An upper bound on D, `cost + mu @ excess`, in nats; by how many states the path agrees too often [K]."""
+    """An upper bound on D, `cost + mu @ excess`, in nats; `excess` counts agreeing states beyond the allowed [K]."""
 
     cost: float
     excess: Floats
@@ -111,9 +111,9 @@ class _Search:
     """The state of one search.
 
     Attributes:
-        best: the best path that differs by enough; its cost is infinite before there is one.
-        lower_bound: no path that differs by enough costs less, nats.
-        ended: whether whoever watches ended it.
+        best: the best path that differs enough; its cost is infinite before there is one.
+        lower_bound: no path that differs enough costs less, nats.
+        ended: whether the watcher ended the search.
     """
 
     def __init__(
@@ -135,7 +135,7 @@ class _Search:
         self.seconds = {"problem": 0.0, "bound": 0.0, "search": 0.0}
 
     def run(self) -> None:
-        """Try prices until the bound cannot rise, or is near enough to the best path, or the search is to end."""
+        """Try prices until the bound cannot rise, is near enough to the best path, or the watcher ends the search."""
         prices = np.zeros(len(self._earlier))
         self._take(self._find_far(), prices)
         cuts = [_Cut(self.best.cost, self._excess(self.best.states))]
@@ -153,7 +153,7 @@ class _Search:
                 return
 
     def _excess(self, states: Int32s) -> Floats:
-        """Return by how many states a path agrees too often with each earlier one [K]; negative where more may."""
+        """Count a path's agreeing states with each earlier path beyond the allowed number [K]; may be negative."""
         same = places(self._problem.model, states)[1:-1] == self._earlier[:, 1:-1]
         return np.asarray(same.sum(axis=(1, 2)) - self._allowed, dtype=np.float64)
 
@@ -174,10 +174,10 @@ class _Search:
         return self.ended
 
     def _find_far(self) -> Certificate:
-        """Find a path that differs by enough, whatever it costs.
+        """Find a path that differs enough, at any cost.
 
-        Without costs and couplings, chains move each on its own and the least weighted agreement is found at once. It
-        bounds the least agreement that all may have in common; weights grow where paths agree too often.
+        Without costs and couplings, chains move independently, and one solve gives the least weighted agreement. It
+        bounds from below the largest agreement of any path; weights grow where paths agree too often.
         """
         model, rules = self._problem.model, self._problem.rules
         free = {name: np.zeros_like(getattr(model, name)) for name in ("costs", "unary", "alone")}
@@ -198,7 +198,7 @@ class _Search:
         raise TooAlikeError(1.0 - least / self._on_the_way if self._on_the_way > 0 else 0.0)
 
     def _take(self, found: Certificate, prices: Floats) -> None:
-        """Make a path differ by enough, and improve it; keep it if it is the best."""
+        """Make a path differ enough, and improve it; keep it if it is the best."""
         problem, path = _guided(self._problem, self._timed), found.path.copy()
         stops, chains, cost = [0, *found.passed, len(path) - 1], path.shape[1], problem.rules.per_move * (len(path) - 1)
         excess = self._excess(path)
@@ -224,8 +224,8 @@ def _guided(problem: Problem, timed: Floats) -> Problem:
 def _improve(trellis: Trellis, chosen: Ints, agreeing: Floats, allowed: Floats, prices: Floats) -> float:
     """Improve a path of positions [n] in place, and return its cost in nats.
 
-    It is polished at rising prices until it agrees with each earlier path in no more states than are allowed. Then one
-    chain or moment after another is replaced by what is cheapest at other prices, where that is cheaper and allowed.
+    Polish it at rising prices until it agrees with each earlier path in no more states than allowed. Then replace one
+    chain or move after another by the cheapest at other prices, if that is cheaper and allowed.
 
     Args:
         trellis: the problem.
@@ -241,7 +241,7 @@ def _improve(trellis: Trellis, chosen: Ints, agreeing: Floats, allowed: Floats, 
     trial, everywhere, parts = chosen.copy(), np.ones(len(trellis.dom), dtype=np.bool_), trellis.chains + trellis.moves
 
     def replacements(factors: Sequence[float]) -> Iterator[int]:
-        """Let `trial` be one replacement after another, and yield its number: at each price, chains, then moments."""
+        """Write one replacement after another to `trial`, and yield its number: at each price, chains, then moves."""
         for row, factor in enumerate(factors):
             dearer = trellis._replace(unary=trellis.unary + factor * prices @ agreeing)
             part = _replace_next(dearer, chosen, 0, everywhere, trial)
@@ -268,8 +268,10 @@ def _improve(trellis: Trellis, chosen: Ints, agreeing: Floats, allowed: Floats, 
 
 @jit
 def _replace_next(trellis: Trellis, path: Ints, first: int, everywhere: Bools, trial: Ints) -> int:
-    """Replace a chain, or else a moment, of a path [n] by what is cheapest, the first of those from `first` on that is
-    another then; write the path with it into `trial`, and return its number, or how many there are if all stay."""
+    """Replace a chain or a move of a path [n] by the cheapest: the first one, from number `first` on, that changes.
+
+    Write the new path into `trial`, and return the number of the replacement, or their count if none changes.
+    """
     for part in range(first, trellis.chains + trellis.moves):
         trial[:] = path
         if part < trellis.chains:
@@ -283,7 +285,7 @@ def _replace_next(trellis: Trellis, path: Ints, first: int, everywhere: Bools, t
 
 
 def _greatest(cuts: Sequence[_Cut]) -> tuple[Floats, float]:
-    """Return the prices [K] at which the least of some cuts is greatest, and its value there in nats."""
+    """Return the prices [K] that maximise the least of the cuts, and its value there in nats."""
     from scipy.optimize import linprog  # slow to import
 
     excess = np.stack([cut.excess for cut in cuts])

@@ -1,13 +1,13 @@
 """Memory-bounded A* over the variables of a trellis, one at a time (operator decomposition).
 
 A node fixes the variables up to one; its *frontier* is the last position chosen in each chain. The rest depends on
-nothing else, so nodes with the same variable and frontier are the same node. f is what the fixed variables cost plus
-the heuristic's bound on the rest, and grows by `heuristic.step`. Where the bound is tight some path has no growth at
-all; as the deeper of two nodes with the same f goes first, the search walks along it: one expansion a variable.
+nothing else, so nodes with the same variable and frontier are the same node. f is the cost of the fixed variables plus
+the heuristic's bound on the rest, and grows by `heuristic.step`. Where the bound is tight, f does not grow at all along
+some path; since the deeper of two nodes with the same f goes first, the search follows it: one expansion per variable.
 
-When the node budget is full the worst leaves are forgotten, and the least f among a node's forgotten children is backed
-up into it; the node is opened again with that f, so nothing is lost from the proof. A quarter of the memory is
-forgotten at a time, which keeps the cost of forgetting to a few operations on the open list for each node.
+When the node budget is full, the search forgets the worst leaves and backs up the least f among a node's forgotten
+children into it. It opens the node again with that f, so the proof loses nothing. It forgets a quarter of the memory at
+a time, so that forgetting costs a few operations on the open list per node.
 
 Sources: Standley, "Finding optimal solutions to cooperative pathfinding problems", AAAI 2010 (the decomposition);
 Russell, "Efficient memory-bounded search methods", ECAI 1992 (SMA*); Lovinger and Zhang, "Enhanced simplified
@@ -28,7 +28,7 @@ from motionmind.search.trellis import Trellis
 
 # Costs closer than this, in nats, are the same: sums of the same numbers in another order differ by far less.
 SAME = 1e-9
-KEPT = 0.75  # share of the memory that is kept when it is full; more costs time, less makes more nodes anew
+KEPT = 0.75  # share of a full memory to keep; more costs time, less generates more nodes again
 FEWEST_BUCKETS = 1 << 10  # of the hash table; their number grows with the nodes
 
 _FREE, _FRESH, _HEAPED, _NODES, _PEAK, _EXPANDED, _FORGOTTEN, _BUCKETS = range(8)  # entries of the tally
@@ -59,11 +59,11 @@ class Found(NamedTuple):
     """The result of a search.
 
     Attributes:
-        cost: of the best path found, nats; what it had to be cheaper than if none was.
+        cost: cost of the best path found, nats; the given limit if none was found.
         lower_bound: no path costs less than this, nats.
         expansions: number of nodes expanded.
         peak_nodes: greatest number of nodes held at once.
-        forgotten: number of nodes forgotten because memory was full; 0 if it never was.
+        forgotten: number of nodes forgotten because memory was full.
     """
 
     cost: float
@@ -89,12 +89,12 @@ def search(
     Args:
         trellis: the problem.
         heuristic: the bound on the cost to go.
-        cost: what a path has to be cheaper than, nats.
-        slack: nats by which the best path found may exceed the bound then proven; between nodes whose f differs by less
-            the deeper goes first, or among many paths of the same cost all would be tried for the last digit.
+        cost: limit that a path must stay below, nats.
+        slack: nats by which the best path found may exceed the proven bound. Between nodes whose f differs by less, the
+            deeper goes first; otherwise the search would try all of many equal paths for the last digit.
         path: receives the best path of positions, if one is found [n].
-        budget: nodes held at most.
-        expansions: nodes expanded at most.
+        budget: most nodes to hold.
+        expansions: most nodes to expand.
         ended: set from another thread to stop the search after the next expansion [1].
     """
     nodes = _root(trellis, from_start(heuristic), budget)
@@ -124,7 +124,7 @@ def _expand(
 ) -> tuple[float, bool]:
     """Generate the children of a node that may lead below `cost`.
 
-    Returns the cost then known, and whether there was room for all.
+    Return the best known cost, and whether there was room for all.
     """
     chains = trellis.chains
     i = nodes.var[node] + 1
@@ -190,10 +190,10 @@ def _root(trellis: Trellis, bound: float, budget: int) -> _Nodes:
 
 
 def nodes_in(memory: int, chains: int) -> int:
-    """Return how many nodes fit into `memory` bytes, everything counted that the search allocates for a node.
+    """Return how many nodes fit into `memory` bytes, counting everything that the search allocates for a node.
 
-    A node takes 44 bytes and 2 a chain, less than 8 in the buckets, whose number is a power of two, and 1 that marks it
-    as kept while others are forgotten.
+    A node takes 44 bytes and 2 per chain, less than 8 in the buckets (whose number is a power of two), and 1 for the
+    mark that keeps it while the search forgets others.
     """
     return memory // (44 + 2 * chains + 8 + 1)
 
@@ -213,8 +213,8 @@ def _trace(trellis: Trellis, nodes: _Nodes, node: int, path: Ints) -> None:
 def _forget(nodes: _Nodes, current: int) -> bool:
     """Forget all but the best open nodes and their ancestors, as many as fit into KEPT.
 
-    Leaves go first, and their keys are backed up. `current`, which is being expanded, is kept with its ancestors.
-    Returns whether there was anything to forget.
+    Forget leaves first, and back up their keys. Keep `current`, the node being expanded, and its ancestors. Return
+    whether there was anything to forget.
     """
     kept = np.zeros(len(nodes.var), np.bool_)
     size, marked = nodes.tally[_HEAPED], _mark(nodes, kept, current)
@@ -252,7 +252,7 @@ def _forget(nodes: _Nodes, current: int) -> bool:
 
 @jit
 def _unmarked(nodes: _Nodes, kept: Bools, node: int) -> int:
-    """Count those of a node and its ancestors that are not marked."""
+    """Count the unmarked nodes among a node and its ancestors."""
     count = 0
     while node >= 0 and not kept[node]:
         count += 1
@@ -262,7 +262,7 @@ def _unmarked(nodes: _Nodes, kept: Bools, node: int) -> int:
 
 @jit
 def _mark(nodes: _Nodes, kept: Bools, node: int) -> int:
-    """Mark a node and its ancestors as kept, and return how many were not yet."""
+    """Mark a node and its ancestors as kept, and return how many were unmarked before."""
     count = 0
     while node >= 0 and not kept[node]:
         kept[node] = True
@@ -326,7 +326,7 @@ def _find(nodes: _Nodes, node: int, var: int, choice: int, chain: int) -> int:
 
 @jit
 def _widen(nodes: _Nodes) -> None:
-    """Take twice as many buckets into use; the nodes of each stay or move to the one that is as far into the new."""
+    """Double the buckets in use; a node stays, or moves to the bucket at the same offset in the new half."""
     count = nodes.tally[_BUCKETS]
     nodes.tally[_BUCKETS] = 2 * count
     for home in range(count):

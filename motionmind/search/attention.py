@@ -1,4 +1,4 @@
-"""Whoever watches a search, and the time it takes."""
+"""The watcher of a search, and the time that a search takes."""
 
 from __future__ import annotations
 
@@ -9,31 +9,31 @@ from typing import TypeVar
 
 import numpy as np
 
-SECONDS_UNWATCHED = 0.1  # between two questions to whoever watches
+SECONDS_UNWATCHED = 0.1  # between two calls of the watcher
 
 _Result = TypeVar("_Result")
 
 
 class Attention:
-    """Whether whoever watches a search wants it to end.
+    """A link to the watcher of a search, who may want it to end.
 
     Attributes:
         ended: set once the search is to end; compiled code reads it from another thread [1].
     """
 
     def __init__(self, wants_end: Callable[[], bool] | None) -> None:
-        """Ask `wants_end` from time to time; None if nobody watches."""
+        """Ask `wants_end` from time to time; None means no watcher."""
         self.ended = np.zeros(1, dtype=bool)
         self._wants_end = wants_end
 
     def ends(self) -> bool:
-        """Ask, and return whether the search is to end."""
+        """Ask the watcher, and return whether the search should end."""
         if self._wants_end is not None and not self.ended[0]:
             self.ended[0] = self._wants_end()
         return bool(self.ended[0])
 
     def run(self, work: Callable[..., _Result], *arguments: object) -> _Result:
-        """Do long compiled work and return its result; if somebody watches, in a thread, asking meanwhile.
+        """Do long compiled work and return its result; with a watcher, run it in a thread and keep asking.
 
         The work gets `ended` as its last argument, and stops when it is set.
         """
@@ -45,7 +45,7 @@ class Attention:
                 while not wait([result], SECONDS_UNWATCHED).done:
                     self.ends()
             except BaseException:
-                self.ended[0] = True  # an error of the watcher, or Ctrl-C, is not to wait for the work
+                self.ended[0] = True  # do not let an error of the watcher, or Ctrl-C, wait for the work
                 raise
             return result.result()
 
