@@ -35,7 +35,7 @@ DECIMALS = 6
 
 
 class Ingredients(NamedTuple):
-    """The ingredients of a model's costs, as far as the model does not keep them apart.
+    """The ingredients of a model's costs that the model itself does not separate.
 
     Attributes:
         kinds: names of the kinds of edges [K], without underscores.
@@ -210,8 +210,8 @@ def _entries(ptr: Ints, columns: Int32s, first: int, last: int, start: int) -> t
     Args:
         ptr: entries of each row.
         columns: their columns, which are positions.
-        first: the first of the rows whose entries are wanted.
-        last: the row after the last of them.
+        first: first row to return.
+        last: row after the last one to return.
         start: the first position of the columns' variable.
     """
     listed = slice(int(ptr[first]), int(ptr[last]))
@@ -232,7 +232,7 @@ def _model_edges(model: Model, segment: _Segment) -> Ints:
 
 def _write(title: str, variables: dict[str, list[str]], functions: Sequence[_Function]) -> str:
     """Return the text of a network."""
-    # Above what any path can cost: the sum of the greatest costs of all functions.
+    # More than any path can cost: the sum of the greatest costs of all functions.
     forbidden = f"{1.0 + sum(np.abs(one.costs).max(initial=0.0) for one in functions):.{DECIMALS}f}"
     header = {"name": title, "mustbe": f"<{forbidden}"}
     values = (f"{json.dumps(name)}: {json.dumps(states)}" for name, states in variables.items())
@@ -246,7 +246,7 @@ def _write(title: str, variables: dict[str, list[str]], functions: Sequence[_Fun
 
 
 def _line(function: _Function, forbidden: str) -> str:
-    """Return a function as the format has it: numbers such as 2e-06, which JSON knows, are none to toulbar2."""
+    """Format a function without exponents: toulbar2 does not read numbers such as 2e-06, although JSON does."""
     rounded = np.round(function.costs, DECIMALS).tolist()
     costs, default = [f"{cost:.{DECIMALS}f}" if cost else "0" for cost in rounded], ""
     if function.pairs is not None:

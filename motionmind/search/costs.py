@@ -1,7 +1,7 @@
 """Costs of a path of positions, of its edges and of its couplings.
 
-Polishing and sampling sum the costs of a chain, or of a moment, in loops of their own: functions that both called made
-polishing 1.4 times slower.
+Polishing and sampling sum the costs of a chain or a move in their own loops: shared functions made polishing 1.4 times
+slower.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def path_cost(trellis: Trellis, path: Ints) -> float:
 def edge_cost(trellis: Trellis, p: int, x: int) -> float:
     """Return the cost of the edge from position `p` to `x`; infinite where there is none.
 
-    The binary search is written out, as in `correction`: calling one function for both slowed polishing.
+    The binary search is inlined here and in `correction`: a shared function slowed polishing.
     """
     low, high = trellis.row_ptr[p], trellis.row_ptr[p + 1]
     while low < high:

@@ -38,9 +38,9 @@ def select_entries(
 
 
 def keep_entries(ptr: Ints, columns: Int32s, costs: Floats, rows: Ints, numbers: Int32s) -> tuple[Ints, Int32s, Floats]:
-    """Do as `select_entries` with rising rows, in the memory of the other matrix, which is lost.
+    """Do the same as `select_entries` for rising rows, overwriting the memory of the other matrix.
 
-    To come by as much memory again takes longer than to write to it.
+    Allocating as much memory again takes longer than writing to it.
     """
     old, shifts = (read_only(ptr), read_only(columns), read_only(costs)), np.zeros(len(rows), np.int64)
     out_ptr = _write_entries(*old, rows, numbers, shifts, columns, costs)
@@ -59,7 +59,7 @@ def _write_entries(
     out_costs: Floats,
 ) -> Ints:
     """Write the columns and entries of `select_entries`, and return its row pointers [N + 1]."""
-    # Every entry is written, and the next one over it where it is left out: a branch would be foretold wrongly.
+    # Write every entry, and overwrite one to leave out with the next: a branch would be mispredicted.
     out_ptr, at = np.zeros(len(rows) + 1, np.int64), np.uint64(0)
     for k in range(len(rows)):
         for e in range(np.uint64(ptr[rows[k]]), np.uint64(ptr[rows[k] + 1])):
@@ -73,16 +73,16 @@ def _write_entries(
 def insert_entries(
     ptr: Ints, columns: Int32s, costs: Floats, rows: Ints, at: Ints, new: Int32s, cost: float
 ) -> tuple[Ints, Int32s, Floats]:
-    """Build a matrix that has further entries, of one cost.
+    """Build a matrix with further entries, all of one cost.
 
     Args:
         ptr: rows of the other matrix [R + 1].
         columns: its columns [E].
         costs: its entries [E].
         rows: the row of each further entry, rising [N].
-        at: the entry that each comes before, or the end of the row [N].
-        new: their columns [N].
-        cost: the cost of each.
+        at: the entry before which to insert each, or the end of the row [N].
+        new: columns of the further entries [N].
+        cost: cost of each further entry.
     """
     rises = np.cumsum(np.bincount(rows, minlength=len(ptr) - 1))
     return ptr + np.concatenate([[0], rises]), np.insert(columns, at, new), np.insert(costs, at, cost)

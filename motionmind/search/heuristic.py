@@ -23,24 +23,24 @@ _NO_PAIR_CHAINS = PairChains(
 
 
 class Heuristic(NamedTuple):
-    """Messages after a backward sweep, or pair chains; the others have no entries."""
+    """Messages after a backward sweep, or pair chains; the unused ones have no entries."""
 
     messages: Messages
     tables: PairChains
 
     @property
     def is_of_pair_chains(self) -> bool:
-        """Whether it is read from pair chains."""
+        """Whether the bound comes from pair chains."""
         return len(self.tables.partner) > 0
 
     @staticmethod
     def of_messages(messages: Messages) -> Heuristic:
-        """Return the heuristic that messages are."""
+        """Return the heuristic given by messages."""
         return Heuristic(messages, _NO_PAIR_CHAINS)
 
     @staticmethod
     def of_pair_chains(tables: PairChains) -> Heuristic:
-        """Return the heuristic that pair chains are."""
+        """Return the heuristic given by pair chains."""
         return Heuristic(_NO_MESSAGES, tables)
 
 
@@ -54,9 +54,9 @@ def from_start(heuristic: Heuristic) -> float:
 
 @jit
 def step(trellis: Trellis, heuristic: Heuristic, i: int, frontier: NDArray[np.uint16], e: int) -> float:
-    """Return by how much f, the cost so far plus the bound on the rest, grows with edge `e`, in nats.
+    """Return the growth in nats of f (cost so far plus the bound on the rest) with edge `e`.
 
-    At least 0 but for rounding.
+    It is at least 0 up to rounding.
 
     Args:
         trellis: the problem.
@@ -77,7 +77,7 @@ def step(trellis: Trellis, heuristic: Heuristic, i: int, frontier: NDArray[np.ui
 
 @jit
 def descend(trellis: Trellis, heuristic: Heuristic, path: Ints) -> None:
-    """Write to `path` [n] the path of positions that takes the least growth of f at each variable."""
+    """Write to `path` [n] the path of positions with the least growth of f at each variable."""
     chains = trellis.chains
     frontier = np.zeros(chains, np.uint16)
     for chain in range(chains):

@@ -1,15 +1,15 @@
-"""The number of moves, where that is left open: chosen by tolls, and by how much the chains would have to hurry.
+"""The choice of an open number of moves, by tolls and by the haste of the chains.
 
 A path's energy says little about its length: once nothing hurries, each further move costs about as much as the last.
-What it does say is which lengths are in haste. The chains' *haste* in n moves is what they pay for starting where they
-do: with V[n, s] the least cost of a chain on its own from state s to the goal in exactly n moves,
+But it reveals which lengths are too short. The chains' *haste* in n moves is the extra cost of starting where they do:
+with V[n, s] the least cost of a chain on its own from state s to the goal in exactly n moves,
 
     haste(n) = sum over chains of  V[n, start] - min over s of V[n, s].
 
-It is infinite where a chain cannot get there, tens of nats where only rare moves or bridges lead there in time, and
-about constant from some length on, whatever a move costs. Length is chosen by haste plus tolls. Both are tables, so the
-choice is exact, and no path need be searched for it. A path is divided into segments by vias: then the numbers of moves
-of all segments are chosen together.
+It is infinite where a chain cannot reach the goal, tens of nats where only rare moves or bridges reach it in time, and
+about constant from some length on, whatever a move costs. The best length minimises haste plus tolls. Both are tables,
+so the choice is exact and needs no path search. Vias divide a path into segments, whose numbers of moves are chosen
+together.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from motionmind.search.problem import Model, Problem, costs_to_go
 
 @dataclass(frozen=True)
 class LengthChoice:
-    """The choice of a number of moves: by haste and tolls, or, without tolls, by what paths cost without the guide.
+    """The choice of a number of moves: by haste and tolls, or, without tolls, by the costs of paths without the guide.
 
     Attributes:
         moves: the number of moves that costs least; without tolls, that of the cheapest path known.
-        cost: what it costs, nats.
+        cost: cost of this number of moves, nats.
         lower_bound: no number of moves costs less than this, nats; with tolls, it is the cost.
-        lower_bound_elsewhere: no other number of moves costs less than this, nats; the choice is proven where this is
-            no less than `cost`, to 1e-6 nats.
+        lower_bound_elsewhere: no other number of moves costs less than this, nats; the choice is proven if this is at
+            least `cost`, to 1e-6 nats.
         expansions: nodes that A* expanded for the choice.
         haste: the part of the cost that is haste, nats; 0 without tolls.
-        passed: with tolls, the moves at which vias are to be passed [K].
+        passed: with tolls, the moves at which to pass the vias [K].
     """
 
     moves: int
@@ -53,7 +53,7 @@ def choose_length(problem: Problem) -> LengthChoice:
 
     Raises:
         InfeasibleError: no path satisfies the problem.
-        ValueError: the tolls are not of the problem's segments and numbers of moves, or not finite.
+        ValueError: the tolls do not match the problem's segments and numbers of moves, or are not finite.
     """
     tolls, rules, shape = problem.tolls, problem.rules, (len(problem.stops) - 1, problem.rules.longest + 1)
     if tolls is None or tolls.shape != shape or not np.isfinite(tolls).all():
@@ -73,8 +73,7 @@ def choose_length(problem: Problem) -> LengthChoice:
 
 
 def fewest_moves(problem: Problem) -> int | None:
-    """Return the least number of moves, of those that the rules allow, in which a path satisfies the problem; None if
-    there is none."""
+    """Return the least number of moves within the rules for which a path exists; None if there is none."""
     rules = problem.rules
     found = _so_far(problem, _hastes(problem))[-1]
     possible = np.flatnonzero(np.isfinite(found[rules.shortest :]))
@@ -82,8 +81,7 @@ def fewest_moves(problem: Problem) -> int | None:
 
 
 def _so_far(problem: Problem, costs: Floats) -> list[Floats]:
-    """Return the least cost of the first segments together, from none to all, by the move after which they end
-    [N + 1].
+    """Return the least total cost of the first 0, 1, ... segments, by the move after which they end [N + 1].
 
     Args:
         problem: the problem.
@@ -115,8 +113,10 @@ def _hastes(problem: Problem) -> Floats:
 
 
 def _hastes_that_matter(problem: Problem, tolls: Floats) -> Floats:
-    """Return `_hastes` of a problem without vias [1, N + 1], infinite from where on tolls [N + 1] alone cost as much as
-    the second best number of moves does with its haste: no haste is below 0."""
+    """Return `_hastes` of a problem without vias [1, N + 1], as far as they can matter; infinite beyond.
+
+    No haste is negative, so stop where the tolls [N + 1] alone cost as much as the second best number of moves.
+    """
     model, rules = problem.model_with_waits(), problem.rules
     out, to_go = np.full((1, len(tolls)), np.inf), None
     last = rules.shortest + int(tolls[rules.shortest :].argmin())
@@ -131,7 +131,7 @@ def _hastes_that_matter(problem: Problem, tolls: Floats) -> Floats:
 
 
 def _haste(model: Model, start: Ints, to_go: Floats) -> Floats:
-    """Return the haste in each number of moves from a start [L], of which the costs to go are given [N + 1, G]."""
+    """Return the haste in each number of moves from a start [L], given the costs to go [N + 1, G]."""
     out, from_start = np.full(len(to_go), np.inf), to_go[:, model.starts[:-1] + start]
     possible = np.isfinite(from_start).all(axis=1)
     cheapest = np.minimum.reduceat(to_go[possible], model.starts[:-1], axis=1)

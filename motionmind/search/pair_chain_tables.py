@@ -1,4 +1,4 @@
-"""The tables of pair chains: what they cost, and their least costs so far and to go, by dynamic programming."""
+"""The tables of pair chains: their costs, and their least costs so far and to go, by dynamic programming."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class PairChains(NamedTuple):
 
     Attributes:
         partner: the other chain of each chain's pair chain [L]; the first chain has no pair chain of its own.
-        child_ptr: the chains whose partner a chain is are `children[child_ptr[chain] : child_ptr[chain + 1]]` [L + 1].
-        children: [L - 1].
+        child_ptr: `children[child_ptr[chain] : child_ptr[chain + 1]]` have `chain` as their partner [L + 1].
+        children: chains with a partner, by partner [L - 1].
         pair_ptr: first pair of variable i [n + 1].
         pair_cost: the pair chain's share of what a pair costs at its move [Q].
         so_far: least cost of the pair chain up to a pair, the pair included [Q].
@@ -169,7 +169,7 @@ def partner_of(trellis: Trellis, i: int) -> int:
 
 @jit
 def pair_chains_of(tables: PairChains, chain: int) -> Ints:
-    """Return the chains whose pair chains a chain is in: its children's, then its own unless it is the first."""
+    """Return the chains whose pair chains include a chain: its children, then itself unless it is the first."""
     children = tables.children[tables.child_ptr[chain] : tables.child_ptr[chain + 1]]
     return children if chain == 0 else np.append(children, chain)
 

@@ -1,22 +1,20 @@
 """Pair chains: a tighter bound, from dynamic programming over pairs of chains.
 
 Messages along single edges cannot see around a cycle: they let a variable be half one value and half another. Two
-coupled chains, a *pair chain*, are one chain of pairs of states, whose least cost dynamic programming finds exactly.
-Every chain but the first makes a pair chain with its parent, or with the first chain where it has none: its *partner*.
-Each coupling belongs to one pair chain; what a chain costs on its own, in its states and along its edges, is shared out
-among the pair chains that it is in. Whatever the shares, the least costs of all pair chains add up to a lower bound on
-the trellis.
+coupled chains form a *pair chain*, one chain of pairs of states, whose least cost dynamic programming finds exactly.
+Every chain but the first forms a pair chain with its *partner*: its parent, or the first chain if it has no parent.
+Each coupling belongs to one pair chain; a chain's own costs, of its states and edges, are shared among all its pair
+chains. Whatever the shares, the least costs of all pair chains add up to a lower bound on the trellis.
 
 Coordinate ascent improves the shares. The *min-marginal* of a pair chain for a position of a variable is its least cost
-with that position: the minimum of so_far + to_go. Shares are moved until all pair chains of the variable have the same
-min-marginals, their mean. That never lowers the bound: n pair chains with mean m(x) cost n min m(x) together, and
-before they cost the sum of their minima, which is at most that. The same is done for the edges between a variable and
-its chain's next. Sweeps forward and back do so along the moves, as with messages, which keeps so_far up to date in the
-sweep forward, and to_go in the sweep back.
+with that position: the minimum of so_far + to_go. Moving shares until all pair chains of the variable have the same
+min-marginals, their mean, never lowers the bound: n pair chains with mean m(x) cost n min m(x) together, at least the
+sum of their minima before. The edges between a variable and its chain's next are treated alike. Sweeps go forward and
+back along the moves, as with messages; so_far stays up to date in the forward sweep, and to_go in the backward sweep.
 
-With values chosen for all variables up to one, what the pair chains still cost at least bounds the cost to go, and it
-grows consistently along a path (`step`): A* searches by this estimate. The min-marginals of a variable's pair chains
-for a position, plus the least costs of the other pair chains, bound all paths through the position.
+With values chosen for all variables up to one, the least remaining cost of the pair chains bounds the cost to go, and
+it grows consistently along a path (`step`): this estimate guides A*. The min-marginals of a variable's pair chains for
+a position, plus the least costs of the other pair chains, bound all paths through the position.
 
 Sources: Komodakis, Paragios and Tziritas, "MRF energy minimization and beyond via dual decomposition", IEEE TPAMI
 33(3), 2011; Kolmogorov, "A new look at reweighted message passing", IEEE TPAMI 37(5), 2015 (the averaging in order).
@@ -49,7 +47,7 @@ from motionmind.search.trws import Messages
 
 
 def build(trellis: Trellis, messages: Messages) -> PairChains:
-    """Build the pair chains of a trellis, the costs as messages have reparametrised them shared out evenly."""
+    """Build the pair chains of a trellis, sharing the costs evenly as reparametrised by messages."""
     chains, tables = trellis.chains, empty(trellis)
     theta, edge = _reparametrise(trellis, messages)
     shares = 1.0 / (np.diff(tables.child_ptr) + (np.arange(chains) > 0))  # of each chain in the pair chains it is in
@@ -70,7 +68,7 @@ def build(trellis: Trellis, messages: Messages) -> PairChains:
 
 
 def _slices(ptr: Ints) -> list[slice]:
-    """Return the slices that row pointers mean."""
+    """Return the slices between row pointers."""
     return [slice(first, end) for first, end in pairwise(ptr.tolist())]
 
 
@@ -129,7 +127,7 @@ def lower_bound(tables: PairChains) -> float:
 def prune(trellis: Trellis, tables: PairChains, through: Floats, below: float) -> tuple[Trellis, PairChains]:
     """Remove the positions that no path cheaper than `below` goes through; return the rest with its pair chains.
 
-    Where there is no such path at all a domain is left empty, and the pair chains mean nothing.
+    If there is no such path, a domain is left empty, and the pair chains are meaningless.
 
     Args:
         trellis: the problem.
@@ -151,7 +149,7 @@ def prune(trellis: Trellis, tables: PairChains, through: Floats, below: float) -
 
 @jit
 def _keep_shares(trellis: Trellis, tables: PairChains, kept: Bools, fewer: PairChains) -> None:
-    """Write what pairs of kept positions cost [P], and the shares of partners' edges between such."""
+    """Write the costs of pairs of kept positions [P], and the shares of partners' edges between them."""
     pair = entry = 0
     for i in range(len(trellis.dom_ptr) - 1):
         if i % trellis.chains == 0:
@@ -173,9 +171,9 @@ def _keep_shares(trellis: Trellis, tables: PairChains, kept: Bools, fewer: PairC
 
 @jit
 def step(trellis: Trellis, tables: PairChains, i: int, frontier: NDArray[np.uint16], e: int) -> float:
-    """Return by how much f, the cost so far plus the bound on the rest, grows with edge `e`, in nats.
+    """Return the growth in nats of f (cost so far plus the bound on the rest) with edge `e`.
 
-    At least 0 but for rounding.
+    It is at least 0 up to rounding.
 
     Args:
         trellis: the problem.

@@ -1,9 +1,9 @@
-"""Search a bounded trellis by A*, the parts of the body that nothing couples any more each by itself.
+"""Search a bounded trellis by A*, separately for each part of the body that is no longer coupled to the others.
 
-What a path costs more or less than one path is the sum of the differences in each part, so with all other parts fixed
-to that path, the bounds of the parts add up. A part needs to be searched only up to what, with the most that the others
-may save, would still be of interest. Searched all at once, every near-best path of one part would be tried with those
-of all others.
+A path's difference in cost from a reference path is the sum of the differences in each part, so with all other parts
+fixed to the reference, the bounds of the parts add up. Search a part only up to a cost that, given the most that the
+others may save, is still of interest. A joint search would try every near-best path of one part with those of all
+others.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from motionmind.search.trellis import Trellis, locate, states_of
 
 
 class Effort(NamedTuple):
-    """Nodes that A* expanded, and the most that it held at once."""
+    """Number of nodes that A* expanded, and the most that it held at once."""
 
     expansions: int = 0
     peak_nodes: int = 0
 
 
 def search(state: Bounded, nodes: int, budget: int, attention: Attention) -> Effort:
-    """Search a trellis for the best path, and take what is found and proven into its bounds.
+    """Search a trellis for the best path, and update its bounds with the result.
 
-    Where bound and path meet already, A* walks along the bound to the best path.
+    Where bound and path meet already, A* follows the bound to the best path.
 
     Args:
-        state: the trellis, and what is known of it.
+        state: the trellis and its bounds.
         nodes: nodes that A* may hold at once.
         budget: nodes that it may expand.
-        attention: whoever may want the search to end.
+        attention: the link to the watcher, who may end the search.
     """
     part, free = _parts(state.trellis)
     names = np.unique(part[free])
@@ -78,7 +78,7 @@ def _search_at_once(state: Bounded, nodes: int, budget: int, attention: Attentio
 
 
 def _descend(state: Bounded) -> Ints:
-    """Return a good path of positions [n], whatever it costs."""
+    """Return a good path of positions [n], at any cost."""
     chosen = np.zeros(len(state.trellis.dom_ptr) - 1, dtype=np.int64)
     heuristic.descend(state.trellis, state.heuristic, chosen)
     polish(state.trellis, chosen, np.full(len(state.trellis.dom), -np.inf))
@@ -86,7 +86,7 @@ def _descend(state: Bounded) -> Ints:
 
 
 def _fix_all_but(state: Bounded, chosen: Ints, mine: Bools) -> tuple[Trellis, Heuristic]:
-    """Return what is left with all chains but some [L] fixed to a path of positions [n]."""
+    """Return the trellis and heuristic with all chains but `mine` [L] fixed to a path of positions [n]."""
     free = np.repeat(np.resize(mine, len(chosen)), np.diff(state.trellis.dom_ptr))
     free[chosen] = True
     through = np.where(free, 0.0, np.inf)
@@ -95,7 +95,7 @@ def _fix_all_but(state: Bounded, chosen: Ints, mine: Bools) -> tuple[Trellis, He
 
 
 def _parts(trellis: Trellis) -> tuple[Ints, Bools]:
-    """Return the first chain of the part that each chain belongs to, and whether the chain has any choice [L].
+    """Return the first chain of each chain's part, and whether the chain has any choice [L].
 
     A coupling joins two chains only where there is a move at which both have more than one position left.
     """

@@ -1,4 +1,4 @@
-"""The pieces that a problem is bounded in: segments of the path, each in a number of moves with its own trellis."""
+"""The pieces of a problem: segments of the path, each with a number of moves and its own trellis and bounds."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from motionmind.search.trellis import Trellis, build_trellis
 
 
 class Pieces:
-    """The pieces of a problem, whose numbers of moves are fixed if it has a guide."""
+    """The pieces of a problem; with a guide, the number of moves is fixed."""
 
     def __init__(self, problem: Problem) -> None:
         self._problem, self._stops = problem, problem.stops
@@ -42,7 +42,7 @@ class Pieces:
         return build_trellis(self._model, self._stops[segment], moves, self._to_go(segment, last), below, timed)
 
     def _lasts(self, segment: int) -> range:
-        """Return the moves after which a segment may end; where costs do not depend on the move, the last of them."""
+        """Return the moves after which a segment may end; only the last one if costs do not depend on the move."""
         longest, left = self._problem.rules.longest, len(self._problem.vias) - segment
         if self._timed is None or left == 0:
             return range(longest, longest + 1)
@@ -50,7 +50,7 @@ class Pieces:
         return range(segment + 1, longest - left + 1) if move is None else range(move, min(move, longest) + 1)
 
     def _to_go(self, segment: int, last: int) -> Floats:
-        """Return the costs to go to a segment's end, which the path comes to after move `last` [last + 1, G]."""
+        """Return the costs to go to a segment's end, which the path reaches after move `last` [last + 1, G]."""
         if segment not in self._kept or self._kept[segment][0] != last:
             timed = None if self._timed is None else self._timed[: last + 1]
             self._kept[segment] = last, costs_to_go(self._model, self._stops[segment + 1], last, timed)

@@ -1,7 +1,7 @@
-"""Improve a path: minimise one chain, or one moment, exactly, while the rest stays as it is, until nothing improves.
+"""Improve a path: minimise one chain or one move exactly, with the rest fixed, until nothing improves.
 
-Both are solved by dynamic programming: along a chain backwards in time, at a moment up the tree. Positions that no path
-as cheap as the present one goes through are passed over: nothing better is lost, and half of a large trellis is spared.
+Dynamic programming solves both: along a chain backwards in time, at a move up the tree. It skips positions that no path
+as cheap as the present one goes through: this loses nothing better, and saves half of a large trellis.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ _ROUNDING = 1e-6  # nats: more than bounds are off by
 
 @jit
 def polish(trellis: Trellis, path: Ints, through: Floats) -> float:
-    """Improve a path [n] of positions in place, chain by chain and moment by moment, and return its cost in nats.
+    """Improve a path [n] of positions in place, chain by chain and move by move, and return its cost in nats.
 
-    What lies as it did when it was last minimised, between neighbours that do, is not minimised again.
+    Skip a chain or move if neither it nor its neighbours changed since it was last minimised.
 
     Args:
         trellis: the problem.
@@ -59,7 +59,7 @@ def polish(trellis: Trellis, path: Ints, through: Floats) -> float:
 
 @jit
 def _of_use(path: Ints, through: Floats, cost: float) -> Bools:
-    """Return which positions [P] a path as cheap as this one, which costs so much, may go through; its own are."""
+    """Return which positions [P] a path that costs at most `cost` may go through, including those of `path`."""
     kept = through <= cost + _ROUNDING
     for p in path:
         kept[p] = True
@@ -68,7 +68,7 @@ def _of_use(path: Ints, through: Floats, cost: float) -> Bools:
 
 @jit
 def _wake_neighbours(trellis: Trellis, chain: int, waits: Bools) -> None:
-    """Note that a chain's parent and children wait to be minimised, for it has changed."""
+    """Mark a changed chain's parent and children for minimisation."""
     if trellis.parents[chain] >= 0:
         waits[trellis.parents[chain]] = True
     for child in range(chain + 1, trellis.chains):
@@ -78,7 +78,7 @@ def _wake_neighbours(trellis: Trellis, chain: int, waits: Bools) -> None:
 
 @jit
 def minimise_chain(trellis: Trellis, path: Ints, chain: int, kept: Bools) -> None:
-    """Replace a chain's positions by the cheapest of those that are kept [P], given the other chains.
+    """Replace a chain's positions by the cheapest of the kept ones [P], given the other chains.
 
     value[p] is the least cost of the chain from position p on, its couplings to the others included.
     """
@@ -114,7 +114,7 @@ def minimise_chain(trellis: Trellis, path: Ints, chain: int, kept: Bools) -> Non
 
 @jit
 def minimise_moment(trellis: Trellis, path: Ints, t: int, kept: Bools) -> None:
-    """Replace all positions at move t by the cheapest of those that are kept [P], given the other moves.
+    """Replace all positions at move t by the cheapest of the kept ones [P], given the other moves.
 
     value[p] is the least cost of a chain with position p and of the chains below it in the tree.
     """
@@ -153,9 +153,9 @@ def minimise_moment(trellis: Trellis, path: Ints, t: int, kept: Bools) -> None:
 
 @jit
 def _least_below(trellis: Trellis, path: Ints, value: Floats, first: int, i: int, above: int, best: int) -> float:
-    """Return the least cost of variable i, as `_cheapest` does, where position `best` has the least value.
+    """Return the least cost of variable i, like `_cheapest`, where position `best` has the least value.
 
-    Unless that costs more with this parent, only what costs less with it can do better.
+    Unless `best` costs more with this parent, only positions that cost less with it can do better.
     """
     u = trellis.up_ptr[i] + above
     least, more = value[best - first], 0.0
@@ -171,7 +171,7 @@ def _least_below(trellis: Trellis, path: Ints, value: Floats, first: int, i: int
 def _cheapest(trellis: Trellis, path: Ints, value: Floats, first: int, i: int, above: int) -> tuple[float, int]:
     """Return the least cost of variable i, and its position, where its parent has index `above` (-1 for no parent).
 
-    Only what its chain's position one move before leads to can be taken.
+    Choose among the positions that its chain's position one move before leads to.
     """
     least, best, before = np.inf, -1, path[i - trellis.chains]
     u = trellis.up_ptr[i] + above

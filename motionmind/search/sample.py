@@ -1,9 +1,9 @@
 """Sample a path with probability proportional to exp(-cost), among those with a given number of moves.
 
-Blocked Gibbs sampling: each chain given the other chains is a chain in time, each moment given those before and after
-it a tree, and both are sampled exactly. No coupling is infinite, so a chain alone can reach each of its paths whatever
-the others do, and the rounds converge to the distribution from any possible path. A finite number of rounds only comes
-close; where nothing couples the chains, one round samples exactly. On real ballet, from 5 Hz and 15 degrees to 10 Hz
+Blocked Gibbs sampling: each chain given the other chains is a chain in time, each move given those before and after it
+is a tree, and both can be sampled exactly. No coupling is infinite, so a chain can reach each of its paths whatever the
+others do, and the rounds converge to the distribution from any path. A finite number of rounds only approximates it;
+for uncoupled chains, one round samples exactly. On real ballet, from 5 Hz and 15 degrees to 10 Hz
 and 5 degrees, costs of paths 10 rounds apart are uncorrelated (0.04 and less).
 
 Sources: Carter and Kohn, "On Gibbs sampling for state space models", Biometrika 81(3), 1994 (forward filtering,
@@ -25,7 +25,7 @@ from motionmind.search.problem import Problem
 from motionmind.search.solve import Certificate
 from motionmind.search.trellis import Trellis, correction, locate, segment_trellises, states_of
 
-ROUNDS = 100  # each samples every chain and every moment once
+ROUNDS = 100  # each samples every chain and every move once
 
 
 def sample_path(problem: Problem, certificate: Certificate, seed: int) -> Certificate:
@@ -37,7 +37,7 @@ def sample_path(problem: Problem, certificate: Certificate, seed: int) -> Certif
         seed: seeds the random numbers.
 
     Returns:
-        The certificate with the sampled path, its cost and the status "sampled"; what it proves of all paths stays.
+        The certificate with the sampled path, its cost and the status "sampled"; the lower bound stays.
     """
     rng, cost = np.random.default_rng(seed), 0.0
     path = certificate.path.copy()
@@ -89,7 +89,7 @@ def _sample_chain(trellis: Trellis, path: Ints, chain: int, rng: np.random.Gener
 def _sample_moment(trellis: Trellis, path: Ints, t: int, rng: np.random.Generator) -> None:
     """Resample all positions at move t given the other moves.
 
-    value[p] is -log of the sum of exp(-cost) over what the chains below p's in the tree may do at the move.
+    value[p] is -log of the sum of exp(-cost) over the choices at this move of the chains below p's in the tree.
     """
     chains = trellis.chains
     first = trellis.dom_ptr[t * chains]

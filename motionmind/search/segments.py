@@ -1,9 +1,9 @@
-"""Bounds and best paths of a path's segments, from stop to stop, put together to those of the whole.
+"""Bounds and best paths of a path's segments, from stop to stop, combined into those of the whole path.
 
-All chains are known at every stop, so what a segment costs depends on its own moves alone: on their number, and, where
-costs depend on the move, on its first move as well. A whole path is then a path through a small graph, whose nodes are
-(stop, move at which it is passed) and whose edges are segments. What the best whole path costs through each edge comes
-from the least costs from the start to each node, and from each node to the end.
+All chains are known at every stop, so a segment's cost depends on its own moves alone: on their number, and, where
+costs depend on the move, on its first move as well. A whole path is then a path through a small graph: its nodes are
+(stop, move at which the path passes it), its edges are segments. The least costs from the start to each node and from
+each node to the end give the cost of the best whole path through each edge.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ import numpy as np
 
 from motionmind._typing import Floats, States
 
-SAME = 1e-9  # nats: costs closer than this differ by rounding
+SAME = 1e-9  # nats: closer costs differ by rounding only
 
 
 class Piece(NamedTuple):
-    """A segment in a number of moves, from its first move on; where costs do not depend on the move, that is 0."""
+    """A segment with its first move (0 where costs do not depend on the move) and its number of moves."""
 
     segment: int
     first: int
@@ -43,7 +43,7 @@ class Segments:
         Args:
             lower: the bounds [K, F, N + 1], infinite where a segment cannot have as many moves.
             shortest: least number of moves of the whole; N is the greatest.
-            at: the moves at which the K - 1 vias are passed, None for any.
+            at: the move at which to pass each of the K - 1 vias, None for any.
         """
         self.lower, self.best = lower, np.inf
         moves = np.arange(lower.shape[2])
@@ -70,8 +70,8 @@ class Segments:
     def most_promising(self) -> tuple[Piece, float, float]:
         """Return the unseen piece that may be part of the cheapest path.
 
-        With it come the least that such a path may cost, and the cost below which the piece improves on its own best
-        and on the best whole path, in nats.
+        Also return the lower bound on such a path, and the cost below which the piece improves on its own best and on
+        the best whole path, both in nats.
         """
         others = self._others(self.lower)
         through = np.where(self._unseen, self.lower + others, np.inf)
@@ -85,7 +85,7 @@ class Segments:
     def update(self, piece: Piece, lower: float, cost: float, path: States) -> None:
         """Take in a piece's bound, and a path of it [n + 1, L] with its cost, or an empty one; mark it as seen.
 
-        Of two paths that cost the same but for rounding, the later stays.
+        Of two paths with the same cost up to rounding, keep the later.
         """
         self._unseen[piece] = False
         self.lower[piece] = max(self.lower[piece], lower)
@@ -94,7 +94,7 @@ class Segments:
             self.best = float(self._so_far(self._cost)[-1].min())
 
     def cost(self, piece: Piece) -> float:
-        """Return the least cost of a piece's paths that is known, nats."""
+        """Return the least known cost of a piece's paths, nats."""
         return float(self._cost[piece])
 
     def best_pieces(self) -> list[Piece]:

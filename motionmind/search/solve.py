@@ -1,4 +1,4 @@
-"""Solve a problem over all numbers of moves by A*, with a certificate of how close to optimal the path is."""
+"""Solve a problem over all numbers of moves by A*, with a certificate that bounds the optimality gap."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class Progress(NamedTuple):
     """Progress of a search.
 
     Attributes:
-        cost: of the best path so far, nats; infinite before there is any.
-        lower_bound: proven of all paths, nats.
+        cost: cost of the best path so far, nats; infinite before there is any.
+        lower_bound: proven bound on all paths, nats.
         expansions: nodes that A* has expanded.
     """
 
@@ -43,7 +43,7 @@ Watch = Callable[[Progress], bool | None]
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """The best path found, and how close to optimal it provably is.
+    """The best path found, with the proof of its quality.
 
     Attributes:
         path: states [T + 1, L].
@@ -53,9 +53,9 @@ class Certificate:
             sampled.
         expansions: nodes expanded by A*.
         peak_nodes: the greatest number of nodes held at once.
-        seconds: time spent on "problem", "bound" and "search"; a measurement, and no part of the proof.
+        seconds: measured time for "problem", "bound" and "search"; not part of the proof.
         passed: the moves at which the path passes its vias [K].
-        length: how its number of moves was chosen, where there are tolls or a guide; None where the number was given.
+        length: how the number of moves was chosen, given tolls or a guide; None if the number was given.
     """
 
     path: Int32s
@@ -70,18 +70,18 @@ class Certificate:
 
 
 def solve(problem: Problem, watch: Watch | None = None) -> Certificate:
-    """Find the cheapest path over all numbers of moves, and prove how good it is.
+    """Find the cheapest path over all numbers of moves, and bound its optimality gap.
 
-    Numbers of moves are bounded in the order of what the chains cost on their own, as long as that is below the cost of
-    the best path found. A* then searches those that this leaves undecided, and in any case that of the best path; what
-    it returns is the answer, unless its nodes run out before. The least of all bounds is what is proven.
+    First bound the numbers of moves in order of the chains' independent costs, while those are below the cost of the
+    best path found. A* then searches the undecided numbers of moves, and in any case that of the best path; its result
+    is the answer, unless its nodes run out. The least of all bounds is the proven one.
 
-    Vias divide the path into segments of at least one move. Then the numbers of moves are those of a segment, each
-    bounded below what the best path leaves when the other segments cost as little as is proven.
+    Vias divide the path into segments of at least one move. Then the numbers of moves apply to a segment, and each is
+    searched only below the best path's cost minus the lower bounds of the other segments.
 
-    A guide says how to move in a number of moves, not how many to make. So where the rules leave a choice the number
-    of moves is that of the cheapest path without the guide, and the certificate is that of the guided problem in it.
-    With tolls it is chosen by them and by haste (`motionmind.search.length`), with the moves at which vias are passed.
+    A guide determines how to move in a number of moves, not how many to make. So if the rules leave a choice, take the
+    number of moves of the cheapest path without the guide, and certify the guided problem with that number. With tolls,
+    choose it by tolls and haste (`motionmind.search.length`), together with the moves at which to pass the vias.
 
     Args:
         problem: what to solve.
@@ -142,7 +142,7 @@ class _Solver:
         return Progress(self.segments.best, self.segments.lower_bound(), self.expansions)
 
     def run(self) -> None:
-        """Search until the best path is proven, the budget spent, or the search is to end; the path is A*'s."""
+        """Search until the best path is proven, the budget is spent, or the watcher stops; A* gives the path."""
         self._bound(lambda: False)
         self._search(lambda: False)
         for piece in self.segments.best_pieces():
@@ -161,7 +161,7 @@ class _Solver:
         return np.isfinite(self.segments.best) and self.segments.lower_bound_elsewhere() > self.segments.best - PROVEN
 
     def _bound(self, enough: Callable[[], bool]) -> None:
-        """Bound pieces, and find paths, until the best is proven or nothing more can be done without a search."""
+        """Bound pieces, and find paths, until the best is proven or only a search can improve further."""
         pairs = 0  # in the pair chains that are kept
         while True:
             piece, least, below = self.segments.most_promising()
@@ -178,7 +178,7 @@ class _Solver:
             self.clock.lap("bound")
 
     def _bounded(self, piece: Piece, below: float) -> Bounded:
-        """Return bounds on a piece as far as paths cheaper than `below` nats go."""
+        """Return bounds on a piece, restricted to paths cheaper than `below` nats."""
         below -= self.rules.per_move * piece.moves
         trellis = self.pieces.trellis(piece, below)
         state = Bounded(trellis, Heuristic.of_messages(trws.no_messages(trellis)), below)
@@ -213,7 +213,7 @@ class _Solver:
         self.segments.update(piece, state.lower_bound + toll, state.cost + toll, state.states)
 
     def certificate(self, length: LengthChoice | None) -> Certificate:
-        """Return what was found and proven."""
+        """Return the best path and the proof."""
         (cost, lower_bound), (path, passed) = self._result(), self.segments.path()
         status: Status = "bounded"
         if cost - lower_bound <= PROVEN:
