@@ -3,7 +3,7 @@
 A chain walks on one joint's joint graph (or on the facing's). For T moves there is a variable (t, chain) for
 t = 0 .. T, whose domain holds the states that lie on some walk of exactly T moves from the chain's start to its goal.
 The chain's edges couple consecutive variables (an absent edge is forbidden); at every t >= 1 the tree couples each
-chain to its parent. A guide may add costs of states that depend on the move, for a path of a given number of moves.
+chain to its parent. For a path of a given number of moves, a guide may add costs of states that depend on the move.
 The search knows nothing else about bodies.
 """
 
@@ -46,8 +46,8 @@ class Model(NamedTuple):
         pair_ptr: pairs of each pair row [sum + 1].
         pair_states: the chain's state in a listed pair [Q], increasing within a pair row.
         pair_costs: correction for the pair, nats [Q].
-        allowed: whether a chain may be in a state after the first posture and before the last [G].
-        place: place of each state [G]; the goal is one of these.
+        allowed: whether a chain may be in a state between the first posture and the last [G].
+        place: place of each state [G]; the goal is a place.
     """
 
     starts: Ints
@@ -104,11 +104,11 @@ class Problem:
         rules: numbers of moves, their costs, and the effort allowed.
         vias: states to pass through, in this order; they divide the path into segments.
         guide: returns, for a path of T moves, the cost of being in each state after moves 1 to T - 1, nats [T - 1, G];
-            finite, of either sign. It says where to be when, not how many moves to make: `solve` compares numbers of
-            moves by what paths cost without it.
+            finite, of either sign. It determines where to be when, not how many moves to make: `solve` compares numbers
+            of moves by the costs of paths without it.
         tolls: nats for a number of moves, for each segment from stop to stop and each number up to the greatest
-            [K, N + 1]; finite, of either sign. They say how many moves to make, and nothing else: where that is given,
-            and once it is chosen (`motionmind.search.length`), nothing is paid for it. None for no tolls.
+            [K, N + 1]; finite, of either sign. They serve only to choose the number of moves
+            (`motionmind.search.length`), and are not part of a path's cost. None for no tolls.
     """
 
     model: Model
@@ -189,8 +189,8 @@ def costs_to_go(
         V[0, s at goal] = 0
         V[k, s] = min over edges s -> s' of  cost(s, s') + alone(s') + timed[T - k + 1, s'] + V[k - 1, s']
 
-    over the states s' that are allowed on the way, and with the last move over those at the goal. Summed over chains V
-    bounds the cost of exactly k moves from below, since each coupling counts once, at the least it can cost its chain.
+    over the allowed states s', and for the last move over those at the goal. Summed over chains, V bounds the cost of
+    exactly k moves from below, since each coupling counts once, at the least that it can cost its chain.
 
     Args:
         model: the costs, waits included.
@@ -226,7 +226,7 @@ def _fill_costs_to_go(model: Model, goal: Ints, timed: Floats, known: int, value
                     cost += timed[moves - k + 1, row]
                 arrived[row - first] = cost if k == 1 or model.allowed[row] else np.inf
             for row in range(first, last):
-                least, other = np.inf, np.inf  # of every other edge, for the next need not wait for the one before
+                least, other = np.inf, np.inf  # one for odd and one for even edges, to run in parallel
                 first_edge, end = np.uint64(model.indptr[row]), np.uint64(model.indptr[row + 1])
                 odd = first_edge + (end - first_edge) % np.uint64(2)
                 if odd > first_edge:

@@ -52,11 +52,11 @@ class Trellis(NamedTuple):
 
 
 def segment_trellises(problem: Problem, moves: Sequence[int]) -> list[Trellis]:
-    """Build a trellis for each segment of a problem, with every state that is allowed in the domains.
+    """Build a trellis for each segment of a problem, with every allowed state in the domains.
 
     Args:
         problem: a problem with K - 1 vias.
-        moves: the moves of its stops: 0, those at which the vias are passed, and the last move [K + 1].
+        moves: the moves of its stops: 0, those of the vias, and the last move [K + 1].
 
     Returns:
         K trellises.
@@ -76,7 +76,7 @@ def build_trellis(
     """Build the trellis of exactly `moves` moves from a start to a goal.
 
     A state is in a domain if it is allowed there, some walk of exactly T moves passes through it then, and the cheapest
-    such walk, beside the other chains' cheapest, costs less than `below`. So no path cheaper than `below` is lost.
+    such walk plus the other chains' cheapest costs less than `below`. So no path cheaper than `below` is lost.
 
     Args:
         model: the costs, waits included.
@@ -84,15 +84,15 @@ def build_trellis(
         moves: number of moves T.
         to_go: `costs_to_go` to the goal, for at least T moves and with the same timed costs, nats [T + 1 or more, G].
         below: cost of a path already known, nats, or infinity.
-        timed: further costs of being in each state after each move, nats [T + 1, G]; None for none. At the start
-            nothing is paid.
+        timed: further costs of being in each state after each move, nats [T + 1, G]; None for none. The start costs
+            nothing.
     """
     timed = np.zeros((0, 0)) if timed is None else timed
     dom_ptr, place = _domains(model, start, moves, to_go, below, timed)
     chains, states, lengths = len(model.parents), model.starts[-1], np.diff(dom_ptr)
     variable = np.repeat(np.arange(len(lengths)), lengths)
     move, first, rows = variable // chains, model.starts[variable % chains], np.flatnonzero(place >= 0) % states
-    dom, last = (rows - first).astype(np.int32), dom_ptr[moves * chains]  # from the last move no edges lead
+    dom, last = (rows - first).astype(np.int32), dom_ptr[moves * chains]  # no edges leave the last move
     edges = model.indptr, model.targets, model.costs
     shifts = (move[:last] + 1) * states + first[:last]
     row_ptr, row_to, row_cost = select_entries(*edges, rows[:last], place.ravel(), shifts)
@@ -111,7 +111,7 @@ def build_trellis(
 
 
 def positions_above(chains: int, parents: Ints, dom_ptr: Ints, up_ptr: Ints) -> tuple[Ints, Ints]:
-    """Return the position of the parent variable that each coupling row is for, and the variable [U] each."""
+    """Return, for each coupling row, the position of the parent variable, and the variable, [U] each."""
     child = np.repeat(np.arange(len(up_ptr) - 1), np.diff(up_ptr))
     above = child + (parents - np.arange(chains))[child % chains]
     return dom_ptr[above] + np.arange(len(child)) - up_ptr[child], child
@@ -119,7 +119,7 @@ def positions_above(chains: int, parents: Ints, dom_ptr: Ints, up_ptr: Ints) -> 
 
 @jit
 def correction(trellis: Trellis, u: int, x: int) -> float:
-    """Return the correction in nats of position `x` in coupling row `u`; 0 for a pair that is not listed."""
+    """Return the correction in nats of position `x` in coupling row `u`; 0 for an unlisted pair."""
     low, high = trellis.col_ptr[u], trellis.col_ptr[u + 1]
     while low < high:
         middle = (low + high) // 2
@@ -145,7 +145,7 @@ def locate(trellis: Trellis, states: Int32s) -> Ints:
 
 @jit
 def reachable(trellis: Trellis, through: Floats, below: float) -> Bools:
-    """Return which positions [P] a path cheaper than `below` may go through, each leading on and led to.
+    """Return which positions [P] a path cheaper than `below` may go through; each has a successor and a predecessor.
 
     Args:
         trellis: the problem.
@@ -153,7 +153,7 @@ def reachable(trellis: Trellis, through: Floats, below: float) -> Bools:
         below: nats.
     """
     kept = through < below
-    for i in range(len(trellis.dom_ptr) - 2 - trellis.chains, -1, -1):  # what leads nowhere
+    for i in range(len(trellis.dom_ptr) - 2 - trellis.chains, -1, -1):  # drop positions without a successor
         for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
             leads, e = False, trellis.row_ptr[p]
             while kept[p] and not leads and e < trellis.row_ptr[p + 1]:
@@ -162,7 +162,7 @@ def reachable(trellis: Trellis, through: Floats, below: float) -> Bools:
             kept[p] = leads
     led_to = np.zeros(len(kept), np.bool_)
     led_to[: trellis.dom_ptr[trellis.chains]] = True
-    for p in range(len(kept)):  # what nothing leads to
+    for p in range(len(kept)):  # drop positions without a predecessor
         kept[p] = kept[p] and led_to[p]
         if kept[p]:
             for e in range(np.uint64(trellis.row_ptr[p]), np.uint64(trellis.row_ptr[p + 1])):
@@ -171,16 +171,16 @@ def reachable(trellis: Trellis, through: Floats, below: float) -> Bools:
 
 
 def subset(trellis: Trellis, kept: Bools, rows: Ints, in_place: bool) -> Trellis:
-    """Build the trellis of the positions that are kept [P].
+    """Build the trellis of the kept positions [P].
 
     Args:
-        trellis: the whole.
+        trellis: the whole trellis.
         kept: which positions to keep.
         rows: their `coupling_rows`.
-        in_place: whether in the memory of the whole, which is lost.
+        in_place: whether to overwrite the memory of the whole.
     """
     held = np.flatnonzero(kept)
-    before = np.concatenate([[0], np.cumsum(kept)])  # how many are kept before each position
+    before = np.concatenate([[0], np.cumsum(kept)])  # number of kept positions before each
     numbers = np.where(kept, before[:-1], -1).astype(np.int32)
     dom_ptr, up_ptr = before[trellis.dom_ptr], np.searchsorted(rows, trellis.up_ptr)
     row, col = (trellis.row_ptr, trellis.row_to, trellis.row_cost), (trellis.col_ptr, trellis.col_to, trellis.col_cost)
@@ -197,7 +197,7 @@ def subset(trellis: Trellis, kept: Bools, rows: Ints, in_place: bool) -> Trellis
 
 
 def coupling_rows(trellis: Trellis, kept: Bools) -> Ints:
-    """Return the coupling rows [U'] of the positions that are kept [P]."""
+    """Return the coupling rows [U'] of the kept positions [P]."""
     above, _ = positions_above(trellis.chains, trellis.parents, trellis.dom_ptr, trellis.up_ptr)
     return np.flatnonzero(kept[above])
 
@@ -227,7 +227,7 @@ def _costs_so_far(model: Model, start: Ints, moves: int, timed: Floats) -> Float
 
 @jit
 def _domains(model: Model, start: Ints, moves: int, to_go: Floats, below: float, timed: Floats) -> tuple[Ints, Int32s]:
-    """Return `dom_ptr`, and the position of each state at each move [T + 1, G], -1 where it has none."""
+    """Return `dom_ptr`, and the position of each state at each move [T + 1, G], -1 for none."""
     chains, rows = len(model.parents), model.starts[-1]
     so_far = _costs_so_far(model, start, moves, timed)
     spare = below
@@ -239,8 +239,8 @@ def _domains(model: Model, start: Ints, moves: int, to_go: Floats, below: float,
     for i in range((moves + 1) * chains):
         t, chain = i // chains, i % chains
         first, least = model.starts[chain], to_go[moves, model.starts[chain] + start[chain]]
-        # Only what kept states lead to is kept. The margin grows with t, by more than the sums can be off: rounding
-        # cannot keep a state and drop all that follow it.
+        # Keep only successors of kept states. The margin grows with t, by more than the rounding of the sums: rounding
+        # cannot keep a state and drop all its successors.
         margin = (t + 1) * (1e-9 + 1e-14 * (abs(least) + abs(spare)))
         led_to = np.zeros(model.starts[chain + 1] - first, np.bool_)
         if t == 0:

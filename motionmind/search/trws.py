@@ -6,8 +6,8 @@ in order, or in reverse, and sends from variable a along each edge (a, b) that l
 
     M(a -> b)(x_b) = min over x_a of  gamma_a * theta_a(x_a) - M(b -> a)(x_a) + theta_ab(x_a, x_b)
 
-where theta_a is the variable's own cost plus all messages to it, less its minimum. What is subtracted so that theta and
-messages have minimum 0 are the *constants* of the variable; after a backward sweep their sum is a lower bound.
+where theta_a is the variable's own cost plus all messages to it, less its minimum. The minima subtracted from theta and
+from messages are the *constants* of the variable; after a backward sweep their sum is a lower bound.
 
 Then, with values chosen for all variables up to i, the cost of the rest is at least
 
@@ -20,13 +20,13 @@ messages from before cancel with the M(a -> b) that are subtracted. So the n mes
 its edges in, and the messages that came back to b, less its constants; and so on to the last variable. The proof holds
 for any forward messages.
 
-In other words, the energy is shared out among chains that run along the order, whose least costs add up to the bound.
-Theta is the sum, over the chains through a variable, of what each costs more than its least with a given value there.
-So when the backward sweep comes to a variable, theta plus the bound as it then stands bounds all paths *through* each
-position. That bound is the sum of the constants of the forward sweep before the variable, the minima of theta from it
-on, and the constants of the messages sent back so far; for messages to earlier variables the forward sweep's constants
-count instead. Where it is no less than the cost of a path already known, the position can leave its domain, which
-tightens the next bounds: reduced-cost fixing, as in linear programming.
+In other words, the energy is shared among chains that run along the order, whose least costs add up to the bound.
+Theta is the sum, over the chains through a variable, of each chain's excess over its least cost with a given value.
+So when the backward sweep reaches a variable, theta plus the current bound bounds all paths *through* each position.
+That bound is the sum of the constants of the forward sweep before the variable, the minima of theta from it on, and the
+constants of the messages sent back so far; for messages to earlier variables the forward sweep's constants count
+instead. If it is at least the cost of a known path, the position can leave its domain, which tightens the next bounds:
+reduced-cost fixing, as in linear programming.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Messages(NamedTuple):
         constants: subtracted at each variable by the backward sweep [n].
         before: subtracted at each variable by the forward sweep [n].
         ahead: a position's own cost plus all messages to it from later variables, less its variable's constant [P]:
-            what choosing it adds to f, but for its edges in and what they had promised.
+            the growth of f when choosing it, apart from its edges in and their earlier messages.
         through: a lower bound on the cost of every path through a position [P].
     """
 
@@ -144,8 +144,8 @@ def forward(trellis: Trellis, messages: Messages) -> None:
 def _send_ahead(trellis: Trellis, messages: Messages, i: int, theta: Floats) -> float:
     """Send from variable i, whose share is theta, to its chain's next move; return what is subtracted.
 
-    Here and below positions are unsigned numbers, of which numba need not ask whether they count from the end: half of
-    the time of the innermost loops.
+    Here and below positions are unsigned, so Numba omits the check for negative indices: half of the innermost loops'
+    time.
     """
     first, begin, end = trellis.dom_ptr[i], trellis.dom_ptr[i + trellis.chains], trellis.dom_ptr[i + trellis.chains + 1]
     messages.down_row[begin:end] = np.inf
@@ -258,10 +258,10 @@ def _normalise(message: Floats, begin: int, end: int) -> float:
 
 @jit
 def step(trellis: Trellis, messages: Messages, i: int, before: int, above: int, e: int) -> float:
-    """Return by how much f grows, in nats, when variable i takes the position that edge `e` leads to.
+    """Return the growth of f in nats when variable i takes the position that edge `e` leads to.
 
-    f grows by the cost of the position and of its edges in, plus what later variables have sent back to it, less what
-    its edges in had promised and the variable's constant. At least 0 but for rounding.
+    f grows by the cost of the position and its edges in, plus the messages from later variables, less the messages
+    along its edges in and the variable's constant. The growth is at least 0 up to rounding.
 
     Args:
         trellis: the problem.
@@ -303,7 +303,7 @@ def descend(trellis: Trellis, messages: Messages, path: Ints, start: int) -> flo
 
 @jit
 def _least_step(trellis: Trellis, messages: Messages, i: int, before: int, above: int) -> tuple[float, int]:
-    """Return the least that f grows by with variable i, as `step` has it, and the position where it does.
+    """Return the least growth of f at variable i, as `step` defines it, and the position with that growth.
 
     Args:
         trellis: the problem.
@@ -361,18 +361,18 @@ def tighten(trellis: Trellis, messages: Messages, path: Ints, sweeps: int, enoug
 def prune(trellis: Trellis, messages: Messages, below: float, in_place: bool) -> tuple[Trellis, Messages]:
     """Remove the positions that no path cheaper than `below` nats goes through; return the rest with its messages.
 
-    Where there is no such path at all a domain is left empty.
+    If there is no such path, a domain is left empty.
 
     Args:
-        trellis: the whole.
+        trellis: the whole trellis.
         messages: those after a backward sweep.
         below: nats.
-        in_place: whether the rest may be written over the whole, which is lost unless a domain is left empty.
+        in_place: whether the rest may overwrite the whole, which survives only if a domain is left empty.
     """
     kept = reachable(trellis, messages.through, below)
     held = np.flatnonzero(kept)
     rows = coupling_rows(trellis, kept)
-    fewest = np.diff(np.searchsorted(held, trellis.dom_ptr)).min()  # that are kept of a domain
+    fewest = np.diff(np.searchsorted(held, trellis.dom_ptr)).min()  # least number of kept positions in any domain
     return subset(trellis, kept, rows, in_place and bool(fewest > 0)), Messages(
         messages.down_row[held], messages.up_row[held], messages.down_col[held], messages.up_col[rows],
         messages.constants.copy(), messages.before.copy(), messages.ahead[held], messages.through[held],

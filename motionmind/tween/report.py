@@ -204,7 +204,7 @@ def read_any_report(path: FilePath) -> TweenReport | NoPathReport:
 
 
 def _fault(error: Exception, path: Path) -> str:
-    """Say what a report lacks or has wrong, and how to write one, not over what is no report at all."""
+    """Describe the fault of a report, and how to write one without overwriting a file that is not a report."""
     lacks = "Object missing required field"
     fault = str(error)
     if not fault.startswith(lacks):
