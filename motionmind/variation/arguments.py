@@ -1,4 +1,4 @@
-"""Checks of arguments: numbers, numpy's or Python's, become Python's own, which files can hold; the rest is refused."""
+"""Checks of arguments: convert Python's and NumPy's numbers to Python's, which files can hold, and refuse the rest."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def check_whole(name: str, value: object, least: int | None = None, most: int | 
 
 
 def check_number(name: str, value: object) -> float:
-    """Return a finite number as a float; WrongTypeError if it is no number, MotionMindError if it is not finite."""
+    """Return a finite number as a float; WrongTypeError if it is not a number, MotionMindError if it is not finite."""
     wanted = "a finite number"
     array = _numbers(name, value, wanted)
     if array.ndim:
@@ -42,7 +42,7 @@ def check_number(name: str, value: object) -> float:
 
 
 def check_numbers(name: str, value: object) -> tuple[float, ...]:
-    """Return finite numbers as floats [d], d = 1 for a single number; errors as of `check_number`."""
+    """Return finite numbers as floats [d], d = 1 for a single number; errors as for `check_number`."""
     return tuple(map(float, _numbers(name, value, "finite numbers").reshape(-1)))
 
 
@@ -53,10 +53,10 @@ def take_renamed(options: dict[str, Any], old: str, new: str, value: Any) -> Any
         options: keywords that a function collected; `old` is removed from them.
         old: the former name.
         new: the present name.
-        value: what was given by the present name; None where nothing was.
+        value: the value given by the present name; None if there is none.
 
     Returns:
-        What was given, by either name.
+        The value given by either name.
 
     Raises:
         WrongTypeError: both names were given.
@@ -82,5 +82,5 @@ def _numbers(name: str, value: object, wanted: str) -> Floats:
 
 
 def _error(is_of_type: bool) -> type[MotionMindError]:
-    """Return the error for a value out of its range, or of another type."""
+    """Return the error class for a value out of range, or of the wrong type."""
     return MotionMindError if is_of_type else WrongTypeError

@@ -1,10 +1,10 @@
-"""Controls: orders of a piece that chance or a simpler mapping makes, to compare a chaotic variation with.
+"""Controls: orders of a piece by chance or by a simpler mapping, for comparison with a chaotic variation.
 
 - `shuffle`: the postures in random order.
 - `chunks`: the chunks of a chaotic order in random order. It keeps as much of the piece as that order does.
-- `quadrants`: the postures of each body part in a random order of their own, after Merce Cunningham. They compose
-  postures that the piece never had, so these are a piece themselves (`Piece.composed`), in their own order.
-- `dabby`: the postures along a chaotic trajectory, as Dabby's mapping of one coordinate gives them.
+- `quadrants`: the postures of each body part in an independent random order, after Merce Cunningham. The composed
+  postures do not occur in the piece, so they form a new piece (`Piece.composed`), in its own order.
+- `dabby`: the postures along a chaotic trajectory, by Dabby's mapping of one coordinate.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def needs_trajectory(self) -> bool:
-        """Whether it is made of a trajectory."""
+        """Whether its order comes from a trajectory."""
         return "flow" not in REFUSED[self.by]
 
     def of_piece(self, piece: Piece) -> tuple[Piece, Ints]:
@@ -83,7 +83,7 @@ def control_of(by: By, seed: int) -> Control | None:
 
 
 def map_points(control: Control | None, sites: Floats, points: Floats) -> Ints:
-    """Map each point of a trajectory [M, d] to the posture whose cell it is in [M].
+    """Map each point of a trajectory [M, d] to the posture whose cell contains it [M].
 
     Args:
         control: the control that maps the points; None for the nearest site.
@@ -96,12 +96,12 @@ def map_points(control: Control | None, sites: Floats, points: Floats) -> Ints:
 def compose_postures(piece: Piece, sources: Ints) -> Piece:
     """Compose postures of joints from several postures of a piece.
 
-    The root goes with its joint. The lowest point of each posture is as high as in the posture that its root is from,
-    for other legs would sink into the floor or hover.
+    The root position comes with the root joint. Keep the height of the lowest point in the root's source posture, as
+    other legs would otherwise sink into the floor or hover.
 
     Args:
         piece: the piece, N postures.
-        sources: the posture that each joint is taken from [N, J].
+        sources: the source posture of each joint [N, J].
 
     Returns:
         The composed postures at the times of the piece's own; its credits are the piece's.

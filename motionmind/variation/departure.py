@@ -1,4 +1,4 @@
-"""The share of a piece's order that a variation leaves, and the nudge that makes it leave so much."""
+"""The share of steps at which a variation departs from its piece's order, and the nudge that gives a share."""
 
 from __future__ import annotations
 
@@ -9,29 +9,28 @@ import numpy as np
 from motionmind._typing import Bools, Ints
 from motionmind.errors import MotionMindError
 
-WITHIN = 0.05  # of the share that is sought
-DEPART = 0.25  # the share that is sought unless another is given
-# Ten to a power of ten; the attractors are some tens across. A piece of a thousand postures is left by a quarter of the
-# steps only if it is followed for hundreds of them, and so from a trajectory that is hardly beside its own.
+WITHIN = 0.05  # tolerance on the share
+DEPART = 0.25  # default share
+# Ten per power of ten; the attractors are some tens across. To depart from a piece of a thousand postures at a quarter
+# of the steps, a variation must follow it for hundreds of steps, so its trajectory must start very near the piece's.
 _NUDGES = np.geomspace(1e-12, 10.0, 131)
 
 
 def departs(order: Ints) -> Bools:
-    """Return which steps [L - 1] of an order of postures [L] neither go on in the piece nor stay."""
+    """Return which steps [L - 1] of an order of postures [L] neither continue the piece nor stay."""
     steps = np.diff(order)
     return np.asarray((steps != 1) & (steps != 0))
 
 
 def departure(order: Ints) -> float:
-    """Return the share of the steps of an order of postures [L] that neither go on in the piece nor stay."""
+    """Return the share of steps of an order of postures [L] that neither continue the piece nor stay."""
     return float(np.mean(departs(order))) if len(order) > 1 else 0.0
 
 
 def share_sought(nudge: object | None, depart: float | None, start: object | None, stretch: int = 1) -> float | None:
     """Return the share of steps for which `vary` seeks a nudge, given its arguments; None if it does not seek one.
 
-    Unless one is given, the stretches are twice as long on average as they have to be, or the share is a quarter if
-    that is less.
+    By default, the share is a quarter, or less if needed for stretches of twice their least length on average.
     """
     return min(DEPART, 0.5 / stretch) if nudge is None and depart is None and start is None else depart
 
@@ -42,10 +41,10 @@ def find_nudge(order: Callable[[float], Ints], share: float, every: int = 1) -> 
     Args:
         order: returns the order of postures that a nudge gives; MotionMindError if its trajectory leads nowhere.
         share: the share, from 0 to 1.
-        every: tries each of so many of the nudges, which are ten to a power of ten.
+        every: try only every n-th nudge; there are ten nudges per power of ten.
 
     Returns:
-        The smallest nudge that comes within 0.05 of the share; if none does, the one that comes nearest.
+        The smallest nudge whose share is within 0.05; if there is none, the nudge with the nearest share.
 
     Raises:
         MotionMindError: the share is not from 0 to 1, or no nudge gives an order.
@@ -57,7 +56,7 @@ def find_nudge(order: Callable[[float], Ints], share: float, every: int = 1) -> 
         try:
             found = abs(departure(order(nudge)) - share)
         except MotionMindError:
-            if off == np.inf:  # it is no matter of the nudge
+            if off == np.inf:  # the nudge is not the cause
                 raise
             break
         if found < off:

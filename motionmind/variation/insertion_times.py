@@ -1,4 +1,4 @@
-"""The time that the engine will insert at each seam that a variation may have, estimated before it searches."""
+"""Estimates of the time that the engine will insert at each possible seam, before it searches."""
 
 from __future__ import annotations
 
@@ -12,18 +12,17 @@ from motionmind.variation.seams import TransitionTest
 
 
 def estimate_insertions(piece: Piece, test: TransitionTest) -> Singles:
-    """Estimate what a seam from each of a piece's N postures to each other inserts, seconds [N, N].
+    """Estimate the seconds that a seam inserts from each of a piece's N postures to each other [N, N].
 
-    It is nothing where the corpus knows the transition. Elsewhere it is the corpus's median time for so far a way, but
-    no less than lets every part of the body be no faster than all but its fastest hundredth of moments
-    (`motionmind.tween.pacing`).
+    The estimate is 0 where the corpus knows the transition. Elsewhere it is the corpus's median time for the
+    displacement, or longer if a body part would exceed the 99th percentile of its speed (`motionmind.tween.pacing`).
 
     Args:
         piece: the piece.
         test: judges which transitions are abrupt.
 
     Raises:
-        SkeletonError: the piece is on another skeleton than the corpus.
+        SkeletonError: the piece has another skeleton than the corpus.
     """
     engine = test.engine
     skeleton = engine.corpus.skeleton

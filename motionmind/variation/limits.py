@@ -1,13 +1,12 @@
 """Limits of a variation: how short stretches of the piece may be, and how much of the time insertions may take.
 
-The trajectory's own order has short stretches, and many insertions. Under limits another order is taken, which stays
-near the trajectory (`motionmind.variation.stretches`): of those with long enough stretches the cheapest, where a second
-of insertion has the smallest price by which the limit holds. So a seam goes, or moves to where the piece is more like
-itself, the sooner the longer its insertion is and the less the trajectory insists on it.
+The trajectory's own order has short stretches and many insertions. Limits replace it by another order near the
+trajectory (`motionmind.variation.stretches`): the cheapest with long enough stretches, at the smallest price per second
+of insertion that meets the limit. So a seam disappears, or moves to a place where the piece resembles itself more, the
+sooner the longer its insertion is and the less the trajectory requires it.
 
-How long an insertion is, is not known before the engine has found it. So it begins with estimates; the seams of the
-order that they give are smoothed, and what was found takes the place of the estimates, until the order has no seam that
-was not smoothed yet.
+The length of an insertion is unknown until the engine finds it. So start with estimates, smooth the seams of the
+resulting order, and replace the estimates by the lengths found, until every seam of the order has been smoothed.
 """
 
 from __future__ import annotations
@@ -26,12 +25,12 @@ from motionmind.variation.departure import WITHIN, departs
 from motionmind.variation.seams import Index, Transition
 from motionmind.variation.stretches import cheapest_order
 
-STRETCH = 4  # postures of each stretch, where insertions are limited and nothing else is said
+STRETCH = 4  # default postures per stretch where insertions are limited
 _MOST = 4_000  # postures of a piece, and of its variation: arrays hold the square of them
-_ROUNDS = 12  # of smoothing; then only seams that are smoothed already are taken
+_ROUNDS = 12  # of smoothing; then only use seams that are smoothed already
 _HALVINGS = 20  # of the span of prices
 _PRICES = 1e-6, 1e4  # of a second, in the trajectory's extents
-_NEVER = 1e6  # seconds that stand for a seam that is not to be taken
+_NEVER = 1e6  # seconds assigned to a forbidden seam
 
 Smoothing = Callable[[Sequence[tuple[int, int]]], tuple[Transition, ...]]  # smooths seams; fewer if it was ended
 
@@ -40,8 +39,8 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Limits of a variation.
 
     Attributes:
-        inserted: the greatest share of the time that insertions are to take; None for no limit.
-        stretch: postures that each stretch of the piece has at least.
+        inserted: the greatest share of the time for insertions; None for no limit.
+        stretch: the least number of postures in each stretch of the piece.
     """
 
     inserted: float | None
@@ -49,11 +48,11 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The order that is kept under limits, in place of the trajectory's.
+    """The order under limits, in place of the trajectory's.
 
     Attributes:
         order: postures of the piece [L].
-        limits: the limits; the share that was reached may be greater.
+        limits: the limits; the actual share of insertions may be greater.
     """
 
     order: tuple[Index, ...]
@@ -61,7 +60,7 @@ class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def check_limits(inserted: float | None, stretch: int | None, count: int, length: int) -> Limits | None:
-    """Return the limits that are asked for; None for none.
+    """Return the requested limits; None for none.
 
     Args:
         inserted: see `Limits`.
@@ -89,7 +88,7 @@ def check_limits(inserted: float | None, stretch: int | None, count: int, length
 
 
 def check_departure(depart: float | None, limits: Limits | None) -> None:
-    """Raise MotionMindError if so large a share of steps cannot leave a piece's order, in stretches so long."""
+    """Raise MotionMindError if the least length of stretches rules out departing at this share of the steps."""
     if depart is not None and limits is not None and depart > 1.0 / limits.stretch + WITHIN:
         raise MotionMindError(
             f"depart {depart:g} cannot be reached in stretches of {limits.stretch} postures: at most 1 step in "
@@ -110,7 +109,7 @@ def inserted_share(inserted: Floats, durations: Floats) -> float:
 
 @dataclass(eq=False)
 class _Seeker:
-    """Seeks an order within limits; `seconds` [N, N] are the estimates, which what is found replaces."""
+    """A search for an order within limits; `seconds` [N, N] holds estimates until the found lengths replace them."""
 
     course: Itinerary
     durations: Floats
@@ -118,7 +117,7 @@ class _Seeker:
     seconds: Singles
 
     def order(self) -> Ints:
-        """Return the order of the smallest price by which the limit holds, as far as is known [L]."""
+        """Return the order at the smallest price that meets the limit, by present knowledge [L]."""
         at_no_price = self._cheapest(0.0)
         if self._holds(at_no_price):
             return at_no_price
@@ -157,7 +156,7 @@ def keep_within(
         limits: the limits.
         course: the trajectories.
         durations: seconds from each of the piece's postures to the next [N].
-        seconds: estimates of what a seam from each posture to each inserts [N, N].
+        seconds: estimated seconds that a seam inserts from each posture to each other [N, N].
         smooth: smooths seams; None if no corpus does.
 
     Returns:
@@ -190,13 +189,13 @@ def keep_within(
 
 
 def _seams_of(order: Ints) -> list[tuple[int, int]]:
-    """Return the seams of an order of postures [L], each once: the postures that they lead from and to."""
+    """Return the distinct seams of an order of postures [L], as (from, to) postures."""
     at = np.flatnonzero(departs(order))
     return list(dict.fromkeys(zip(order[at].tolist(), order[at + 1].tolist(), strict=True)))
 
 
 def _learn(seeker: _Seeker, estimates: Singles, smoothed: Mapping[tuple[int, int], Transition]) -> None:
-    """Put what was found in the place of the estimates, and bring the others to the same scale."""
+    """Replace estimates by the found lengths, and rescale the other estimates to match."""
     known = {pair: float(one.candidates[0].motion.times[-1]) for pair, one in smoothed.items() if one.candidates}
     scale = 1.0
     if known:

@@ -1,7 +1,7 @@
 """The review of a variation: edits, each of which leads from one state of the review to the next.
 
-An edit loses nothing. A variation keeps the list of its edits; its state is the result of applying them one after
-another to the first order. To undo the last edit is to drop it from the list.
+An edit loses nothing. A variation keeps the list of its edits; applying them in turn to the first order gives its
+state. To undo the last edit, drop it from the list.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ class Cut(msgspec.Struct, frozen=True, tag_field="edit", tag="cut", forbid_unkno
     """Move postures `first` to `last` before posture `before`, all as numbered before the edit.
 
     Attributes:
-        numbers: "anew" if seams are numbered in the order in which they come then; "kept", as in files of 0.1, if each
-            seam keeps its number and new seams get the next ones.
+        numbers: "anew" to number seams in their new order; "kept", as in files of 0.1, if each seam keeps its number
+            and new seams get the next ones.
     """
 
     first: int
@@ -61,7 +61,7 @@ class Cut(msgspec.Struct, frozen=True, tag_field="edit", tag="cut", forbid_unkno
 class Smooth(
     msgspec.Struct, Generic[T], frozen=True, eq=False, tag_field="edit", tag="smooth", forbid_unknown_fields=True
 ):
-    """Judge and smooth transitions that had not been, or whose insertion was discarded; nobody has approved these yet.
+    """Judge and smooth transitions that were not judged before, or whose insertion was discarded; they become open.
 
     Attributes:
         transitions: the new judgements, with what the engine found; variation files call them `joins`.
@@ -91,11 +91,11 @@ class Verdict:
 
 @dataclass(frozen=True, eq=False)
 class Seam:
-    """A place in a variation where it neither goes on as the piece does nor stays in its posture.
+    """A place in a variation where it neither continues the piece nor stays in its posture.
 
     Attributes:
         number: the seam's number, from 1 on in the order of the movement.
-        at: the posture of the variation that it leads from; it leads to the next one.
+        at: the posture of the variation before the seam; the seam leads to the next one.
         start: that posture's number in the piece.
         end: the next posture's number in the piece.
         transition: the corpus's judgement of it; None if no corpus has judged it.
@@ -130,7 +130,7 @@ class Seam:
 
     @property
     def insertion(self) -> Candidate | None:
-        """The engine's movement that is inserted here; None if it found none, or it is discarded."""
+        """The engine's movement inserted here; None if it found none, or the reviewer discarded it."""
         if self.transition is None or not self.transition.candidates or self.decision == "discarded":
             return None
         return self.transition.candidates[self.chosen - 1]
@@ -177,7 +177,7 @@ class ReviewState:
         return tuple(seams)
 
     def looks_like(self, other: ReviewState) -> bool:
-        """Tell whether a reviewer sees the same in another state: its postures, its seams and their insertions."""
+        """Return whether another state has the same postures, seams and insertions, and so looks the same."""
         mine, theirs = (
             [(seam.number, seam.transition, seam.decision, seam.chosen) for seam in state.seams]
             for state in (self, other)
@@ -185,7 +185,7 @@ class ReviewState:
         return np.array_equal(self.postures, other.postures) and mine == theirs
 
     def seam(self, number: int) -> Seam:
-        """Return the seam of that number; MotionMindError, which lists the seams there are, if there is none."""
+        """Return the seam with a number; MotionMindError, which lists the existing seams, if there is none."""
         for seam in self.seams:
             if seam.number == number:
                 return seam
@@ -231,7 +231,7 @@ def apply_edit(state: ReviewState, edit: Edit) -> ReviewState:
 
 
 def _judge_anew(state: ReviewState, judged: Mapping[tuple[int, int], Transition]) -> ReviewState:
-    """The state with new judgements; a decision stands only where nothing was discarded and nothing new was found."""
+    """Return the state with new judgements; a decision stands unless it was a discard or there is a new result."""
     verdicts = dict(state.verdicts)
     for (one, other), verdict in verdicts.items():
         transition = judged.get((int(state.order[one]), int(state.order[other])))

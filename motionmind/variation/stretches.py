@@ -1,13 +1,13 @@
-"""Orders of a piece's postures that stay near a trajectory, in stretches of the piece that are not too short.
+"""Orders of a piece's postures that stay near a trajectory, in long enough stretches of the piece.
 
-The nearest site at each point (`motionmind.chaos.reorder`) gives an order that may leave the piece's at every step.
-Here an order pays for how far it is from the trajectory, and for what its seams insert:
+The nearest site at each point (`motionmind.chaos.reorder`) gives an order that may depart from the piece at every step.
+Here an order pays for its distance from the trajectory, and for the insertions at its seams:
 
     sum over n of (|y[n] - x[order[n]]| - min over i of |y[n] - x[i]|) / scale + charge * sum over seams of seconds
 
-Among the orders whose stretches, each a run of the piece, are long enough, the cheapest is found by dynamic
-programming: over the points, with the cheapest order that ends at each posture and may leave it. The scale is the root
-mean square distance of the sites from their middle. A seam leads to one of the sites that are nearest to its point.
+Dynamic programming over the points finds the cheapest order whose stretches (runs of the piece) are long enough, from
+the cheapest orders that end at each posture and may leave it. The scale is the root mean square distance of the sites
+from their mean. A seam leads to one of the sites nearest to its point.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from motionmind.errors import MotionMindError
 from motionmind.jit import jit
 
 _LANDINGS = 32  # sites at a point to which a seam may lead
-_ON, _STAY = -1, -2  # steps that are no seams; others are the number of a landing
+_ON, _STAY = -1, -2  # steps without a seam; other values are the number of a landing
 
 
 def cheapest_order(course: Itinerary, seconds: Singles, charge: float, stretch: int) -> Ints:
     """Find the cheapest order of a piece's N postures along a trajectory of L points (see the module).
 
-    It stays in a posture only where the nearest site does, too.
+    It stays in a posture only where the nearest site stays too.
 
     Args:
         course: the sites [N, d] and the trajectory [L, d].
-        seconds: what a seam from each posture to each inserts, seconds [N, N].
+        seconds: seconds that a seam inserts from each posture to each other [N, N].
         charge: the price of a second.
-        stretch: postures that each stretch has at least.
+        stretch: the least number of postures in each stretch.
 
     Returns:
         Postures [L].
@@ -62,7 +62,7 @@ def _follow(away: Singles, landings: Ints, stays: Bools, seconds: Singles, charg
     """Return the cheapest order [L]; none [0] if there is no order.
 
     Args:
-        away: how far each posture's site is from each point [L, N].
+        away: distance of each posture's site from each point [L, N].
         landings: postures to which a seam may lead at each point [L, K].
         stays: whether an order may stay in its posture at a point [L].
         seconds, charge, stretch: as in `cheapest_order`.
