@@ -86,7 +86,7 @@ def write(path: Path, movement: Motion | Posture) -> None:
 
 
 def note_licences(path: Path, motion: Motion) -> None:
-    """Note what stands against passing on a motion that is written, by the licences of what it is made of."""
+    """Note the licences of a written motion's sources that restrict passing it on."""
     from motionmind.credits.ledger import objections
 
     for objection in objections(motion.credits):
@@ -113,7 +113,7 @@ def write_all(paths: Sequence[Path], movement: Motion | Posture) -> None:
 
 
 def note_lossy_fields(path: Path, fields: Sequence[str]) -> None:
-    """Note the fields of a motion that its file has no place for, if any."""
+    """Note the fields of a motion that its file format cannot hold, if any."""
     if fields:
         note(f"{path}: no place for {'; '.join(fields)}")
 

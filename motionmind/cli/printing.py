@@ -46,7 +46,7 @@ class Notes(logging.Handler):
 
 
 def progress(message: str) -> None:
-    """Print a message about what takes long, on a terminal alone."""
+    """Print the progress of a long operation, on a terminal only."""
     if sys.stderr.isatty():
         click.echo(message, err=True)
 
@@ -117,7 +117,7 @@ def print_tween(result: Tween, files: Sequence[Path], *, with_details: bool = Fa
 
 
 def _print_beyond(result: Tween, indent: str = "") -> None:
-    """Print where a viewer would wince, a line each."""
+    """Print each flaw that would make a viewer wince, one per line."""
     from motionmind.tween.headline import beyond
 
     for sentence in beyond(result):
@@ -135,20 +135,20 @@ def _print_details(result: Tween) -> None:
 
 
 def _passages(places: Sequence[Source]) -> str:
-    """Format the passages that a movement is danced like: "adagio from 3.2 s, temps-lie from 10.0 s"."""
+    """Format the passages that a movement follows: "adagio from 3.2 s, temps-lie from 10.0 s"."""
     starts = [*places[:1], *(after for before, after in pairwise(places) if _parts(before, after))]
     return ", ".join(f"{displayed(one.clip)} from {one.seconds:.1f} s" for one in starts)
 
 
 def _parts(before: Source, after: Source) -> bool:
-    """Return whether a place in a corpus is not where a passage goes on from another."""
+    """Return whether a passage breaks off between two places in a corpus."""
     return (before.clip, before.corpus, before.mirrored) != (after.clip, after.corpus, after.mirrored) or not (
         before.seconds <= after.seconds <= before.seconds + _GOES_ON_S
     )
 
 
 def _tempo(result: Tween) -> str:
-    """Say in words why a tween takes as long as it does, and where that is not the corpus's way."""
+    """Explain the duration of a tween, and its differences from the corpus."""
     from motionmind.tween.pacing import worded
 
     tempo, said = result.tempo, []
@@ -171,7 +171,7 @@ def _tempo(result: Tween) -> str:
 
 
 def format_what_if(one: WhatIf) -> str:
-    """Format what a restriction costs a tween: "hold neck: 12.400 nats and 1 move less"."""
+    """Format the price of a restriction: "hold neck: 12.400 nats and 1 move less"."""
     nats = f"at least {one.least:.3f}, at most {one.most:.3f} nats"
     if one.proven:
         nats = f"{one.most:.3f} nats" if one.most >= 0.0005 else "no nats"
@@ -364,6 +364,6 @@ class Warned:
             note(str(message))
 
     def finish(self) -> None:
-        """Say how many warnings were not shown."""
+        """Print the number of warnings not shown."""
         if self._left:
             note(f"{count(self._left, 'more warning')} like these (--details prints them)")

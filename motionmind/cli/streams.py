@@ -1,4 +1,4 @@
-"""Standard output and standard error, neither of which may be in the way of the work."""
+"""Standard output and standard error, wrapped so that neither can stop the work."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class _Forgiving:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        """Write text, or do without."""
+        """Write text, or drop it on failure."""
         try:
             return self._stream.write(text)
         except (OSError, ValueError):  # ValueError: it was closed
@@ -52,7 +52,7 @@ class _Forgiving:
             return len(text)
 
     def flush(self) -> None:
-        """Flush, or do without."""
+        """Flush, ignoring failure."""
         try:
             self._stream.flush()
         except (OSError, ValueError):
