@@ -1,4 +1,4 @@
-"""Bending: where walks leave a path's states, they are bent towards them, as little as will do."""
+"""Bending of corpus walks towards the states of a path, no further than necessary."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from motionmind.walks.expectation import Expectation
 from motionmind.walks.headings import correct_headings
 from motionmind.walks.stops import Stop
 
-# Tolerances by which a chain may be off its state at a move: where something is asked of it, with room for the arc
-# between two frames, and elsewhere.
+# Distance that a chain may keep from its state at a move, in tolerances: where a request constrains the chain (below 1,
+# to leave room for the arc between two frames), and elsewhere.
 FIRMLY, FREELY = 0.95, 3.0
 
 
 def allowed_off(chains: Floats, path: Int32s, grammar: Grammar, tolerances: Floats, wished: Bools) -> Floats:
-    """Return how far each chain may be off its state at each move [T + 1, L], radians; the walk has them at `chains`.
+    """Return the distance that each chain may keep from its state at each move [T + 1, L], radians.
 
-    It is FIRMLY the chain's tolerance where something is asked of it. Elsewhere it is FREELY as much, and what the walk
-    is beyond the tolerance of every state: of a vocabulary that has nothing near, no state is to be forced on a
-    movement.
+    It is FIRMLY times the chain's tolerance where a request constrains the chain (`wished`). Elsewhere it is FREELY
+    times the tolerance, plus the walk's distance (at `chains`) beyond the tolerance of the nearest state: a vocabulary
+    without a state nearby must not distort the movement.
     """
     starts, nearest = grammar.transitions.starts, np.empty(path.shape)  # cosines of half the angles
     for chain in range(len(tolerances)):
@@ -45,11 +45,10 @@ def bend_to_states(
     corpus: Corpus,
     within: Floats,
 ) -> Expectation:
-    """Return a walk bent so that each chain is `within` radians [T + 1, L] of its state [T + 1, L, 4] at each move.
+    """Bend a walk so that each chain is `within` radians [T + 1, L] of its state [T + 1, L, 4] at each move.
 
-    Before, it has the chains at the moves as given [T + 1, L, 4].
-
-    The bend of each move is 0 at the stops and where the chain is near already; between moves it is a spline.
+    `chains` are the walk's orientations at the moves [T + 1, L, 4]. The bend is 0 at the stops and where a chain is
+    near enough already; a spline interpolates it between moves.
     """
     joints, inner = walk.poses.shape[1], np.ones(len(states), dtype=np.bool_)
     inner[list(stops)] = False

@@ -1,8 +1,7 @@
-"""Detours: what fills the time where there is more of it than a movement from one posture to another takes.
+"""Detours: movement that fills the time when a transition is given more than it takes.
 
-The mean of walks that may wander for long is near the mean of all postures, and hardly moves. Dancers who have time go
-on as they do from there, and come as they do to where they are to be. So a detour follows the corpus on from a posture
-that is like the first, and into one that is like the last; in between it joins the two in its own time.
+The mean of long corpus walks is near the mean of all postures and hardly moves. Instead, a detour follows a recording
+onwards from a posture like the first, then another into a posture like the last, and interpolates between the two.
 """
 
 from __future__ import annotations
@@ -15,23 +14,23 @@ from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import postures_near
 
-NEAREST = 8  # of the corpus's postures are tried for each end
-SEVERAL = 4  # times as many are looked at of a large corpus, whose trees measure distances in another way
-UNUSED = 0.05  # radians a joint (root mean square) that a recording must be nearer to be worth a move less of detour
+NEAREST = 8  # postures of the corpus to try for each end
+SEVERAL = 4  # times as many candidates in a large corpus, whose trees use another metric
+UNUSED = 0.05  # RMS radians per joint: cost of each move that the recordings do not fill
 
 
 def detour(corpus: Corpus, carriage: Carriage, ends: tuple[Floats, Floats], moves: int, own: int) -> Floats:
-    """Return orientations of the joints at each move [moves + 1, J, 4], the ends' own at both ends.
+    """Return orientations of the joints at each move [moves + 1, J, 4], exact at both ends.
 
-    Of the recordings that go on from near the first posture, and that lead near the last, those are taken that come
-    nearest to each other, are nearest to the ends, and last for all but `own` of the moves.
+    Choose the pair of recordings, one from near the first posture and one into the last, with the lowest cost: their
+    distance to each other, their distances to the ends, and the moves that they leave unfilled besides `own`.
 
     Args:
-        corpus: the movement that was learned from.
-        carriage: its moments.
+        corpus: the recorded movement.
+        carriage: its samples.
         ends: orientations of the chains in both postures [L, 4].
-        moves: number of moves, as long as the corpus's.
-        own: number of moves to join the recordings in.
+        moves: number of moves of the detour, each as long as one of the corpus.
+        own: number of moves in which to join the two recordings.
     """
     joints = len(corpus.skeleton)
     shown = carriage.orientations[: len(corpus), :joints]
@@ -61,7 +60,7 @@ def detour(corpus: Corpus, carriage: Carriage, ends: tuple[Floats, Floats], move
 
 
 def _nearest(carriage: Carriage, shown: Floats, posture: Floats) -> tuple[Ints, Floats]:
-    """Return the corpus's postures nearest to one [J, 4], of all [N, J, 4], and their distances, radians a joint."""
+    """Return the indices of the nearest of N postures [N, J, 4] to one [J, 4], and their distances, radians per joint."""
     some = np.arange(len(shown))
     if carriage.trees is not None:
         some = np.sort(postures_near(carriage.trees, carriage.orientations, posture, SEVERAL * NEAREST, len(shown)))

@@ -93,21 +93,21 @@ def jump_in_time(
     reach: tuple[int, int],
     fastest: Floats,
 ) -> Floats:
-    """Return how many times as long each half step is to take [2 T], at most 1, so that jumps are from stretched legs.
+    """Return the factor by which to stretch each half step [2 T], at most 1, so that jumps start from stretched legs.
 
-    Where the first or the last posture is in the air, how long the body falls from there is gravity's to say. A walk
-    may take longer from the floor to there: then the body would leave the floor in a posture in which it is lower, as
-    in a split, and first come down so far. It is to leave it in the one in which it stands highest, and legs hurry.
+    If the first or the last posture is in the air, gravity decides how long the body takes between it and the floor. A
+    walk that takes longer would take off in a lower posture, such as a split. Speed the legs up instead, so that the
+    body takes off in the posture in which it stands highest.
 
     Args:
         skeleton: the body.
         rotations: local rotations at the half steps [2 T + 1, J, 4].
-        seconds: how long half steps take [2 T].
-        heights: of the corpus's lowest points above the floor at the half steps [2 T + 1], metres.
+        seconds: durations of the half steps [2 T].
+        heights: heights of the corpus's lowest points above the floor at the half steps [2 T + 1], metres.
         low: height of the lowest point above the floor in the first and in the last posture [2], metres.
-        in_air: whether they are in the air, and how they are passed is not given [2].
-        reach: half steps from there to the next posture that is given.
-        fastest: speeds of the joints, rad/s, that are not exceeded more than HURRIES times [J].
+        in_air: whether each is in the air with no velocity given [2].
+        reach: half steps from each to the next given posture.
+        fastest: speeds of the joints, rad/s [J]; a hurried step stays below HURRIES times these.
     """
     out, still = np.ones(len(seconds)), np.zeros((len(rotations), 3))
     mass = centre_of_mass(skeleton, rotations, still) if in_air.any() else None
@@ -140,13 +140,13 @@ def jump_in_time(
 
 
 def land_between(seconds: Floats, heights: Floats, size: float, moving: tuple[bool, bool]) -> Floats:
-    """Return how many times as long each half step is to take [2 T], at least 1, so that a body that is in the air at
-    both ends comes down between, unless one leap of no great height leads from the one to the other.
+    """Return the factor by which to stretch each half step [2 T], at least 1, so that a body in the air at both ends
+    lands in between, unless one low leap joins the two.
 
     Args:
-        seconds: how long half steps take [2 T].
-        heights: of the lowest points above the floor at both ends [2], metres.
-        size: of the body (`motionmind.body.support.size_of`).
+        seconds: durations of the half steps [2 T].
+        heights: heights of the lowest points above the floor at both ends [2], metres.
+        size: size of the body (`motionmind.body.support.size_of`).
         moving: whether the first and the last posture are passed at a given velocity.
     """
     takes = float(seconds.sum())
@@ -163,15 +163,15 @@ def land_between(seconds: Floats, heights: Floats, size: float, moving: tuple[bo
 def slower_steps(
     motion: Motion, most: Floats, moving: tuple[bool, bool], slides: float = np.inf, lasts: bool = False
 ) -> Floats:
-    """Return how many times longer each step of a movement is to take [N - 1] so that nothing is faster than may be.
+    """Return the factor by which to stretch each step of a movement [N - 1] to respect the speed limits.
 
     Args:
         motion: the movement.
-        most: speeds of the joints, rad/s, of the body's turning, of its travel and its rise, heights/s, and the root's
-            acceleration, heights/s^2 [J + 4].
-        moving: whether the first and the last posture are passed at a given velocity, which is not to change.
-        slides: speed of a foot near the floor, heights/s; of bodies at least as tall as people.
-        lasts: whether it is to last as long as before: then what is slower takes its time from where nothing is fast.
+        most: limits on the speeds of the joints and of the body's turning, rad/s, of its travel and its rise, heights/s,
+            and on the root's acceleration, heights/s^2 [J + 4].
+        moving: whether the first and the last posture have a given velocity, which must not change.
+        slides: limit on the speed of a foot near the floor, heights/s; only for bodies at least as tall as people.
+        lasts: whether to keep the total duration: slower steps then take their time from steps with slack.
     """
     posed = pose(motion.skeleton, motion.rotations, motion.root)
     slower, slack = _slower(motion, posed, most, slides, moving)
@@ -181,13 +181,13 @@ def slower_steps(
 def _slower(
     motion: Motion, posed: Posed, most: Floats, slides: float, moving: tuple[bool, bool]
 ) -> tuple[Floats, Floats]:
-    """Return how many times longer each step of a movement is to take [N - 1], at least 1, and what share of its time
-    it could do without [N - 1].
+    """Return the factor by which to stretch each step of a movement [N - 1], at least 1, and the share of its time that
+    it can spare [N - 1].
 
     Args:
         motion: the movement.
         posed: the same, in the world.
-        most: as for `slower_steps`, as is all else.
+        most: limits, as in `slower_steps`.
         slides: speed of a foot near the floor, heights/s.
         moving: whether the first and the last posture are passed at a given velocity.
     """
@@ -215,17 +215,17 @@ def _slower(
 
 
 def _mean_around(values: Floats, weights: Floats) -> Floats:
-    """Return means [N] of values around each with so many weights [2 n + 1]; beyond the ends they are as there."""
+    """Return the weighted means [N] around each value, with weights [2 n + 1] and the end values repeated."""
     reach = len(weights) // 2
     return np.convolve(values[np.arange(-reach, len(values) + reach).clip(0, len(values) - 1)], weights, "valid")
 
 
 def _braking(moved: Floats, moving: tuple[bool, bool], fps: float) -> Bools:
-    """Return between which steps [N - 2] a body slows down from a velocity that is given, or comes to one.
+    """Return whether a body slows down from a given velocity, or speeds up to one, between steps [N - 2].
 
     Args:
         moved: displacements of the root in each step [N - 1, 3].
-        moving: whether it passes the first and the last frame with a given velocity.
+        moving: whether the first and the last frame have a given velocity.
         fps: frames a second.
     """
     faster, out = np.diff(np.linalg.norm(moved, axis=1)), np.zeros(len(moved) - 1, dtype=np.bool_)
@@ -238,13 +238,13 @@ def _braking(moved: Floats, moving: tuple[bool, bool], fps: float) -> Bools:
 
 
 def _within(slower: Floats, slack: Floats, seconds: Floats) -> Floats:
-    """Return how many times as long each step is to take [N - 1] so that all of them take as long as before.
+    """Return the factor by which to stretch each step [N - 1] so that the total duration stays the same.
 
     Args:
-        slower: how many times longer each is to take [N - 1].
-        slack: what share of its time each could do without [N - 1]; where more than SPARES of that would be taken,
-            all is left as it is.
-        seconds: how long each takes [N - 1].
+        slower: factor by which each step should stretch [N - 1].
+        slack: share of its time that each can spare [N - 1]; if more than SPARES of the total is needed, nothing
+            changes.
+        seconds: durations of the steps [N - 1].
     """
     more, spare = float((slower - 1.0) @ seconds), float(slack @ seconds)
     if more > SPARES * spare:
@@ -264,8 +264,8 @@ def _floor(times: Floats, low: Floats, at: Floats) -> Floats:
 
 
 def _away(middles: Floats, times: Iterable[float], fps: float, beside: float = 0.0) -> Floats:
-    """Return how far steps are from some times, by their middles [N]: from 0 up to `beside` seconds from one to 1 from
-    SETTLES more on."""
+    """Return 0 for steps whose middles [N] are within `beside` seconds of any of some times, rising to 1 over the next
+    SETTLES seconds."""
     since = np.full(len(middles), np.inf)
     for time in times:
         since = np.minimum(since, np.abs(middles - time))
@@ -273,7 +273,7 @@ def _away(middles: Floats, times: Iterable[float], fps: float, beside: float = 0
 
 
 def _falling(skeleton: Skeleton, posed: Posed, fps: float) -> Bools:
-    """Return in which frames of a movement the mass of a body falls, off the floor [N]."""
+    """Return whether the centre of mass is in free fall in each frame [N]."""
     ends, out = np.zeros(len(posed.places), dtype=np.bool_), np.zeros(len(posed.places), dtype=np.bool_)
     ends[[0, -1]] = True
     for start, stop in find_falls(skeleton, posed, ends, fps)[1]:

@@ -1,4 +1,4 @@
-"""The time that moves take, and the frames of a motion."""
+"""Durations of moves, and times of a motion's frames."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def usual(transitions: Transitions) -> float:
 def durations(path: Int32s, transitions: Transitions) -> Floats:
     """Return the duration of each move [T] of a path, seconds: the median over chains of the corpus's durations.
 
-    Chains that hold or wait do not vote while others move, for a hold can last any time; bridges have no duration of
-    their own. A move without any vote takes the median duration of all moves of the corpus.
+    While some chains move, chains that hold or wait do not vote, because a hold can last any time. Bridges have no
+    duration and never vote. A move without votes takes the median duration of all moves in the corpus.
 
     Args:
         path: states of the chains [T + 1, L].
@@ -58,11 +58,11 @@ def timeline(path: Int32s, transitions: Transitions, fps: float, length: float |
     """Return the times of a path's moves and of its frames, at about `fps`; the last frame falls on the end exactly.
 
     Args:
-        path: states of the chains [T + 1, L], with one move at least.
+        path: states of the chains [T + 1, L], with at least one move.
         transitions: the corpus's moves from state to state.
         fps: frames a second.
-        length: duration of the whole, seconds, to which frames are fitted; None for as long as the corpus takes,
-            stretched by less than a frame.
+        length: total duration, seconds, to which the frames are fitted; None for the duration in the corpus, rounded to
+            whole frames.
     """
     seconds = durations(path, transitions)
     usually = float(seconds.sum())
@@ -75,13 +75,13 @@ def timeline(path: Int32s, transitions: Transitions, fps: float, length: float |
 
 
 def stretch(clock: Timeline, at: Floats, times_longer: Floats, fps: float) -> tuple[Timeline, Floats]:
-    """Return a clock that runs slower, or faster, and the times that some steps then end at [S + 1].
+    """Return a slower or faster clock, and the times of the steps' boundaries on it [S + 1].
 
     Args:
-        clock: the clock as it was; the number of its usual moves stays, for they are slower, or faster.
-        at: times that the steps end at [S + 1], the first and the last those of the clock.
-        times_longer: how many times as long each step is to take [S].
-        fps: frames a second; the whole is stretched further by less than a frame.
+        clock: the clock to stretch; its number of usual moves stays the same.
+        at: the steps' boundaries on it [S + 1], from its first time to its last.
+        times_longer: factor by which to stretch each step [S].
+        fps: frames a second; the total is rounded to whole frames.
     """
     to = np.concatenate([[0.0], np.cumsum(times_longer * np.diff(at))])
     frames = max(1, round(float(to[-1]) * fps))
