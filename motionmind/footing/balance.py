@@ -1,4 +1,4 @@
-"""Balance: whether a centre of mass is over its support, and where a support is nearest to it."""
+"""Balance of a centre of mass over its support."""
 
 from __future__ import annotations
 
@@ -7,36 +7,36 @@ import numpy as np
 from motionmind._typing import Bools, Floats
 from motionmind.jit import jit
 
-DEEP = 0.1  # metres beyond what is allowed at which a body surely falls
+DEEP = 0.1  # metres beyond the allowed overhang at which a body surely falls
 WALKS = 0.5  # metres a second: a body that travels faster falls from foot to foot, as walkers do
 
 
 def walks(root: Floats, fps: float) -> bool:
-    """Return whether a body travels so fast that it is never to stand still over a foot: positions [N, 3], metres."""
+    """Return whether a body travels too fast to balance over each foot, from its root's positions [N, 3], metres."""
     return bool(np.linalg.norm((root[-1] - root[0])[[0, 2]]) * fps > WALKS * (len(root) - 1))
 
 
 def is_beyond(points: Floats, touches: Bools, centre: Floats, overhang: float) -> Bools:
-    """Return where a centre of mass is farther beyond its support than it may be [N].
+    """Return whether a centre of mass is more than `overhang` beyond its support in each frame [N].
 
     Args:
-        points: level places of points of the body [N, P, 2], metres.
-        touches: which of them bear the body on the floor [N, P].
-        centre: level place of the centre of mass [N, 2], metres.
-        overhang: how far beyond the support it may be, metres.
+        points: level positions of the body's points [N, P, 2], metres.
+        touches: whether each bears the body on the floor [N, P].
+        centre: level position of the centre of mass [N, 2], metres.
+        overhang: allowed distance from the support, metres.
     """
     return np.asarray(np.linalg.norm(centre - nearest_in_support(points, touches, centre), axis=1) > overhang)
 
 
 def falls_without(points: Floats, low: Bools, feet: Bools, centre: Floats, overhang: float) -> Floats:
-    """Return how far a body would fall without each foot [N, feet], from 0 to 1 where it surely falls.
+    """Return the degree to which a body would fall without each foot [N, feet], 0 to 1 (it surely falls).
 
     Args:
-        points: level places of points of the body [N, P, 2], metres.
-        low: which of them would bear it if all its feet stood [N, P].
-        feet: which of them are each foot's [feet, P].
-        centre: level place of the centre of mass [N, 2], metres.
-        overhang: how far beyond its support that may be, metres.
+        points: level positions of the body's points [N, P, 2], metres.
+        low: whether each would bear the body if all feet stood [N, P].
+        feet: whether each belongs to each foot [feet, P].
+        centre: level position of the centre of mass [N, 2], metres.
+        overhang: allowed distance from the support, metres.
     """
     out = np.zeros((len(centre), len(feet)))
     for number, own in enumerate(feet):
@@ -46,17 +46,17 @@ def falls_without(points: Floats, low: Bools, feet: Bools, centre: Floats, overh
 
 
 def nearest_in_support(points: Floats, touches: Bools, wanted: Floats) -> Floats:
-    """Return the point [N, 2] of each support that is nearest to a wanted one [N, 2]; that itself where none bears.
+    """Return the point of each support nearest to a wanted point [N, 2]; the wanted point itself without a support.
 
-    The support is the convex hull of the points that touch the floor. A point outside of it is nearest to one of the
-    segments between two of them; one inside sees them all around itself, with no gap of half a turn.
+    The support is the convex hull of the points that touch the floor. For a point outside it, the nearest point lies on
+    a segment between two of them. From a point inside, their directions leave no gap of half a turn.
 
     Args:
-        points: level places of points on the floor [N, P, 2], metres.
-        touches: which of them bear the body [N, P].
-        wanted: level places [N, 2], metres.
+        points: level positions of points on the floor [N, P, 2], metres.
+        touches: whether each bears the body [N, P].
+        wanted: level positions [N, 2], metres.
     """
-    # The same order in memory, whoever asks, or it would be compiled for each.
+    # Contiguous, because each memory layout would be compiled anew.
     return _nearest_in_support(np.ascontiguousarray(points), touches, np.ascontiguousarray(wanted))
 
 

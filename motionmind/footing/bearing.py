@@ -1,4 +1,4 @@
-"""Bearing: what bears a body at each frame, and where: feet by their stances, other parts where they are."""
+"""Support of a body in each frame: the stances of its feet, and other body parts on the floor."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from motionmind.footing.footfalls import Stance, find_stances, standing_costs
 from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
 
-UNDER = 0.02  # metres above the lowest limb at which a limb's share in bearing the body has fallen to 1/e
-BEARS = 4  # a limb bears the body by this power of how firmly it stands
-TOUCHES = 0.03  # metres above a limb's lowest point below which another point of it touches the floor
-MOSTLY = 0.3  # share of bearing from which a part other than a foot holds the body up
-LOADS = 0.12  # seconds in which a foot takes over the body's weight
-ALONE = 0.05  # metres above a body's lowest point below which another part bears, too
-HEAVY = 6.0  # a second: cost of swinging a foot that bears the whole weight of a body at rest
-FALLS = 30.0  # a second: cost of swinging a foot without which the body falls; chosen on ballet and karate
-RESTS = 0.3  # seconds from an end at which nothing moves in which low feet stand
+UNDER = 0.02  # metres above the lowest limb at which a limb's share of the support has fallen to 1/e
+BEARS = 4  # exponent: a limb's firmness to this power is its share of the support
+TOUCHES = 0.03  # metres above a limb's lowest point up to which its other points touch the floor
+MOSTLY = 0.3  # share of the support above which a part other than a foot holds the body up
+LOADS = 0.12  # seconds for a foot to take over the body's weight
+ALONE = 0.05  # metres above a body's lowest point up to which another part bears it, too
+HEAVY = 6.0  # per second: cost of swinging a foot that bears the whole weight of a body at rest
+FALLS = 30.0  # per second: cost of swinging a foot without which the body falls; chosen on ballet and karate
+RESTS = 0.3  # seconds from a motionless end during which low feet stand
 UPSIDE = 0.15  # metres above a body's lowest point up to which its lowest foot may bear it
-NEAR = 0.1  # metres that a part of a foot is off at most which is in one place, though it rolls, or turns on that
+NEAR = 0.1  # metres: largest displacement of some point of a foot that stays in place, though it may roll or turn
 
 
 class Shape(NamedTuple):
-    """A body in each frame relative to its root, and its parts.
+    """A body and its parts in each frame, relative to the root.
 
     Attributes:
-        places: of the points that may touch the floor [N, P, 3], metres.
-        feet: which of them are each foot's [feet, P].
-        others: which of them are each other part's: limbs without their feet, and last the trunk [parts, P].
+        places: positions of the points that may touch the floor [N, P, 3], metres.
+        feet: whether a point belongs to each foot [feet, P].
+        others: whether a point belongs to each other part: limbs without their feet, then the trunk [parts, P].
         low: height of each foot's lowest point [N, feet], metres.
         low_others: the same of the other parts [N, parts]; infinite for one without points.
-        tracks: level places of the feet, which do not move while they stand or roll [N, feet, 2], metres.
+        tracks: level positions of the feet, constant while they stand or roll [N, feet, 2], metres.
         outward: level unit vectors from the middle of the hips to each leg's [N, feet, 2].
     """
 
@@ -51,12 +51,12 @@ class Shape(NamedTuple):
 
     @property
     def lowest(self) -> Floats:
-        """Height of the lowest point of all [N], metres."""
+        """Height of the lowest point of the body [N], metres."""
         return np.asarray(self.places[..., 1].min(axis=1))
 
 
 def shape_of(skeleton: Skeleton, posed: Posed, feet: list[Foot]) -> Shape:
-    """Return the shape of a body that is posed about its root."""
+    """Return the shape of a body posed about its root."""
     places, limb = posed.places, limb_of_points(skeleton)[posed.joints]
     of_feet = points_of_feet(skeleton, posed.joints, feet)
     others = (limb == np.arange(len(limbs_of(skeleton)) + 1)[:, None]) & ~of_feet.any(axis=0)
@@ -69,7 +69,7 @@ def shape_of(skeleton: Skeleton, posed: Posed, feet: list[Foot]) -> Shape:
 
 
 def points_of_feet(skeleton: Skeleton, joints: Indices, feet: list[Foot]) -> Bools:
-    """Return which points are each foot's [feet, P]; `joints` are those that the points belong to [P]."""
+    """Return whether each point belongs to each foot [feet, P], from the joint of each point [P]."""
     own = [foot_points(foot, joints, len(skeleton)) for foot in feet]
     return np.stack(own) if own else np.zeros((0, len(joints)), dtype=np.bool_)
 
@@ -78,15 +78,15 @@ def lowest(places: Floats, parts: Bools) -> Floats:
     """Return the height of the lowest point of each part [N, parts], metres; infinite for a part without points.
 
     Args:
-        places: of the body's points [N, P, 3], metres.
-        parts: which of them are each part's [parts, P].
+        places: positions of the body's points [N, P, 3], metres.
+        parts: whether a point belongs to each part [parts, P].
     """
     heights = [places[:, own, 1].min(axis=1, initial=np.inf) for own in parts]
     return np.stack(heights, axis=1) if heights else np.zeros((len(places), 0))
 
 
 def _touching(places: Floats, parts: Bools, low: Floats, bears: Bools) -> Bools:
-    """Return which points are of parts that bear [N, parts], and about as low as the lowest of them [N, P]."""
+    """Return whether each point belongs to a bearing part and is about as low as its lowest [N, P]."""
     out = np.zeros(places.shape[:2], dtype=np.bool_)
     for own, lowest_of, on in zip(parts, low.T, bears.T, strict=True):
         out[:, own] |= on[:, None] & (places[:, own, 1] < (lowest_of + TOUCHES)[:, None])
@@ -94,14 +94,14 @@ def _touching(places: Floats, parts: Bools, low: Floats, bears: Bools) -> Bools:
 
 
 class Bearing(NamedTuple):
-    """The parts that bear a body at each frame.
+    """The support of a body in each frame.
 
     Attributes:
-        stances: when and where each foot stands.
-        loads: how much of the weight each foot may bear [N, feet], from 0 to 1: less as a stance begins and ends.
+        stances: times and places of each foot's stances.
+        loads: share of the weight that each foot may bear [N, feet], 0 to 1; less as a stance begins and ends.
         stands: whether each foot stands [N, feet].
-        targets: the feet's places, less their tracks [N, feet, 2], metres: where each would have the root.
-        others: how much each other part bears [N, parts], from 0 to 1.
+        targets: the feet's places minus their tracks [N, feet, 2], metres: the root's position according to each foot.
+        others: share of the support of each other part [N, parts], 0 to 1.
     """
 
     stances: list[list[Stance]]
@@ -115,8 +115,8 @@ class Bearing(NamedTuple):
         return self._replace(stands=np.ones_like(self.stands))
 
     def touching(self, shape: Shape) -> Bools:
-        """Return which points touch the floor [N, P]: those of what bears, about as low as its lowest."""
-        # A foot that comes down, or lifts, in this very frame carries nothing yet, or no more.
+        """Return whether each point touches the floor [N, P]: points of bearing parts, about as low as their lowest."""
+        # A foot carries nothing in the frame in which it lands or lifts.
         still = self.stands.copy()
         still[1:] &= self.stands[:-1]
         still[:-1] &= self.stands[1:]
@@ -137,25 +137,25 @@ def find_bearing(
     fps: float,
     falls: Floats | None = None,
 ) -> Bearing:
-    """Find what bears a body, and where its feet step.
+    """Find the support of a body, and the steps of its feet.
 
     Args:
         shape: the body.
-        root: level places of the root on which feet would slide to where they have to be [N, 2], metres.
-        mass: level places of the centre of mass relative to the root [N, 2], metres.
-        firm: how firmly each limb, and last the trunk, stands where it is low [N, limbs + 1], from 0 to 1.
+        root: level positions of the root if the feet may slide [N, 2], metres.
+        mass: level positions of the centre of mass relative to the root [N, 2], metres.
+        firm: firmness of each limb, and last of the trunk, where it is low [N, limbs + 1], 0 to 1.
         flying: whether the body is in the air [N].
         staying: a foot that stands throughout, or None.
-        moving: whether the body passes the first and the last frame with a velocity; else feet that are low rest there.
-        passing: whether it passes them, at whatever velocity; else a foot that is in the air there takes its time.
-        feet: its feet.
+        moving: whether the body has a velocity in the first and the last frame; if not, low feet rest there.
+        passing: whether the body passes through them at any velocity; if not, a foot in the air there takes its time.
+        feet: feet of the body.
         fps: frames a second.
-        falls: how far the body would fall without each foot [N, feet], from 0 to 1; None where that is not known.
+        falls: degree to which the body would fall without each foot [N, feet], 0 to 1; None if unknown.
     """
     low = shape.lowest[:, None]
     far = np.minimum(shape.low_others - low, 1.0)
     bears = np.maximum(firm, 1e-3) ** BEARS
-    if feet:  # where no foot is near the floor, what is lowest bears, however the corpus's bodies hold it
+    if feet:  # without a foot near the floor, the lowest part bears, whatever the corpus shows
         lifted = np.clip((shape.low.min(axis=1, keepdims=True) - low) / UPSIDE - 1.0, 0.0, 1.0)
         bears = np.maximum(bears, lifted)
     others = bears * np.exp(-far / UNDER) * np.isfinite(shape.low_others)
@@ -182,11 +182,11 @@ def find_bearing(
         stands[:, staying] = True
     stances: list[list[Stance]] = [[] for _ in feet]
     borne = [np.zeros(0, dtype=np.bool_) for _ in feet]
-    for _ in range(2):  # each foot steps where others stand, as they did the last time
+    for _ in range(2):  # each foot steps while others stand, as found in the previous round
         for k in range(len(feet)):
             bears = stands[:, [other for other in range(len(feet)) if other != k]].any(axis=1) | rests
             if np.array_equal(bears, borne[k]):
-                continue  # as the last time
+                continue  # unchanged
             borne[k] = bears
             stances[k] = find_stances(tracks[:, k], shape.outward[:, k], *costs[k], bears, flying, fps, passing)
             stands[:, k] = False
@@ -200,20 +200,20 @@ def find_bearing(
 
 
 def _weights(shape: Shape, mass: Floats) -> Floats:
-    """Return about how much of the weight each foot would bear if all stood [N, feet]: the more the nearer it is."""
+    """Estimate the share of the weight on each foot if all stood [N, feet]; near feet bear more."""
     far = rot.norm(shape.tracks - mass[:, None])
     near = 1.0 / np.maximum(far, 0.03) ** 2
     return np.asarray(near / np.maximum(near.sum(axis=1, keepdims=True), 1e-9)) ** 2
 
 
 def find_staying(shape: Shape, root: Floats) -> int | None:
-    """Return the foot that stays where it stands: one that bears alone in the first and the last frame, in one place.
+    """Return the foot that alone bears the body in the first and the last frame, in one place; None if there is none.
 
-    It may roll from its heel to its toes there, or turn on either.
+    The foot may roll from heel to toes, or turn on either.
 
     Args:
         shape: the body.
-        root: level places of the root [N, 2], metres.
+        root: level positions of the root [N, 2], metres.
     """
     low = np.concatenate([shape.low, shape.low_others], axis=1)[[0, -1]]
     bears = low < low.min(axis=1, keepdims=True) + ALONE
@@ -229,9 +229,9 @@ def find_staying(shape: Shape, root: Floats) -> int | None:
 def _write_stance(
     start: int, end: int, place: Floats, slip: Floats, fades: float, foot: int, places: Floats, loads: Floats
 ) -> None:
-    """Write the places of a foot in its stance [N, feet, 2], metres, and how much of the weight it may bear [N, feet].
+    """Write the places of a foot in its stance [N, feet, 2], metres, and its share of the weight [N, feet].
 
-    It bears all of it well within the stance, and less where that begins and ends, within so many frames.
+    The share is 1 within the stance, and falls off towards its beginning and end over `fades` frames.
     """
     for t in range(start, end + 1):
         share = 1.0 if t == end > start else (t - start) * (1.0 / max(end - start, 1))

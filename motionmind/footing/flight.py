@@ -21,8 +21,8 @@ from motionmind.body.tempo import runs_of
 SURELY = 0.5  # share of the corpus's walks that are in the air where a given posture is
 EVER = 0.05  # share of them from which a movement may be
 HOVERS = 0.04  # metres above the floor from which a given posture is in the air, if walks there are
-SHORTEST, LONGEST = 0.15, 0.8  # seconds of a flight
-PUSHES = 0.25  # seconds that a push off, or a landing, takes at least
+SHORTEST, LONGEST = 0.15, 0.8  # seconds: duration of a flight
+PUSHES = 0.25  # seconds: shortest push-off or landing
 PAUSES = 0.1  # seconds for which a fall may be slower than that, as where legs are drawn up
 
 

@@ -16,18 +16,18 @@ from motionmind._typing import Bools, Floats, Ints
 from motionmind.jit import jit
 
 LIFTED = 0.02, 0.08  # metres above the lowest limb: from here on a foot hardly stands, from there on not at all
-HIGH = 8.0  # a second: cost of standing with a foot that the movement lifts so high, and in proportion if higher
-MOVING = 3.0  # a second: cost of standing with a foot that the corpus moves there
-FIRM = 1.0  # a second: cost of swinging a foot that stands firmly
-STRAYS = 0.08  # metres off its track at which a standing foot costs 1 a second
-STEP_COST = 0.5  # of each step
-QUICK = 1.2  # metres a second: a step's mean speed that costs as much as standing STRAYS off
-BRIEF = 0.33  # seconds that a step takes at least
-ALONE = 40.0  # a second: cost of swinging where nothing else bears the body
+HIGH = 8.0  # per second: cost of standing with a foot lifted to the upper height; proportional above
+MOVING = 3.0  # per second: cost of standing with a foot that the corpus moves
+FIRM = 1.0  # per second: cost of swinging a foot that stands firmly
+STRAYS = 0.08  # metres off its track at which a standing foot costs 1 per second
+STEP_COST = 0.5  # cost of each step
+QUICK = 1.2  # m/s: mean speed of a step that costs as much as standing STRAYS off the track
+BRIEF = 0.33  # seconds: shortest step
+ALONE = 40.0  # per second: cost of swinging while nothing else bears the body
 OUTSIDE = 0.8  # share of a sideways course during a stance that a foot spends on its own side of its track
-CROSSES = 4.0  # how much more it costs to be off the track towards the other feet than elsewhere
-SHIFTS = 0.08  # seconds in which a body shifts its weight from one foot to another
-SOON = 12.0  # a second: cost of swinging before that
+CROSSES = 4.0  # cost factor for being off the track towards the other feet
+SHIFTS = 0.08  # seconds to shift the weight from one foot to another
+SOON = 12.0  # per second: cost of swinging before the weight has shifted
 SLIPS = 0.02  # metres that a foot may slip without a step
 
 

@@ -1,4 +1,4 @@
-"""The root's trajectory: the feet that stand carry the body; where none stands it travels as the corpus's bodies do."""
+"""Trajectory of the root: feet in stance carry the body; without one it travels as in the corpus."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.footing.smoothing import smoothed
 
 GRIP = 0.015  # metres above the floor at which a foot's hold on it has fallen to 1/e
-SLIP = 0.15  # weight of the corpus's own travel, that of a standing foot being 1
-WALKS = 0.3  # metres a second of missing travel that is made up evenly by half
+SLIP = 0.15  # weight of the corpus's travel, relative to 1 for a standing foot
+WALKS = 0.3  # m/s of missing travel at which half of it is spread evenly over time
 STARTS = 0.3  # seconds in which even travel starts and stops
-RAISED = 0.1, 0.25  # metres by which the second foot is above the first: from there a body travels less, and least
-LEAST = 0.3  # share of even travel that is left then: no dancer walks with a leg in the air
-GATHERS = 0.2  # seconds over which travel becomes less, and more again
-BEARS = 4  # a limb bears the body by this power of how much it stands: of two feet, mostly the one that stands firmer
+RAISED = 0.1, 0.25  # metres from the lowest foot to the second: even travel begins to shrink, and is least
+LEAST = 0.3  # share of even travel that remains: no dancer walks with a leg in the air
+GATHERS = 0.2  # seconds over which travel shrinks and grows again
+BEARS = 4  # exponent of a limb's firmness: of two feet, mostly the firmer one bears the body
 
 
 def root_trajectory(
@@ -31,25 +31,25 @@ def root_trajectory(
     seconds: float,
     easily: Floats,
 ) -> Floats:
-    """Return positions [N, 3] of the root, metres, from `a` to `b`; their heights are provisional, `stand` sets them.
+    """Return positions [N, 3] of the root, metres, from `a` to `b`; `stand` sets their final heights.
 
     From each frame to the next, points of the body that stand near the floor should stay, and the root should move by
     `drift`: the displacements v minimise sum_p w_p |v + v_p|^2 + SLIP |v - drift|^2, with v_p the motion of point p
     relative to the root and w_p = exp(-height / GRIP) stands^BEARS of its limb, under the condition that they add up to
     b - a. So v = (SLIP drift - sum_p w_p v_p + l) / (SLIP + sum_p w_p), with one multiplier l for all: the distance
-    missing to `b` is made up where the body stands least; if it is far, in proportion to `easily`, but for its start
-    and its end.
+    missing to `b` is added where the body stands least firmly; a long one in proportion to `easily`, with a ramp at
+    both ends.
 
     Args:
         skeleton: the body.
         posed: the movement about its root, of N frames.
         clearance: height of the lowest point above the floor [N], metres.
-        stands: how firmly each limb, and last the trunk, stands between frames [N - 1, limbs + 1], from 0 to 1.
+        stands: firmness of each limb, and last of the trunk, between frames [N - 1, limbs + 1], 0 to 1.
         drift: displacement of the corpus's bodies from each frame to the next [N - 1, 3], metres.
         a: first position of the root [3], metres.
         b: last position of the root [3], metres.
-        seconds: duration of the whole.
-        easily: how easily the body steps between frames [N - 1], from LEAST to 1 (`steps_easily`).
+        seconds: total duration.
+        easily: ease of stepping between frames [N - 1], LEAST to 1 (`steps_easily`).
     """
     points = posed.places[:, : 2 * len(skeleton)]
     height = points[..., 1] - points[..., 1].min(axis=-1, keepdims=True) + clearance[:, None]
@@ -69,10 +69,10 @@ def root_trajectory(
 
 
 def steps_easily(heights: Floats, fps: float) -> Floats:
-    """Return how easily a body steps between frames [N - 1], from LEAST to 1: with one foot high up it would hop.
+    """Return the ease of stepping between frames [N - 1], LEAST to 1; with one foot high up, a body would hop.
 
     Args:
-        heights: of each foot's lowest point, above any floor [N, feet], metres.
+        heights: heights of each foot's lowest point above any level [N, feet], metres.
         fps: frames a second.
     """
     if heights.shape[1] < 2:

@@ -13,9 +13,9 @@ _Values = TypeVar("_Values", Bools, Floats)
 
 
 def smoothed(values: Floats, seconds: float, fps: float) -> Floats:
-    """Return means [N] of values around each, within so many seconds; the first and the last value stay."""
+    """Return the weighted mean around each value [N], within some seconds; the first and the last stay the same."""
     width = min(max(round(seconds * fps), 1), len(values) - 1)
-    # Mirrored through its ends, so that these stay.
+    # Point reflection at both ends keeps them in place.
     before, after = 2.0 * values[0] - values[width:0:-1], 2.0 * values[-1] - values[-2 : -width - 2 : -1]
     around = np.concatenate([before, values, after])
     return np.asarray(np.convolve(around, bell(width), "valid"))
@@ -23,7 +23,7 @@ def smoothed(values: Floats, seconds: float, fps: float) -> Floats:
 
 @lru_cache(maxsize=64)
 def bell(width: int) -> Floats:
-    """Return smooth weights [2 width + 1], greatest in the middle, that add up to 1."""
+    """Return the weights of a Hann window [2 width + 1], which add up to 1."""
     weights = np.hanning(2 * width + 3)[1:-1]
     out: Floats = weights / weights.sum()
     out.setflags(write=False)
@@ -31,7 +31,7 @@ def bell(width: int) -> Floats:
 
 
 def sliding_max(values: _Values, reach: int) -> _Values:
-    """Return the greatest of the values [N] within so many of each; beyond the ends they are as there."""
+    """Return the maximum within `reach` of each value [N], with the end values repeated."""
     padded = np.pad(values, reach, mode="edge")
     greatest: _Values = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
     return greatest

@@ -60,7 +60,7 @@ def detour(corpus: Corpus, carriage: Carriage, ends: tuple[Floats, Floats], move
 
 
 def _nearest(carriage: Carriage, shown: Floats, posture: Floats) -> tuple[Ints, Floats]:
-    """Return the indices of the nearest of N postures [N, J, 4] to one [J, 4], and their distances, radians per joint."""
+    """Return the indices of the postures [N, J, 4] nearest to one [J, 4], and their distances, radians per joint."""
     some = np.arange(len(shown))
     if carriage.trees is not None:
         some = np.sort(postures_near(carriage.trees, carriage.orientations, posture, SEVERAL * NEAREST, len(shown)))

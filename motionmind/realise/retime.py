@@ -167,7 +167,7 @@ def slower_steps(
 
     Args:
         motion: the movement.
-        most: limits on the speeds of the joints and of the body's turning, rad/s, of its travel and its rise, heights/s,
+        most: limits on the speeds of the joints and of the body's turning, rad/s, of its travel and rise, heights/s,
             and on the root's acceleration, heights/s^2 [J + 4].
         moving: whether the first and the last posture have a given velocity, which must not change.
         slides: limit on the speed of a foot near the floor, heights/s; only for bodies at least as tall as people.
