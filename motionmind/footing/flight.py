@@ -1,8 +1,8 @@
-"""Flight: when a body is in the air, and that its mass falls freely there.
+"""Flights: intervals in the air, in which the centre of mass falls freely.
 
-A flight lasts as long as its height asks, 2 sqrt(2 H / g); where a given posture is in the air, the body passes it at
-the top of its flight, unless its velocity is given. Before it takes off and after it lands the body has its height for
-free: least squares of its acceleration bend the legs as deep as the push needs.
+A flight of height H lasts 2 sqrt(2 H / g). The body passes a given posture in the air at the top of its flight, unless
+the posture has a velocity. Before take-off and after landing the body's height is free: least squares of its
+acceleration bend the legs as deeply as the push needs.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ PAUSES = 0.1  # seconds for which a fall may be slower than that, as where legs 
 
 
 class Flight(NamedTuple):
-    """A stretch in the air: the last frame on the floor before it, and the first after it.
+    """An interval in the air, from the last frame on the floor before it to the first after it.
 
-    Where it begins or ends in a given posture, that is the frame; `rates` are the vertical velocities there, metres a
-    second, or None where it is on the floor, or nothing is known.
+    A flight that begins or ends in a given posture has that frame instead. `rates` are the vertical velocities at both
+    frames, m/s; None on the floor, or if unknown.
     """
 
     start: int
@@ -51,7 +51,7 @@ def find_flights(
     """Return the flights of a movement, in order.
 
     Args:
-        aloft: share of the corpus's walks that are in the air [N], from 0 to 1.
+        aloft: share of the corpus walks that are in the air [N], 0 to 1.
         leaps: height of their lowest points above the floor there [N], metres.
         standing: height of the centre of mass if the lowest point were on the floor [N], metres.
         masses: its height in the first and in the last frame [2], metres.
@@ -83,13 +83,13 @@ def find_flights(
         share, frames = aloft[start:stop], np.arange(start, stop)
         height = float(share @ leaps[start:stop] / share.sum())
         seconds = min(2.0 * np.sqrt(2.0 * height / gravity), LONGEST)
-        # Walks jump at different moments: so many of their flights are expected in this time.
+        # Walks jump at different times: this is the expected number of flights in this interval.
         count = round(share.sum() / (seconds * fps))
         middles = np.interp((np.arange(count) + 0.5) / max(count, 1), np.cumsum(share) / share.sum(), frames)
         for middle in middles:
             half = min(0.5 * seconds * fps, 0.5 * (end - begin))
             top = float(np.clip(middle, begin + half, max(end - half, begin + half)))
-            # Rounded before: what lies midway between two frames is not for rounding errors to decide.
+            # The inner rounding keeps rounding errors from deciding ties midway between two frames.
             flight = Flight(round(round(top - half, 6)), round(round(top + half, 6)), (None, None))
             if half >= 0.5 * SHORTEST * fps and flight.end - flight.start > 2:
                 out.append(flight)
@@ -100,14 +100,14 @@ def find_flights(
 def _time_of_fall(
     standing: Floats, mass: float, rate: float | None, longest: float, gravity: float, fps: float
 ) -> tuple[int, float]:
-    """Return the frames before a body in the air came off the floor, and its vertical velocity in the air.
+    """Return the number of frames since a body in the air took off, and its vertical velocity in the air.
 
     Args:
         standing: height of the centre of mass on the floor, from the frame in the air back [N], metres.
         mass: its height in the air, metres.
-        rate: its velocity there, metres a second, upward; None for the top of the flight, or as near it as there is
-            time for, and as lets it come off the floor in a whole frame.
-        longest: how many frames it may take.
+        rate: its upward velocity there, m/s; None for the top of the flight, or as near it as the time and a take-off
+            in a whole frame allow.
+        longest: maximum number of frames.
         gravity: metres a second squared.
         fps: frames a second.
     """
@@ -123,18 +123,18 @@ def _time_of_fall(
     first = int(below[0]) + 1
     if not free:
         return first, rate
-    # It is to come off the floor in a whole frame: of the two about that moment, in the one nearer to that velocity.
+    # Take off in a whole frame: of the two around that time, the one whose velocity is nearer.
     either = [max(first - 1, 1), first]
     rates = (mass - standing[either]) / seconds[either] - 0.5 * gravity * seconds[either]
     nearest = int(np.abs(rates - rate).argmin())
-    # Too near the floor, or over a posture so much higher, it comes off in no whole frame.
+    # Too near the floor, or over a much higher posture, no whole frame fits.
     if abs(rates[nearest] - rate) > gravity / fps:
         return first, rate
     return int(either[nearest]), float(rates[nearest])
 
 
 def flying_frames(flights: list[Flight], hovering: tuple[bool, bool], count: int) -> Bools:
-    """Return in which frames nothing bears the body [count]; `hovering` is whether the first and the last are such."""
+    """Return whether nothing bears the body in each frame [count]; `hovering` states it of the first and the last."""
     out = np.zeros(count, dtype=np.bool_)
     for flight in flights:
         out[flight.start + 1 : flight.end] = True
@@ -144,9 +144,9 @@ def flying_frames(flights: list[Flight], hovering: tuple[bool, bool], count: int
 
 
 def find_falls(skeleton: Skeleton, posed: Posed, given: Bools, fps: float) -> tuple[Floats, list[tuple[int, int]]]:
-    """Return the centre of mass [N, 3], metres, and the first frame of each fall, and the one after its last.
+    """Return the centre of mass [N, 3], metres, and the first frame of each fall and the frame after its last.
 
-    Where masses are not known there are no falls.
+    Without known masses there are no falls.
 
     Args:
         skeleton: the body.
@@ -166,15 +166,15 @@ def find_falls(skeleton: Skeleton, posed: Posed, given: Bools, fps: float) -> tu
 
 
 def _falls(fall: Floats, up: Bools, in_air: tuple[bool, bool], pauses: int) -> list[tuple[int, int]]:
-    """Return the first frame of each fall, and the one after its last.
+    """Return the first frame of each fall and the frame after its last.
 
-    A pause is between two falls, or between a fall and an end in the air.
+    A pause lies between two falls, or between a fall and an end in the air.
 
     Args:
         fall: downward acceleration of the mass, in gravities [N].
-        up: where the body is off the floor, and may be moved [N].
-        in_air: whether it is off the floor in the first and in the last frame, which may not.
-        pauses: frames of a pause at most.
+        up: whether the body is off the floor in a frame that may change [N].
+        in_air: whether it is off the floor in the first and in the last frame, which may not change.
+        pauses: largest number of frames in a pause.
     """
     fast = up & (fall > FALLING)
     whole = fast.copy()
@@ -185,7 +185,7 @@ def _falls(fall: Floats, up: Bools, in_air: tuple[bool, bool], pauses: int) -> l
             whole[inner] = np.all(up[inner] & (fall[inner] > -FALLING))
     out = []
     for start, stop in runs_of(whole):
-        # What trembles falls on the whole no faster than that: then pauses part it.
+        # A trembling body falls no faster than that on average: then pauses separate its falls.
         parts = [(0, stop - start)] if fall[start:stop].mean() > FALLING else runs_of(fast[start:stop])
         out += [(start + first, start + last) for first, last in parts if last - first > 1]
     return out

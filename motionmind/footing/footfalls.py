@@ -1,9 +1,8 @@
-"""Footfalls: when each foot stands, where, and how it goes from one place to the next.
+"""Footfalls: times and places of each foot's stances.
 
-A foot stands or swings. While it stands it has one place on the floor; a foot that stands at A stays there until it
-steps, and the last place is B's. Between two places it swings, and is lifted over the floor as far as the movement's
-own postures do not lift it. When it swings is found by dynamic programming over all ways to part the time, so that far
-travel takes as many steps as there is time for, and feet that the movement itself lifts step then.
+A foot stands or swings. In stance it keeps one place on the floor: its first place is A's until it steps, and its last
+is B's. Dynamic programming over all divisions of the time into stance and swing finds the steps, so that long
+distances take as many steps as time allows, and feet step when the movement lifts them.
 """
 
 from __future__ import annotations
@@ -32,9 +31,9 @@ SLIPS = 0.02  # metres that a foot may slip without a step
 
 
 class Stance(NamedTuple):
-    """An interval in which a foot stands, from one frame to another, both included; and the foot's place there [2].
+    """An interval in which a foot stands, its first and last frame included, and the foot's level place [2], metres.
 
-    A foot that does not quite end where it began, for both are given, slips by `slip` [2] meanwhile, metres.
+    A foot with given places at both ends slips by their difference, `slip` [2], metres.
     """
 
     start: int
@@ -44,11 +43,11 @@ class Stance(NamedTuple):
 
 
 def standing_costs(above: Floats, firm: Floats) -> tuple[Floats, Floats]:
-    """Return what it costs a foot to stand and to swing [N] each, a second.
+    """Return the costs per second of standing and of swinging a foot [N].
 
     Args:
         above: height of its lowest point above that of the lowest limb [N], metres.
-        firm: how firmly the corpus's feet stand there [N], from 0 to 1.
+        firm: firmness of the corpus's feet [N], 0 to 1.
     """
     low, high = LIFTED
     stand = HIGH * np.maximum((above - low) / (high - low), 0.0) + MOVING * (1.0 - firm) ** 2
@@ -66,25 +65,25 @@ def find_stances(
     fps: float,
     passing: tuple[bool, bool] = (False, False),
 ) -> list[Stance]:
-    """Return when and where a foot stands: the way to part the time into standing and swinging that costs least.
+    """Return the stances of a foot that minimise the cost of standing and swinging.
 
-    Standing costs the square of how far the foot is off its track, in units of STRAYS, and what `stand` says; swinging
-    what `swing` says, STEP_COST, the square of its speed in units of QUICK, and ALONE where nothing else bears.
+    Standing costs `stand`, and the square of the distance to the track in units of STRAYS. Swinging costs `swing`,
+    STEP_COST, the square of the speed in units of QUICK, and ALONE while nothing else bears the body.
 
     Args:
-        track: where the movement has the foot [N, 2], metres, level.
+        track: level positions of the foot in the movement [N, 2], metres.
         outward: unit vectors to the leg's side of the body [N, 2].
-        stand: what it costs to stand [N], a second.
-        swing: what it costs to swing [N], a second.
+        stand: cost of standing [N], per second.
+        swing: cost of swinging [N], per second.
         others: whether another limb bears the body [N].
         flying: whether the body is in the air [N].
         fps: frames a second.
-        passing: whether the body passes the first and the last frame; else a foot in the air takes its time there.
+        passing: whether the body passes through the first and the last frame; if not, a foot in the air takes its time.
     """
     track, outward = np.ascontiguousarray(track), np.ascontiguousarray(outward)
     brief = max(2, round(BRIEF * fps))
     stand, swing = _costs(stand, swing, others, flying, round(SHIFTS * fps), fps)
-    # A foot that is given in the air comes down in half a step; on its way or with the body it does so as it falls.
+    # A foot given in the air lands within half a step; if the body passes through or flies, it lands as it falls.
     first, last = (0 if goes or flies else brief // 2 for goes, flies in zip(passing, flying[[0, -1]], strict=True))
     parted = _part(track - track[0], outward, _crossing(track, outward), stand, swing, brief, (first, last), fps)
     places, slips = _places(track, outward, parted, brief)
@@ -98,9 +97,9 @@ def find_stances(
 def _costs(
     stand: Floats, swing: Floats, others: Bools, flying: Bools, around: int, fps: float
 ) -> tuple[Floats, Floats]:
-    """Return what it costs a foot to stand and to swing [N] in each frame, by what else bears the body then.
+    """Return the costs of standing and of swinging a foot in each frame [N], given the other support of the body.
 
-    Another limb surely bears it where it does in all of so many frames around.
+    Another limb surely bears the body where it does so in all frames within `around`.
     """
     stands, swings = np.full(len(stand), 1e3), np.zeros(len(stand))
     for t in range(len(stand)):
@@ -115,7 +114,7 @@ def _costs(
 
 @jit
 def _places(track: Floats, outward: Floats, parted: Ints, brief: int) -> tuple[Floats, Floats]:
-    """Return where a foot stands [K, 2], and how far it slips meanwhile [K, 2], in intervals [K, 2] of frames."""
+    """Return the places [K, 2] and the slips [K, 2] of a foot in its stances, intervals of frames [K, 2]."""
     places, slips, last = np.empty((len(parted), 2)), np.zeros((len(parted), 2)), len(track) - 1
     for k in range(len(parted)):
         start, end = parted[k]
@@ -125,12 +124,12 @@ def _places(track: Floats, outward: Floats, parted: Ints, brief: int) -> tuple[F
             side += outward[t]
         place /= end + 1 - start
         side /= end + 1 - start
-        # On its own side of where the movement has it: feet that travel sideways do not cross.
+        # Place the foot on its own side of its track, so that feet that travel sideways do not cross.
         beyond = 0.0
         for t in range(start, end + 1):
             beyond = max(beyond, (track[t, 0] - place[0]) * side[0] + (track[t, 1] - place[1]) * side[1])
         place += OUTSIDE * beyond * side
-        # A foot that comes from the air has no time to go elsewhere.
+        # A foot that comes from the air has no time to move elsewhere.
         place = track[start] + min(start / brief, 1.0) * (place - track[start])
         places[k] = track[end] + min((last - end) / brief, 1.0) * (place - track[end])
         if start == 0:
@@ -155,7 +154,7 @@ def _part(  # noqa: PLR0915 - one table, filled in one go
 ) -> Ints:
     """Return the intervals [K, 2] in which a foot stands, in order (see `find_stances`).
 
-    A step takes so many frames at least, and half a step from the first frame and to the last.
+    A step takes at least `brief` frames; from the first frame or to the last, at least `half`.
     """
     count = len(track)
     stand_sum, swing_sum = np.zeros(count + 1), np.zeros(count + 1)
