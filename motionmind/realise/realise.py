@@ -47,11 +47,11 @@ from motionmind.walks.stops import Stop, stop_at
 DANCED_WITHIN = (
     0.9  # tolerances by which a passage may take a joint off its state; the rest is for the arc between frames
 )
-SOLVES = 3  # at most: the first, and others on slower clocks
-KEEPS = 0.97  # share of the bounds on speed that the solve keeps to: it gives a little
-SLIGHTLY = 1.02  # times as long as before: a clock that need not be slower stays
-_SAME = 1e-9  # radians: orientations no farther apart are equal but for rounding
-_UNSEEN = 2e-3  # radians: a joint that returns to its start, and goes no farther, does not move
+SOLVES = 3  # most solves: the first, then others on slower clocks
+KEEPS = 0.97  # share of the speed bounds given to the solve, which exceeds them slightly
+SLIGHTLY = 1.02  # smallest stretch of a step worth another solve
+_SAME = 1e-9  # radians: orientations no farther apart differ by rounding alone
+_UNSEEN = 2e-3  # radians: a joint that returns to its start and goes no farther does not move
 
 
 class Realised(NamedTuple):
@@ -71,12 +71,12 @@ class Realised(NamedTuple):
 
 
 class Style(NamedTuple):
-    """The style of a motion: what was learned of a corpus.
+    """The style of a motion, learned from a corpus.
 
     Attributes:
         corpus: the corpus.
         grammar: its states and transitions.
-        carriage: its posture statistics: how bodies travel and stand.
+        carriage: its posture statistics: travel and stance.
         tolerances: angle within which a state of each chain stands for an orientation [L], radians.
         fastest: greatest speeds of the joints, of turning and of travel [J + 2], as in `motionmind.learned.pace`, at a
             pace of 1; None for no bound. With a given length they hold as far as slower parts leave time.
@@ -109,7 +109,7 @@ class Wishes(NamedTuple):
         arriving: velocity at `b`; None where unknown.
         without: terms of the solve to leave out.
         pace: speed relative to the corpus, where there is no `length`.
-        slows: whether the clock may slow down; else the given moves say how long they take.
+        slows: whether the clock may slow down; if not, the given moves keep their durations.
         liveliness: 0 for the mean of walks, up to 1 for a passage of the corpus (`motionmind.walks.passages`).
         place: start of that passage in the corpus; None for any.
     """

@@ -1,15 +1,14 @@
-"""Retiming: a movement takes longer where something in it would be faster than the corpus's bodies usually are, and a
-leap as long as the fall from where it begins (`jump_in_time`).
+"""Retiming: slow a movement down where it would be faster than usual in the corpus; time leaps by gravity
+(`jump_in_time`).
 
-How long a movement takes on the whole is settled before its path is known, and by the way from end to end alone. On the
-way a joint may go there and back. Where that would be faster than all but the corpus's fastest hundredth of moments,
-the clock slows down: all of the body, so that joints stay together, and smoothly, over a few half steps.
+The distance between the two postures alone sets the duration, before the path is known, but a joint may go there and
+back on the way. Where that would be faster than 99 % of the corpus's samples, the clock slows down smoothly over a few
+half steps, for the whole body, so that its joints stay together.
 
-The synthesis then gives feet and balance what they need, and some of it is quick. So the clock slows down once more
-where the synthesised movement exceeds the corpus's own of that length (`motionmind.learned.pace.Pace.peaks`), where a
-joint is much faster than in nearly all of the corpus's moments, and where a foot near the floor is faster than feet
-usually are there. It does not slow in the air, where the body falls as it does; a body that dips as fast with its feet
-on the floor can be slower.
+The synthesis then adds movement of the feet and for balance, some of it quick. So the clock slows down once more where
+the result exceeds the peaks of corpus movement of that length (`motionmind.learned.pace.Pace.peaks`), where a joint is
+much faster than in nearly all samples, and where a foot near the floor is faster than usual. It does not slow down in
+free fall, but may where a body dips as fast with its feet on the floor.
 """
 
 from __future__ import annotations
@@ -32,19 +31,19 @@ from motionmind.learned.pace import moved_in, steps_of, ways
 from motionmind.learned.peaks import accelerations
 from motionmind.walks.expectation import Expectation
 
-HEADROOM = 0.9  # share of the fastest speeds that is kept to: passages, and the synthesis, add to them later
-ENDS_AT = 0.92  # share of the peaks that is kept to in the end; chosen on cmu-05
-JOINTS_AT = 1.13  # times as fast as all but a hundredth of the corpus's moments, as joints are at most; for ballet
-JUMPS_AT = 0.95  # share of the fastest rise with which a body jumps on the way at most
-AROUND = 1.0 / 6.0  # seconds about what is too quick, in which the clock is slower
-LONGER = 1.1  # times as long as it was a movement is taken to be at most, when it is compared with others as long
-SPARES = 0.3  # share of the time that slow parts could do without, which fast ones may take
-SLIGHT = 1e-3  # by which a clock is not worth slowing
-LEFT = 0.1  # metres, of a person: walks that are no higher have not left the floor
-SITS = 0.1  # metres, of a person: a body that leaves the floor no lower than that under where it could is not hurried
-HIGHER = 0.02  # metres, of a person: what is no higher than that is not worth a longer fall
-HURRIES = 2.5  # times as fast as all but a hundredth of the corpus's moments: as joints may be in a leap
-SETTLES = 0.3  # seconds from an end that is passed at a given speed, in which the clock comes to slow down
+HEADROOM = 0.9  # share of the fastest speeds allowed: passages and the synthesis add to them later
+ENDS_AT = 0.92  # share of the peaks allowed in the end; chosen on cmu-05
+JOINTS_AT = 1.13  # largest speed of a joint, relative to the 99th percentile in the corpus; for ballet
+JUMPS_AT = 0.95  # share of the fastest rise allowed to a jump on the way
+AROUND = 1.0 / 6.0  # seconds around an excess in which the clock slows down
+LONGER = 1.1  # largest factor on a movement's duration when comparing it with movements as long
+SPARES = 0.3  # share of the spare time of slow parts that fast parts may take
+SLIGHT = 1e-3  # smallest change of the clock worth making
+LEFT = 0.1  # metres, for a person: walks no higher than this have not left the floor
+SITS = 0.1  # metres, for a person: do not hurry a take-off that is at most this much lower than possible
+HIGHER = 0.02  # metres, for a person: smallest gain in height worth a longer fall
+HURRIES = 2.5  # largest speed of a joint in a leap, relative to the 99th percentile in the corpus
+SETTLES = 0.3  # seconds from an end with a given velocity in which the clock may begin to slow down
 
 
 def keep_pace(
@@ -55,15 +54,15 @@ def keep_pace(
     travel: Floats,
     moving: tuple[bool, bool],
 ) -> Floats:
-    """Return how many times longer each half step of a walk is to take [2 T], at least 1.
+    """Return the factor by which to stretch each half step of a walk [2 T], at least 1.
 
     Args:
         walk: the movement at its half steps.
-        frames: times at which to look how fast it is, in order, seconds.
-        corpus: what it was learned from.
+        frames: times between which to measure the speeds, increasing, seconds.
+        corpus: the corpus of the walk.
         fastest: speeds of the joints, rad/s, of the body's turning, and of its travel, heights/s [J + 2].
         travel: level displacement of the root in each half step [2 T, 3], metres, on the corpus's skeleton.
-        moving: whether the first and the last posture are passed at a given velocity, which is not to change.
+        moving: whether the first and the last posture have a given velocity, which must not change.
     """
     times = walk.half_steps
     root = np.concatenate([np.zeros((1, 3)), np.cumsum(travel, axis=0)])
@@ -74,7 +73,7 @@ def keep_pace(
     slower = np.ones(len(travel))
     step = np.searchsorted(times, 0.5 * (frames[1:] + frames[:-1])) - 1
     np.maximum.at(slower, step.clip(0, len(slower) - 1), (speeds / (HEADROOM * fastest)).max(axis=1))
-    # The greatest of three, twice, covers the mean of five: no half step is slowed less than it needs.
+    # The maximum of five covers the mean of five: no half step slows down less than it needs.
     slower = _mean_around(sliding_max(slower, 2), np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0)
     middle = 0.5 * (times[1:] + times[:-1])
     for is_moving, since in zip(moving, (middle - times[0], times[-1] - middle), strict=True):
@@ -117,7 +116,7 @@ def jump_in_time(
     for end, onward in ((0, slice(None)), (-1, slice(None, None, -1))):
         if not in_air[end]:
             continue
-        # From the posture in the air on, or back.
+        # Onwards from the first posture, or back from the last.
         high, takes, best, highest, hurries, quicker = standing[onward], 0.0, np.inf, 0.0, 0.0, (0, 1.0)
         for step in range(1, reach[end] + 1):
             if heights[onward][step] < LEFT * size:

@@ -178,7 +178,7 @@ class Rows(NamedTuple):
         self.add(state, normal, residual, np.full(len(self.first), spread**-2.0))
 
     def add_broken(self, state: State, step: Floats, normal: Normal, residual: Floats, spread: float) -> bool:
-        """Add those rows alike whose residual [R] a step [N, 3 + D] makes positive; return whether there are any."""
+        """Add the rows whose residual [R] a step [N, 3 + D] makes positive; return whether there are any."""
         broken = residual + self.changes(state, step) > 0.0
         first, ways, points, after, shares = self
         rows = Rows(first[broken], ways[broken], points[broken], after[broken], shares[broken])
@@ -309,8 +309,8 @@ def _right_jacobian(turned: Floats, axes: Floats) -> Floats:
 def inverse_right_jacobian(turned: Floats, vectors: Floats) -> Floats:
     """Return the inverse of the right Jacobian of SO(3) at rotation vectors [..., 3], times vectors [..., 3].
 
-    The left one's is that at -v, and its transpose. J^-1(v) e = e + v x e / 2 + d v x (v x e), d = (1 - (|v| / 2)
-    cot (|v| / 2)) / |v|^2. Source: as of `_right_jacobian`.
+    The inverse of the left Jacobian is this at -v, or its transpose. J^-1(v) e = e + v x e / 2 + d v x (v x e),
+    d = (1 - (|v| / 2) cot (|v| / 2)) / |v|^2. Source: as for `_right_jacobian`.
     """
     square = np.sum(turned * turned, axis=-1)[..., None]
     half = 0.5 * np.sqrt(np.maximum(square, SERIES))

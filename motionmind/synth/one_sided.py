@@ -26,7 +26,7 @@ from motionmind.synth.kinematics import Rows, State, inverse_right_jacobian, row
 from motionmind.synth.system import Normal
 
 UP = np.array([0.0, 1.0, 0.0])
-NEAR_M = 0.06  # between legs that may pass through each other from one frame to the next
+NEAR_M = 0.06  # between legs that may pass through each other within a frame
 OPPOSITE = 0.2  # cosine between the directions from leg to leg below which they have changed sides
 EDGE = 1e-6  # in a term's unit: tolerance of its bound
 
@@ -35,7 +35,7 @@ R = TypeVar("R")
 
 
 def _once(method: Callable[[Any, State], R]) -> Callable[[Any, State], R]:
-    """Keep what a method of a term found in the last state: `add` and `foresee` ask for it in turn."""
+    """Cache the result of a term's method for the last state, which `add` and `foresee` share."""
     name = f"{method.__name__} found"
 
     @wraps(method)
@@ -52,8 +52,8 @@ def _once(method: Callable[[Any, State], R]) -> Callable[[Any, State], R]:
 class OneSided(ABC):
     """A term whose rows push only beyond its bound.
 
-    Rows within the bound do not push, and a step goes through it. Those that it would break are therefore added, and
-    the step is computed again. This is one iteration of a primal-dual active set. Source: Hintermüller, Ito, Kunisch,
+    Rows within the bound do not push, so a step may cross it. The solve adds the rows that a step would break, and
+    computes the step again. This is one iteration of a primal-dual active set. Source: Hintermüller, Ito, Kunisch,
     "The primal-dual active set strategy as a semismooth Newton method", SIAM Journal on Optimization 13 (2002).
     """
 
@@ -73,7 +73,7 @@ class Floor(OneSided):
     """Keep points above the floor.
 
     Attributes:
-        floor: its height [N], metres.
+        floor: height of the floor [N], metres.
         spread: standard deviation of the depth, metres.
     """
 
@@ -117,8 +117,8 @@ class Balance(OneSided):
     Kajita et al., "Biped walking pattern generation by using preview control of zero-moment point", ICRA (2003).
 
     Attributes:
-        touches: which points support the body [N, P].
-        floor: its height [N], metres.
+        touches: whether each point supports the body [N, P].
+        floor: height of the floor [N], metres.
         overhang: allowed distance of the centre of mass from the support, metres.
         room: the same of the zero-moment point: half a foot's width, because points lie on its midline.
         near: nearness to each end of the movement [2, N], 0 to 1: given postures may be out of balance.
@@ -152,7 +152,7 @@ class Balance(OneSided):
         return np.asarray(height / self.gravity * self.fps**2)
 
     def _excess(self, state: State, points: Floats) -> Floats:
-        """Return how far points [2, N - 2, 2] are from the nearest that are allowed, metres."""
+        """Return the vectors from the nearest allowed points to points [2, N - 2, 2], metres."""
         places, ends = np.ascontiguousarray(state.places[..., [0, 2]]), [0, -1]
         level = state.mass[ends][:, [0, 2]]
         given = np.linalg.norm(level - nearest_in_support(places[ends], self.touches[ends], level), axis=1)
@@ -165,7 +165,7 @@ class Balance(OneSided):
         return np.asarray(np.sqrt(1.0 + np.sum((excess / self.reach) ** 2, axis=-1)))
 
     def _rows(self, state: State, normal: Normal, off: Floats, excess: Floats, chosen: Bools) -> None:
-        """Add rows of the points [2, N - 2] that are so far [2, N - 2, 2] from their nearest that are allowed."""
+        """Add rows of the chosen points [2, N - 2], at offsets [2, N - 2, 2] from the nearest allowed points."""
         levers = self._levers(state)
         shares = np.zeros((2, len(levers), 3))
         shares[0] = np.stack([-levers, 1.0 + 2.0 * levers, -levers], axis=1)
@@ -259,10 +259,10 @@ class Limits(OneSided):
 
 @dataclass
 class Speed(OneSided):
-    """Bound the angular speed of the joints; that of the root by how it tilts, and by how it turns about the vertical.
+    """Bound the angular speed of the joints; for the root, tilt and turn about the vertical separately.
 
     Attributes:
-        most: greatest speeds of the joints [J], rad/s; of the root, how fast it tilts.
+        most: greatest speeds of the joints [J], rad/s; for the root, of its tilt.
         turns: greatest speed at which the root turns about the vertical, rad/s.
         fps: frames a second.
         spread: standard deviation of the excess, rad/s.
@@ -285,7 +285,7 @@ class Speed(OneSided):
         return out
 
     def _excess(self, velocities: Floats) -> Floats:
-        """Return how far velocities [N - 1, J, 3] are from the nearest that are allowed, rad/s."""
+        """Return the differences of velocities [N - 1, J, 3] from the nearest allowed, rad/s."""
         excess, root = _beyond(velocities, self.most), velocities[:, 0]
         excess[:, 0] = _beyond(root * (1.0 - UP), self.most[0]) + _beyond(root * UP, self.turns)
         return excess
@@ -294,13 +294,13 @@ class Speed(OneSided):
         """Return the Jacobian of a joint's velocities from some frames to the next [R, 2, d, 3]."""
         axes = (state.own_axes if joint else state.axes)[:, state.freedom.of(joint)[0]]
         before, after = axes[first], axes[first + 1]
-        if joint == 0:  # the excess of others is along their turn, which the Jacobian of the logarithm keeps
+        if joint == 0:  # other joints' excess lies along their rotation, which the logarithm's Jacobian preserves
             turn = np.broadcast_to(velocities[first, :1] / self.fps, before.shape)
             before, after = inverse_right_jacobian(turn, before), inverse_right_jacobian(-turn, after)
         return self.fps * np.stack([-before, after], axis=1)
 
     def _rows(self, state: State, normal: Normal, velocities: Floats, off: Floats, chosen: Bools) -> None:
-        """Add rows of the chosen velocities [N - 1, J] that are so far [N - 1, J, 3] from their nearest allowed."""
+        """Add rows of the chosen velocities [N - 1, J], at differences [N - 1, J, 3] from the nearest allowed."""
         for joint in np.flatnonzero(chosen.any(axis=0)).tolist():
             (first,) = np.nonzero(chosen[:, joint])
             jacobian, columns = self._jacobian(state, velocities, joint, first), state.freedom.of(joint)[1]

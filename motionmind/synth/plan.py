@@ -30,11 +30,11 @@ SLIPS = 0.3  # m/s: speed of a foot that the corpus counts as half firm
 LOW_M = 0.02  # height of a swinging foot at which its grip has fallen to 1/e
 SKIMS = 0.15  # m/s, standard deviation of a swinging foot's level speed at the floor
 STILL = 0.03  # m/s, standard deviation of the firmest foot's speed
-RESTS = 0.1  # metres a second, standard deviation: the speed of a supporting hand, knee or trunk
+RESTS = 0.1  # m/s, standard deviation of the speed of a supporting hand, knee or trunk
 RISES = 0.33  # share of a step in which the foot rises, and in which it comes down
 LIFT_M = 0.105  # height of a step whose reference does not lift the foot; chosen on cmu-05 and cmu-16
 FAR_M = 0.3  # length of a step from which it is that high
-SETTLES = 0.3  # seconds in which a foot that is given above the floor comes down
+SETTLES = 0.3  # seconds for a foot given above the floor to come down
 TIPTOE_M = 0.12  # height above the floor up to which one foot may stay throughout (`find_staying`)
 
 
@@ -163,7 +163,7 @@ class Plan:
         )
 
     def _of_feet(self, root: Floats, steps: bool) -> Iterator[_Point]:
-        """Yield what is wanted of the points of feet."""
+        """Yield the targets of the feet's points."""
         shape, bearing, ground, off = self.shape, self.bearing, self.stretch.ground, self._off(root)
         if not steps:
             off[..., [0, 2]] = 0.0
@@ -193,7 +193,7 @@ class Plan:
                 yield _Point(int(point), at, np.stack([level, height, level], axis=1), stands, moves, slips)
 
     def _of_others(self, root: Floats) -> Iterator[_Point]:
-        """Yield what is wanted of supporting hands, knees or the trunk: they are on the floor, in their own places."""
+        """Yield the targets of supporting hands, knees or the trunk: on the floor, in their own places."""
         shape = self.shape
         rests = self.bearing.others > MOSTLY
         for part in np.flatnonzero(rests.any(axis=0)):
@@ -215,7 +215,7 @@ class Plan:
         out = np.zeros((count, len(self.feet), 3))
         level = bearing.targets - root[:, None, [0, 2]]
         height = shape.low + root[:, 1:2] - self.stretch.ground.floor[:, None]
-        # A foot that nothing else supports is not lifted.
+        # Never lift a foot that alone supports the body.
         support = bearing.stands.sum(axis=1) + (bearing.others > MOSTLY).sum(axis=1) + self.flying
         borne = support[:, None] > bearing.stands
         for k in range(len(self.feet)):
@@ -242,7 +242,7 @@ class Plan:
                 far = min(float(np.linalg.norm(step)) / FAR_M, 1.0)
                 lift = np.where(borne[part, k], LIFT_M * far * _eased(np.minimum(share, share[::-1]) / RISES), 0.0)
                 off[part, 1] += np.maximum(lift - height[part, k] - off[part, 1], 0.0)
-                # Low down a foot goes straight from place to place, however the reference has it.
+                # Near the floor a foot moves straight from place to place, whatever the reference does.
                 strays = places - places[0] - _eased(share)[:, None] * step
                 low = (1.0 - far) * (1.0 - _eased((height[part, k] + off[part, 1]) / HIGH_M))
                 off[part, 0], off[part, 2] = (off[part][:, [0, 2]] - low[:, None] * strays).T
@@ -286,7 +286,7 @@ def plan_contacts(
         bool(staying is None and stretch.ground.aloft[end] > SURELY and above[end] > HOVERS) for end in (0, -1)
     )
     flights: list[Flight] = []
-    # Nor does a body hop that stands on one and the same limb, in one place, at both ends.
+    # A body that stands on the same limb, in one place, at both ends does not hop either.
     if flies and staying is None and standing_rises(skeleton, stretch.posed.rotations[[0, -1]], root[[0, -1]]) is None:
         rates = [
             None if rate is None else rate + float(step)

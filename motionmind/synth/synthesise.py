@@ -38,10 +38,10 @@ from motionmind.synth.weights import WEIGHTS, Weights
 STILL_RAD = 2e-3  # a joint outside the legs that the reference turns less has no unknowns
 LONG_M = 0.3  # of a person: a joint outside the legs with a shorter reach has no unknowns
 PASSES_S = 0.12  # before legs meet and after they part, in which the plane between them turns; chosen on cmu-05
-SWAYS_S = 0.5  # in which a body that is given out of balance comes over its support
+SWAYS_S = 0.5  # for a body given out of balance to come over its support
 WINDOW = 400  # frames solved at once
 OVERLAP = 60  # frames at the end of a window that the next one solves again
-ITERATIONS = 16, 10  # at most, of a first solve and of one that starts from another
+ITERATIONS = 16, 10  # most iterations of a first solve, and of one that starts from another
 REPLANS = 2, 0  # times that steps are planned again, in the same
 LENGTHS = "cm", "m/s^2"  # units that scale with the body
 LEVEL = np.array([1.0, 0.0, 1.0])
@@ -172,7 +172,7 @@ class _Scene:
         self.stops = self.fps * stance.half_steps[2 * np.array(list(given.low))]
         moving = given.rates[0] is not None, given.rates[1] is not None
         self.fixed = np.zeros(len(times), dtype=np.bool_)
-        # A posture that falls on a frame but for rounding errors keeps that frame.
+        # A posture within rounding errors of a frame keeps that frame.
         self.fixed[np.floor(self.stops + 1e-6).astype(int)] = True
         self.fixed[np.ceil(self.stops - 1e-6).astype(int)] = True
         self.fixed[[1, -2]] |= moving
@@ -211,7 +211,7 @@ class _Scene:
         return x
 
     def falls(self) -> Floats:
-        """Return how far the body would fall without each foot, by the last plan of steps [N, feet]."""
+        """Return the degree to which the body would fall without each foot in the last plan [N, feet]."""
         out = np.zeros((len(self.reference), len(self.feet)))
         for plan in self.plans:
             if plan.falls is not None:

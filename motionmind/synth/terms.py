@@ -1,6 +1,6 @@
 """Terms of the solve: each adds its squared residuals, in units of their standard deviations, to one system.
 
-A term says what a movement should be like, and how firmly. `add(state, normal)` adds its rows, linearised at a state;
+A term states one property of the movement and its weight. `add(state, normal)` adds its rows, linearised at a state;
 `gives(state)` returns its residual frame by frame, in the unit that reports name. Terms that push only beyond a bound
 are in `motionmind.synth.one_sided`.
 """
