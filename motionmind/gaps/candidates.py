@@ -1,4 +1,4 @@
-"""Choose promising transitions: those that most lower a sample's costs, without the joints' coordination.
+"""Choose the transitions that lower a sample's costs most, without the joints' coordination.
 
 The cost of paths of T moves has a lower bound, the sum of one bound for each joint chain: all chains make T moves, and
 each state costs as much as alone. A transition adds an edge to each joint graph that lacks it; its gain is how much it

@@ -43,7 +43,7 @@ class Carriage:
         weights: weight of each sample [N].
         begins: sample that each step leads from [2 M].
         ends: sample that it leads to [2 M].
-        shares: share of each step among those that leave the same sample [2 M].
+        shares: probability of each step, given the sample that it leaves [2 M].
         clusters: cluster of each body part in each sample [N, P] (see `motionmind.learned.clusters`).
         turn: turn about the vertical in each half of each move [M], radians.
         travel: displacement of the root in each half, metres, relative to the body's heading midway [M, 3].

@@ -47,7 +47,7 @@ class Chosen(NamedTuple):
         weights: of the samples [n].
         begins: position in `moments` that each step leads from [m].
         ends: position that it leads to [m].
-        shares: share of each step among those that leave the same sample [m].
+        shares: probability of each step, given the sample that it leaves [m].
         clusters: cluster of each sample, numbered from 0 [n].
         near: which of them are nearest to the first posture and to the last, and represent only themselves, [n] each;
             None for all.
