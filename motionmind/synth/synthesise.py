@@ -27,9 +27,10 @@ from motionmind.footing.feet import find_free_feet
 from motionmind.footing.ground import Given, Stance, find_ground
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline
+from motionmind.synth.collision import Collision
 from motionmind.synth.gave import Gave
 from motionmind.synth.kinematics import Freedom, State, body_of
-from motionmind.synth.one_sided import EDGE, Balance, Collision, Floor, Limits, Speed, Travel
+from motionmind.synth.one_sided import EDGE, Balance, Floor, Limits, Speed, Travel
 from motionmind.synth.plan import Plan, Stretch, plan_contacts
 from motionmind.synth.solve import Problem, solve
 from motionmind.synth.terms import Ballistic, Contacts, Run, Term, Track

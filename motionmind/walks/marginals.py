@@ -25,7 +25,7 @@ def posterior_marginals(
     Args:
         begins: sample from which each of the corpus's steps leads [M].
         ends: sample to which it leads [M].
-        shares: probability of each step, given the sample that it leaves [M]; they add up to 1.
+        shares: probability of each step, given the sample that it leaves [M].
         clusters: cluster of each sample [N].
         weights: of the samples [N], above 0.
         near: likelihood of each sample at each step [S + 1, N].

@@ -15,8 +15,9 @@ from motionmind.body.capsules import capsules_of, legs_depth
 from motionmind.body.plausibility import GRAVITY
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
+from motionmind.synth.collision import Collision
 from motionmind.synth.kinematics import Freedom, State, body_of
-from motionmind.synth.one_sided import Balance, Collision, Floor, Limits, Speed, Travel
+from motionmind.synth.one_sided import Balance, Floor, Limits, Speed, Travel
 from motionmind.synth.solve import LOOKS, Problem, solve
 from motionmind.synth.system import Normal
 from motionmind.synth.terms import Ballistic, Contacts, Run, Term, Track

@@ -14,9 +14,10 @@ from motionmind.body.capsules import capsules_of, legs_depth, pair_depths
 from motionmind.body.legs import find_hinge
 from motionmind.body.plausibility import GRAVITY
 from motionmind.geometry import rotations as rot
-from motionmind.synth import one_sided
+from motionmind.synth import collision as module
+from motionmind.synth.collision import Collision
 from motionmind.synth.kinematics import Freedom, State, body_of
-from motionmind.synth.one_sided import Balance, Collision, Floor, Limits, OneSided, Speed, Travel
+from motionmind.synth.one_sided import Balance, Floor, Limits, OneSided, Speed, Travel
 from motionmind.synth.system import Normal
 from motionmind.synth.terms import Ballistic, Contacts, Run, Term, Track
 
@@ -131,7 +132,7 @@ def untapered(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let capsules be as thick at both ends: where axes are nearest is then where capsules are deepest."""
     own = capsules_of(HUMAN)
     even = own._replace(radii=np.repeat(own.radii[:, :1], 2, axis=1))
-    monkeypatch.setattr(one_sided, "capsules_of", lambda skeleton: even)
+    monkeypatch.setattr(module, "capsules_of", lambda skeleton: even)
 
 
 def test_the_gradient_of_a_collision_is_exact_but_for_tapering_limbs(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,7 +161,7 @@ def test_the_gradient_of_legs_on_a_plane_is_exact_but_for_how_nearest_points_mov
         thick = radii[pairs, 0] + at[0] * (radii[pairs, 1] - radii[pairs, 0])
         return thick.sum(axis=2) - far, apart / far[..., None], at[0]
 
-    monkeypatch.setattr(one_sided, "pair_depths", held)
+    monkeypatch.setattr(module, "pair_depths", held)
     term = collision()
     assert_gradient(term, state)
     assert np.any(term._planes)
