@@ -283,6 +283,18 @@ def test_legs_that_swap_sides_are_pulled_apart(rotations: Floats, frames_show_it
     assert legs_depth(HUMAN, between(made.rotations)).max() < 0.02
 
 
+def test_a_step_stops_at_a_bound_and_not_before_it() -> None:
+    """A body that is to go from 6 cm above the floor to 5 cm below it, in one iteration."""
+    problem = standing()
+    lowest = problem.state(rest(problem)).places[..., 1].min()
+    floor = Floor(np.full(N, lowest + 0.05), 0.001)
+    above = rest(problem)
+    above[1:-1, 1] = 0.11
+    spreads = np.full((N, problem.freedom.unknowns), 0.5)
+    made = solve(problem, [Track(spreads), floor], above, iterations=1)
+    assert np.abs(made.places[1:-1, :, 1].min(axis=1) - floor.floor[1:-1]).max() < 0.002
+
+
 def test_what_is_too_fast_slows_down_by_the_time_it_has() -> None:
     """The fast middle of a turn is spread over its slow beginning and end."""
     turn = np.interp(np.arange(N), [0.0, 4.0, 6.0, N - 1.0], [0.0, 0.0, 0.9, 0.9])
