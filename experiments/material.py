@@ -11,13 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
-from motionmind import Engine, Motion, Posture, make_discretization, own_skeleton, read_motion
+from motionmind import Engine, Motion, Posture, own_skeleton, read_motion
 from motionmind._typing import Ints
+from motionmind.body.contact import find_floor
 from motionmind.corpus.clip import Clip
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
-from motionmind.metrics import find_floor
-from motionmind.metrics.measure import at_rate
+from motionmind.discretize import make_discretization
+from motionmind.metrics.figures import at_rate
 
 RECORDED = {
     "cmu-05": "*.bvh",

@@ -26,7 +26,7 @@ import motionmind
 from motionmind.cli import main
 from motionmind.cli.warming import FIRST
 from motionmind.codecache import is_all_compiled
-from motionmind.discretize import Codebook
+from motionmind.discretize.codebook import Codebook
 from motionmind.formats import read_motion
 from motionmind.retarget.retarget import own_skeleton
 from motionmind.tween.engine import Engine

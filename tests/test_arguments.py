@@ -14,16 +14,32 @@ import pytest
 from scores import TITLED
 
 import motionmind as mm
-from motionmind import MotionMindError, WrongTypeError
+from motionmind import (
+    MotionMindError,
+    WrongTypeError,
+    chaos,
+    discretize,
+    formats,
+    gaps,
+    learned,
+    metrics,
+    plots,
+    retarget,
+)
+from motionmind import credits as crediting
 from motionmind.corpus.gather import Gathering
 
 # Made by MotionMind and given to its users, who make none; errors and warnings take any message.
 ANSWERS = {
     "Bridge",
+    "Corpus",
     "Credit",
     "Explanation",
     "Figure",
     "Gaps",
+    "Library",
+    "Plate",
+    "Score",
     "Seam",
     "Sighting",
     "Source",
@@ -58,8 +74,8 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
     (folder / "report.json").write_text(json.dumps(known["tween"].report()))
     mm.write_motion(folder / "clip.bvh", motion)
     mm.write_variation(folder / "variation.json", variation)
-    flow = mm.flow_of("lorenz")
-    library = mm.name_states([mm.read_score(folder / "bends.score")], 12.0)
+    flow = chaos.find_flow("lorenz")
+    library = discretize.name_states([mm.read_score(folder / "bends.score")], 12.0)
     still = {"rotations": motion.rotations[:1], "root": motion.root[:1]}
     asked = {name: parameter.default for name, parameter in inspect.signature(mm.TweenRequest).parameters.items()}
     asked = {name: {} if name == "pin" else value for name, value in asked.items()}
@@ -70,19 +86,20 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
     assert gathering.keys() == Gathering.__annotations__.keys()
     path = folder / "out"
     return {
-        "angle_chart": (mm.angle_chart, {"motion": known["tween"].motion}),
+        "draw_angles": (plots.draw_angles, {"motion": known["tween"].motion}),
         "compose": (mm.compose, {"path": folder / "bends.score", "clip": "bends"}),
-        "contact_sheet": (mm.contact_sheet, {"motion": motion, "frames": [0]}),
+        "draw_sheet": (mm.draw_sheet, {"motion": motion, "frames": [0]}),
         "explain": (mm.explain, {"tween": known["tween"]}),
-        "find_gaps": (mm.find_gaps, {"learned": engine, "pairs": 2, "count": 0, "named": {}}),
-        "flow_of": (mm.flow_of, {"name": "lorenz", "rho": 28.0}),
+        "find_gaps": (gaps.find_gaps, {"learned": engine, "pairs": 2, "count": 0, "named": {}}),
+        "find_flow": (chaos.find_flow, {"name": "lorenz", "rho": 28.0}),
         "list_corpora": (mm.list_corpora, {"folder": folder}),
-        "lossy_fields": (mm.lossy_fields, {"motion": motion, "path": "rest.bvh"}),
-        "make_discretization": (mm.make_discretization, {"kind": "codebook"}),
-        "measure": (mm.measure, {"motion": motion, "learned": engine}),
-        "name_states": (mm.name_states, {"scores": [mm.read_score(folder / "bends.score")], "tolerance": 12.0}),
+        "lossy_fields": (formats.lossy_fields, {"motion": motion, "path": "rest.bvh"}),
+        "make_discretization": (discretize.make_discretization, {"kind": "codebook"}),
+        "measure": (metrics.measure, {"motion": motion, "learned": engine}),
+        "name_states": (discretize.name_states, {"scores": [mm.read_score(folder / "bends.score")], "tolerance": 12.0}),
         "own_skeleton": (mm.own_skeleton, {"movement": motion}),
-        "read_joint_mapping": (mm.read_joint_mapping, {"path": folder / "rig.toml"}),
+        "read_joint_mapping": (retarget.read_joint_mapping, {"path": folder / "rig.toml"}),
+        "read_library": (discretize.read_library, {"name_or_path": "human23"}),
         "read_motion": (mm.read_motion, {"path": folder / "clip.bvh"}),
         "read_posture": (mm.read_posture, {"path": folder / "clip.bvh", "frame": 3}),
         "read_report": (mm.read_report, {"path": folder / "report.json"}),
@@ -90,14 +107,14 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
         "read_variation": (mm.read_variation, {"path": folder / "variation.json"}),
         "to_human23": (mm.to_human23, {"movement": motion}),
         "vary": (mm.vary, {"piece": motion}),
-        "write_attractor": (mm.write_attractor, {"path": path.with_suffix(".svg"), "variation": variation}),
-        "write_joint_graph": (
-            mm.write_joint_graph,
+        "draw_attractor": (plots.draw_attractor, {"path": path.with_suffix(".svg"), "variation": variation}),
+        "draw_joint_graph": (
+            plots.draw_joint_graph,
             {"path": path.with_suffix(".graphml"), "engine": engine, "joint": "left_hip"},
         ),
-        "write_library": (mm.write_library, {"path": path.with_suffix(".toml"), "library": library}),
+        "write_library": (discretize.write_library, {"path": path.with_suffix(".toml"), "library": library}),
         "write_motion": (mm.write_motion, {"path": path.with_suffix(".bvh"), "motion": motion}),
-        "write_picture": (mm.write_picture, {"path": path.with_suffix(".png"), "motion": posture.as_motion()}),
+        "draw_picture": (mm.draw_picture, {"path": path.with_suffix(".png"), "motion": posture.as_motion()}),
         "write_posture": (mm.write_posture, {"path": path.with_suffix(".json"), "posture": posture}),
         "write_variation": (mm.write_variation, {"path": path.with_suffix(".var"), "variation": variation}),
         "Engine.alternatives": (lambda **given: [*engine.alternatives(**given)], {**tween_asked, "count": 1}),
@@ -106,12 +123,12 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
         "Engine.joint_graph": (engine.joint_graph, {"joint": "left_hip"}),
         "Engine.learn": (
             mm.Engine.learn,
-            {"corpus": engine.corpus, "discretization": mm.make_discretization("codebook")},
+            {"corpus": engine.corpus, "discretization": discretize.make_discretization("codebook")},
         ),
         "Engine.load": (mm.Engine.load, {"name": "ballet"}),
         "Engine.save": (engine.save, {"folder": folder / "saved"}),
         "Engine.tween": (engine.tween, tween_asked),
-        "Flow": (mm.Flow, {"name": "own", "field": flow.field, "start": flow.start, "step": 0.01}),
+        "Flow": (chaos.Flow, {"name": "own", "field": flow.field, "start": flow.start, "step": 0.01}),
         "Insertion": (mm.Insertion, {"times": [0.0, 1.0], "credits": ()}),
         "Insertion.renamed": (mm.Insertion(np.arange(2.0)).renamed, {"joints": {}}),
         "Motion": (mm.Motion, {"skeleton": skeleton, "times": [0.0], **still}),
@@ -144,6 +161,9 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
         "TweenRequest.nodes": (mm.TweenRequest().nodes, {"chains": 23}),
         "TweenRequest.of": (mm.TweenRequest.of, {"request": None, "moves": 3}),
         "TweenRequest.plain": (mm.TweenRequest().plain, {"chains": 23}),
+        "Velocity": (mm.Velocity, {"rotations": np.zeros((len(skeleton), 3)), "root": [0, 1, 0]}),
+        "Velocity.at_end": (mm.Velocity.at_end, {"motion": motion}),
+        "Velocity.at_start": (mm.Velocity.at_start, {"motion": motion}),
         "Variation": (
             mm.Variation,
             {"piece": variation.piece, "course": variation.course, "order": variation.order},
@@ -164,8 +184,8 @@ INNER = {"Piece.around", "Piece.arrange", "Piece.chunks", "Piece.ends", "Piece.i
 def public() -> dict[str, Callable[..., Any]]:
     """Every public function, class and method that takes an argument, by name."""
     found: dict[str, Callable[..., Any]] = {}
-    for name in mm.__all__:
-        thing = getattr(mm, name)
+    rooms = (mm, chaos, crediting, discretize, formats, gaps, learned, metrics, plots, retarget)
+    for name, thing in ((name, getattr(room, name)) for room in rooms for name in room.__all__):
         if (
             name in ANSWERS | PROTOCOLS
             or not callable(thing)

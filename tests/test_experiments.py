@@ -186,7 +186,7 @@ def test_a_move_is_awkward_that_is_faster_and_rougher_than_the_corpus() -> None:
     from dataclasses import replace
 
     from experiments.panel.run import awkward, material, usual
-    from motionmind.metrics.measure import at_rate
+    from motionmind.metrics.figures import at_rate
 
     engine, _ = material(None, "adagio alone")
     own = usual(engine)

@@ -17,17 +17,17 @@ from motionmind import (
     FormatError,
     Motion,
     MotionMindError,
-    flow_of,
-    lossy_fields,
-    make_discretization,
     read_motion,
     read_variation,
     vary,
     write_motion,
     write_variation,
 )
-from motionmind.discretize import from_spec, to_spec
+from motionmind.chaos import find_flow
+from motionmind.discretize import make_discretization
+from motionmind.discretize.spec import from_spec, to_spec
 from motionmind.discretize.states import StateSpace
+from motionmind.formats import lossy_fields
 from motionmind.plots.portrait import portrait_of
 from motionmind.plugins import Group, added
 
@@ -38,7 +38,9 @@ import json
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from motionmind import FormatError, Flow, Motion, human23, make_discretization
+from motionmind import FormatError, Motion, human23
+from motionmind.chaos import Flow
+from motionmind.discretize import make_discretization
 
 
 class Dots:
@@ -170,8 +172,8 @@ def test_a_discretization_is_made_by_its_name_and_by_its_specification() -> None
 
 @pytest.mark.usefixtures("installed")
 def test_a_flow_varies_a_piece_and_is_found_again_in_its_file(tmp_path: Path, run: Run) -> None:
-    assert flow_of("sprott", a=1.1).parameters["a"] == 1.1
-    write_variation(tmp_path / "variation.json", vary(ADAGIO, flow=flow_of("sprott"), nudge=0.5))
+    assert find_flow("sprott", a=1.1).parameters["a"] == 1.1
+    write_variation(tmp_path / "variation.json", vary(ADAGIO, flow=find_flow("sprott"), nudge=0.5))
     assert portrait_of(read_variation(tmp_path / "variation.json")).flow.dimensions == ("u", "v", "w")
     write_motion(tmp_path / "clip.json", ADAGIO)
     done = run("vary", "clip.json", "--attractor", "sprott", "--nudge", "0.5", "-o", "varied.json")
@@ -183,7 +185,7 @@ def test_what_is_built_in_stays(tmp_path: Path) -> None:
     write_motion(tmp_path / "clip.bvh", ADAGIO.resample(10.0))
     assert len(read_motion(tmp_path / "clip.bvh")) == len(ADAGIO.resample(10.0))
     assert make_discretization("codebook").kind == "codebook"
-    assert flow_of("lorenz").parameters["rho"] == 45.0
+    assert find_flow("lorenz").parameters["rho"] == 45.0
 
 
 @pytest.mark.usefixtures("installed")
@@ -214,10 +216,10 @@ def test_a_broken_package_is_named_in_a_line(tmp_path: Path, run: Run) -> None:
         (lambda: from_spec({"kind": "halves", "width": 3}), "fails: TypeError: .*'width'"),
         (lambda: make_discretization("halvs"), "did you mean halves"),
         (
-            lambda: flow_of("other"),
+            lambda: find_flow("other"),
             "other in motionmind.flows, by the package tiny-motion, must be a Flow of that name",
         ),
-        (lambda: flow_of("sprot"), "did you mean sprott"),
+        (lambda: find_flow("sprot"), "did you mean sprott"),
     ):
         with pytest.raises(MotionMindError, match=words):
             make()
@@ -242,12 +244,13 @@ def test_packages_are_imported_only_when_they_are_used(installed: Path, tmp_path
     code = (
         "import sys\n"
         "import motionmind as mm\n"
+        "from motionmind import chaos, discretize\n"
         "motion = mm.read_motion('clip.json'); mm.write_motion('clip.glb', motion)\n"
-        "mm.make_discretization('codebook'); mm.vary(motion, flow=mm.flow_of('lorenz'))\n"
+        "discretize.make_discretization('codebook'); mm.vary(motion, flow=chaos.find_flow('lorenz'))\n"
         "print('tiny_motion' in sys.modules)\n"
         "from motionmind.plugins import added\n"
         "print(added('motionmind.formats'), 'tiny_motion' in sys.modules)\n"
-        "mm.flow_of('sprott'); print('tiny_motion' in sys.modules)\n"
+        "chaos.find_flow('sprott'); print('tiny_motion' in sys.modules)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
     lines = done.stdout.splitlines()

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,6 +18,18 @@ import motionmind
 PACKAGE = Path(motionmind.__file__).parent
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if "_bundled" not in path.parts)
 
+# Packages of specialised names; those of the command line and of notebooks have their own tests.
+ROOMS = sorted(
+    path.parent.name
+    for path in PACKAGE.glob("*/__init__.py")
+    if "__all__" in path.read_text("utf-8") and path.parent.name not in ("cli", "notebook")
+)
+NAMES = sorted(
+    f"{package}.{name}"
+    for package in ("motionmind", *(f"motionmind.{room}" for room in ROOMS))
+    for name in importlib.import_module(package).__all__
+)
+
 
 @cache
 def tree_of(path: Path) -> ast.Module:
@@ -24,9 +37,15 @@ def tree_of(path: Path) -> ast.Module:
     return ast.parse(path.read_text("utf-8"))
 
 
-@pytest.mark.parametrize("name", motionmind.__all__)
+def public(name: str) -> Any:
+    """Return what a dotted public name stands for."""
+    package, _, last = name.rpartition(".")
+    return getattr(importlib.import_module(package), last)
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_every_public_name_exists_and_is_documented(name: str) -> None:
-    thing = getattr(motionmind, name)
+    thing = public(name)
     assert inspect.getdoc(thing)
     if inspect.isclass(thing):
         methods = inspect.getmembers(thing, lambda member: inspect.isfunction(member) or inspect.ismethod(member))
@@ -34,11 +53,10 @@ def test_every_public_name_exists_and_is_documented(name: str) -> None:
         assert not undocumented
 
 
-@pytest.mark.parametrize("name", motionmind.__all__)
+@pytest.mark.parametrize("name", NAMES)
 def test_every_public_name_has_an_example_that_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    thing = getattr(motionmind, name)
-    found = doctest.DocTestFinder(recurse=False).find(thing, name, globs={})
+    found = doctest.DocTestFinder(recurse=False).find(public(name), name, globs={})
     assert found, f"{name} has no docstring of its own"
     assert found[0].examples, f"{name} shows no example"
     # Nothing is at hand but what the example itself imports, as for a reader who types it.
@@ -47,13 +65,20 @@ def test_every_public_name_has_an_example_that_runs(name: str, tmp_path: Path, m
     assert runner.failures == 0
 
 
-def test_the_names_are_those_of_the_stub_and_each_is_found_by_tab() -> None:
-    stub = ast.parse((PACKAGE / "__init__.pyi").read_text("utf-8"))
+def test_the_package_has_few_names() -> None:
+    assert len(motionmind.__all__) <= 45
+    assert len({name.rpartition(".")[2] for name in NAMES}) == len(NAMES), "a name is public in two places"
+
+
+@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("__init__.pyi")), ids=lambda path: path.parent.name)
+def test_the_names_are_those_of_the_stub_and_each_is_found_by_tab(path: Path) -> None:
+    stub = ast.parse(path.read_text("utf-8"))
     imported = [alias.name for node in stub.body if isinstance(node, ast.ImportFrom) for alias in node.names]
-    assert sorted(imported) == sorted(set(imported)) == sorted(motionmind.__all__)
+    package = importlib.import_module(".".join(path.relative_to(PACKAGE.parent).parts[:-1]))
+    assert sorted(imported) == sorted(set(imported)) == sorted(package.__all__)
     listed = next(node for node in stub.body if isinstance(node, ast.Assign))
     assert ast.literal_eval(listed.value) == sorted(imported)
-    assert set(motionmind.__all__) <= set(dir(motionmind))
+    assert set(package.__all__) <= set(dir(package))
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:
@@ -121,24 +146,6 @@ def test_modules_that_moved_are_found_under_their_old_names_with_a_warning() -> 
     words = [sys.executable, "-c", _IMPORT_MOVED, repr(moved)]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.stdout.splitlines() == [f"{old} 0" for old, _ in moved], done.stderr
-
-
-@pytest.mark.parametrize(
-    ("package", "old", "new"),
-    [
-        ("motionmind.formats", "lost", "lossy_fields"),
-        ("motionmind.metrics", "Judge", "StyleClassifier"),
-        ("motionmind.metrics", "find_habits", "learn_habits"),
-        ("motionmind.metrics", "find_judge", "fit_style_classifier"),
-        ("motionmind.metrics", "find_phrases", "learn_phrases"),
-    ],
-)
-def test_a_name_that_changed_is_found_under_its_old_name_with_a_warning(package: str, old: str, new: str) -> None:
-    module = importlib.import_module(package)
-    with pytest.warns(DeprecationWarning, match=f"{old} is now {new}; the old name goes in 0.3"):
-        assert getattr(module, old) is getattr(module, new)
-    with pytest.raises(AttributeError, match="has no attribute 'motor'"):
-        module.motor  # noqa: B018
 
 
 def test_a_module_that_never_was_is_not_found() -> None:

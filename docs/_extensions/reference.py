@@ -1,6 +1,6 @@
 """Directives that write the reference from the code: public names, commands and their options, file formats.
 
-```{public-names}      the names of `motionmind.__all__`, grouped by subject
+```{public-names}      the names of `motionmind` and its packages (their `__all__`), by subject
 ```{command-line}      every command with its arguments and its options, in groups where a command has groups
 ```{json-schema} dotted.name
 """
@@ -22,23 +22,47 @@ from sphinx.util.docutils import SphinxDirective
 _log = logging.getLogger(__name__)
 
 SUBJECTS = {
-    "Tweens": ("Engine", "TweenRequest", "Tween", "Bridge", "Wait", "Source", "Credit", "Sighting", "list_corpora"),
-    "Reports": ("TweenReport", "read_report", "explain", "Explanation", "measure", "Figure", "find_gaps", "Gaps"),
-    "Movement": ("Posture", "Motion", "Insertion", "Skeleton", "human23", "human44"),
+    "Tweens": ("Engine", "TweenRequest", "Tween", "Bridge", "Wait", "Source", "learned.Sighting", "credits.Credit"),
+    "Reports": ("TweenReport", "read_report", "explain", "Explanation", "metrics.measure", "metrics.Figure"),
+    "Corpora": ("list_corpora", "Corpus", "gaps.find_gaps", "gaps.Gaps"),
+    "Movement": ("Posture", "Motion", "Velocity", "Insertion", "Skeleton", "human23", "human44"),
     "Files": (
         "read_motion",
         "read_posture",
         "write_motion",
         "write_posture",
-        "lossy_fields",
-        "MotionReader",
-        "MotionWriter",
+        "formats.lossy_fields",
+        "formats.MotionReader",
+        "formats.MotionWriter",
     ),
-    "Scores": ("compose", "read_score"),
-    "Skeletons of your own": ("own_skeleton", "to_human23", "read_joint_mapping"),
-    "States": ("make_discretization", "Discretization", "name_states", "write_library"),
-    "Variations": ("vary", "Variation", "Piece", "Seam", "Flow", "flow_of", "read_variation", "write_variation"),
-    "Pictures": ("write_picture", "contact_sheet", "angle_chart", "write_joint_graph", "write_attractor"),
+    "Scores": ("compose", "read_score", "Score"),
+    "Skeletons of your own": ("own_skeleton", "to_human23", "retarget.read_joint_mapping"),
+    "States": (
+        "discretize.make_discretization",
+        "discretize.Discretization",
+        "discretize.name_states",
+        "discretize.read_library",
+        "discretize.write_library",
+        "discretize.Library",
+    ),
+    "Variations": (
+        "vary",
+        "Variation",
+        "Piece",
+        "Seam",
+        "read_variation",
+        "write_variation",
+        "chaos.find_flow",
+        "chaos.Flow",
+    ),
+    "Pictures": (
+        "draw_picture",
+        "draw_sheet",
+        "plots.draw_angles",
+        "plots.draw_joint_graph",
+        "plots.draw_attractor",
+        "plots.Plate",
+    ),
     "Errors": (
         "MotionMindError",
         "FormatError",
@@ -64,7 +88,7 @@ SCHEMAS = {
     "corpus-summary": "motionmind.learned.summary.CorpusSummary",
     "corpus-check": "motionmind.learned.summary.CorpusCheck",
     "gaps": "motionmind.gaps.gaps.Gaps",
-    "measure-report": "motionmind.metrics.measure.MeasureReport",
+    "measure-report": "motionmind.metrics.figures.MeasureReport",
     "variation-report": "motionmind.variation.report.VariationReport",
 }
 
@@ -157,34 +181,40 @@ class CommandLine(SphinxDirective):
         return self.parse_text_to_nodes(text, allow_section_headings=True)
 
 
+def public_names() -> set[str]:
+    """Return the public names, those of a package after its name: "Engine", "metrics.measure"."""
+    import motionmind
+
+    names = set(motionmind.__all__)
+    for room in {name.rpartition(".")[0] for group in SUBJECTS.values() for name in group} - {""}:
+        names |= {f"{room}.{name}" for name in import_module(f"motionmind.{room}").__all__}
+    return names
+
+
 class PublicNames(SphinxDirective):
     """The public names by subject; a name without a subject is a warning."""
 
     def run(self) -> list[nodes.Node]:
         """Write a section for each subject."""
-        import motionmind
-
         grouped = {name for names in SUBJECTS.values() for name in names}
-        for name in sorted(grouped ^ (set(motionmind.__all__) - {"__version__"})):
-            _log.warning("docs/_extensions/reference.py: SUBJECTS and motionmind.__all__ differ in %s", name)
+        for name in sorted(grouped ^ public_names()):
+            _log.warning("docs/_extensions/reference.py: SUBJECTS and the public names differ in %s", name)
         text = "\n\n".join(
-            "\n".join([f"## {subject}", *(self._entry(name) for name in names if hasattr(motionmind, name))])
-            for subject, names in SUBJECTS.items()
+            "\n".join([f"## {subject}", *map(self._entry, names)]) for subject, names in SUBJECTS.items()
         )
         return self.parse_text_to_nodes(text, allow_section_headings=True)
 
     @staticmethod
     def _entry(name: str) -> str:
-        import motionmind
-
-        thing = getattr(motionmind, name)
+        room, _, last = f"motionmind.{name}".rpartition(".")
+        thing = getattr(import_module(room), last)
         if not isinstance(thing, type):
             kind, members = "function", ""
         elif issubclass(thing, Exception):
             kind, members = "exception", ""
         else:
             kind, members = "class", "\n   :members:" + "\n   :inherited-members:" * (name == "Engine")
-        return f"\n```{{eval-rst}}\n.. auto{kind}:: motionmind.{name}{members}\n```\n"
+        return f"\n```{{eval-rst}}\n.. auto{kind}:: {room}.{last}{members}\n```\n"
 
 
 class JsonSchema(SphinxDirective):

@@ -9,7 +9,8 @@ import numpy as np
 from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
 from experiments.material import corpus, pairs, part, posture, recorded
-from motionmind import Engine, make_discretization
+from motionmind import Engine
+from motionmind.discretize import make_discretization
 from motionmind.learned.summary import joinable
 
 BUDGET = 20_000

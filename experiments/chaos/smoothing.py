@@ -14,7 +14,8 @@ from time import perf_counter
 
 import numpy as np
 
-from motionmind import Engine, Piece, Variation, flow_of, own_skeleton, read_motion, vary
+from motionmind import Engine, Piece, Variation, own_skeleton, read_motion, vary
+from motionmind.chaos import find_flow
 from motionmind.variation.seams import judge_transitions
 
 PIECES = (("ballet", "jump"), ("macarena", "macarena"), ("karate", "heian-shodan"), ("medley", "medley"))
@@ -66,7 +67,7 @@ def shuffled(variations: list[Variation], engine: Engine) -> float | None:
     """
     found = []
     for variation, seed in product(variations, range(SHUFFLES)):
-        flow, nudge = flow_of(variation.course.flow), variation.course.nudge
+        flow, nudge = find_flow(variation.course.flow), variation.course.nudge
         control = vary(variation.piece, by="chunks", seed=seed, flow=flow, nudge=nudge)
         pairs = [(seam.start, seam.end) for seam in control.seams]
         found += [one.is_abrupt for one in judge_transitions(variation.piece, pairs, engine, posturewise=False)]
@@ -102,7 +103,7 @@ def main() -> None:
                 vary(
                     piece,
                     engine,
-                    flow=flow_of(flow),
+                    flow=find_flow(flow),
                     nudge=nudge,
                     length=max(LEAST, len(piece)),
                     alternatives=1,

@@ -9,7 +9,7 @@ import numpy as np
 from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
 from experiments.material import engine, pairs, posture, recorded
-from motionmind.metrics import arrival_spread, learn_habits
+from motionmind.metrics.paths import arrival_spread, learn_habits
 
 BUDGET = 20_000  # nodes; what is not proven by then is as good as it matters here
 SHOWN = (0.0, 0.5, 1.0)

@@ -10,11 +10,13 @@ import numpy as np
 from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
 from experiments.material import corpus, engine, pairs, part, posture, recorded
-from motionmind import Engine, make_discretization
+from motionmind import Engine
 from motionmind.corpus.corpus import Corpus
+from motionmind.discretize import make_discretization
 from motionmind.geometry import rotations as rot
 from motionmind.learned.summary import joinable
-from motionmind.metrics import angular_jerk, learn_habits
+from motionmind.metrics.paths import learn_habits
+from motionmind.metrics.smoothness import angular_jerk
 
 BUDGET = 20_000
 EXPERTS = {"ballet": "ballet", "karate": "karate"}

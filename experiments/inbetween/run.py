@@ -16,20 +16,11 @@ from experiments.inbetween.tables import chart, tell
 from experiments.material import FPS, RECORDED, families, learned, movement, recorded, take_of
 from motionmind import Engine, Motion, NoPathError
 from motionmind._typing import Floats
+from motionmind.body.contact import find_floor, foot_slide, skating
 from motionmind.corpus.corpus import Corpus
-from motionmind.metrics import (
-    StyleClassifier,
-    angular_jerk,
-    find_floor,
-    fit_style_classifier,
-    foot_slide,
-    l2p,
-    l2q,
-    npss,
-    position_spread,
-    seen,
-    skating,
-)
+from motionmind.metrics.inbetween import l2p, l2q, npss, position_spread, seen
+from motionmind.metrics.smoothness import angular_jerk
+from motionmind.metrics.style import StyleClassifier, fit_style_classifier
 
 __all__ = ["chart", "jobs", "tell", "work"]
 

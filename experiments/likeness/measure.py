@@ -20,7 +20,8 @@ from experiments.likeness.windows import POSTURES, Case
 from experiments.material import FPS
 from motionmind._typing import Bools, Floats
 from motionmind.geometry import rotations as rot
-from motionmind.metrics import angular_speed, l2q, npss, seen
+from motionmind.metrics.inbetween import l2q, npss, seen
+from motionmind.metrics.smoothness import angular_speed
 
 MOVING_GROUPS = ("arms", "spine", "head", "legs")
 AnyFloats = NDArray[Any]

@@ -13,8 +13,11 @@ from experiments.material import FPS, TOLD_APART, movement, recorded, without
 from motionmind import Skeleton
 from motionmind._typing import Bools, Floats
 from motionmind.body.anatomy_file import anatomy_named as anatomy
+from motionmind.body.contact import find_feet, find_floor
 from motionmind.geometry import rotations as rot
-from motionmind.metrics import StyleClassifier, angular_speed, find_feet, find_floor, fit_style_classifier, l2q
+from motionmind.metrics.inbetween import l2q
+from motionmind.metrics.smoothness import angular_speed
+from motionmind.metrics.style import StyleClassifier, fit_style_classifier
 from motionmind.render.body_shape import shape_of
 
 SECONDS = 2.0

@@ -12,7 +12,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from experiments.material import FPS, TOLD_APART, movement, recorded
-from motionmind.metrics import fit_style_classifier
+from motionmind.metrics.style import fit_style_classifier
 
 SECONDS = (0.6, 1.2, 2.0, 4.0)
 

@@ -12,11 +12,13 @@ import numpy as np
 from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
 from experiments.material import RATE, corpus, engine, part, recorded
-from motionmind import Engine, Motion, NoPathError, Piece, flow_of, make_discretization
+from motionmind import Engine, Motion, NoPathError, Piece
 from motionmind._typing import Bools, Floats
+from motionmind.chaos import find_flow
 from motionmind.chaos.reorder import itinerary
-from motionmind.metrics import angular_jerk, angular_speed
-from motionmind.metrics.measure import at_rate
+from motionmind.discretize import make_discretization
+from motionmind.metrics.figures import at_rate
+from motionmind.metrics.smoothness import angular_jerk, angular_speed
 from motionmind.variation.seams import judge_transitions
 
 FLOWS, NUDGES, LENGTH = ("lorenz", "rossler"), (0.1, 0.3, 1.0), 200
@@ -99,7 +101,7 @@ def leaps(count: int) -> list[tuple[int, int]]:
     found: dict[tuple[int, int], None] = {}
     for flow in FLOWS:
         for nudge in NUDGES:
-            indices = itinerary(flow_of(flow), count, LENGTH, nudge=nudge).indices.tolist()
+            indices = itinerary(find_flow(flow), count, LENGTH, nudge=nudge).indices.tolist()
             found |= {(i, k): None for i, k in pairwise(indices) if k not in (i, i + 1)}
     return list(found)
 

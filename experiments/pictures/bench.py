@@ -19,7 +19,7 @@ from time import perf_counter
 
 import numpy as np
 
-from motionmind import Engine, Motion, compose, contact_sheet, human44, read_posture, write_motion, write_picture
+from motionmind import Engine, Motion, compose, draw_picture, draw_sheet, human44, read_posture, write_motion
 from motionmind.render.sheet import png
 
 BALLET = Path(__file__).parents[2] / "corpora" / "ballet"
@@ -105,19 +105,19 @@ def main() -> None:
         def timed(what: str, make: Callable[[], object], aim: str = "") -> None:
             rows.append((what, f"{best(make):.2f} s", aim))
 
-        timed("contact sheet of 50 postures, as PNG", lambda: png(contact_sheet(adagio, range(50))), "0.3 s")
-        timed("GIF of 200 frames, 480 pixels", lambda: write_picture(here / "a.gif", film, fps=25), "1.5 s")
-        timed("MP4 of 200 frames, 480 pixels", lambda: write_picture(here / "a.mp4", film, fps=25))
-        timed("SVG of a tween of 1.5 s, 19 frames", lambda: write_picture(here / "a.svg", tween))
+        timed("contact sheet of 50 postures, as PNG", lambda: png(draw_sheet(adagio, range(50))), "0.3 s")
+        timed("GIF of 200 frames, 480 pixels", lambda: draw_picture(here / "a.gif", film, fps=25), "1.5 s")
+        timed("MP4 of 200 frames, 480 pixels", lambda: draw_picture(here / "a.mp4", film, fps=25))
+        timed("SVG of a tween of 1.5 s, 19 frames", lambda: draw_picture(here / "a.svg", tween))
         timed("GLB of 10,000 frames", lambda: write_motion(here / "a.glb", whole), "1 s")
         timed("BVH of 10,000 frames", lambda: write_motion(here / "a.bvh", whole))
         timed("AMASS's .npz of 10,000 frames", lambda: write_motion(here / "a.npz", whole))
-        timed("page of 5,000 postures", lambda: write_picture(here / "a.html", piece))
-        write_picture(here / "b.html", hands)
+        timed("page of 5,000 postures", lambda: draw_picture(here / "a.html", piece))
+        draw_picture(here / "b.html", hands)
         for name, file in (("human23", "a.html"), ("human44", "b.html")):
             rows.append((f"size of that page, {name}", f"{(here / file).stat().st_size / 1e6:.2f} MB", "4 MB"))
         try:
-            write_picture(here / "c.html", tween)
+            draw_picture(here / "c.html", tween)
             rows += [
                 ("the tween's page, pictures", playing(here / "c.html", browser, True), "60 a second"),
                 ("the same without ghosts", playing(here / "c.html", browser, False), "60 a second"),

@@ -15,8 +15,9 @@ from time import perf_counter
 
 import numpy as np
 
-from motionmind import Engine, Motion, Posture, make_discretization, own_skeleton, read_motion
+from motionmind import Engine, Motion, Posture, own_skeleton, read_motion
 from motionmind.corpus.gather import gather
+from motionmind.discretize import make_discretization
 from motionmind.geometry import rotations as rot
 
 RATE = 5.0

@@ -23,10 +23,11 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from experiments.inbetween.rivals import slerp
 from experiments.inbetween.run import GAPS, GIVEN, Window, tween, windows_of
 from experiments.material import RATE, families, movement, recordings
-from motionmind import Engine, NoPathError, make_discretization
+from motionmind import Engine, NoPathError
 from motionmind._typing import Floats
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.gather import gather
+from motionmind.discretize import make_discretization
 
 STRIDE, LONG_STRIDE = 0.7, 1.0  # seconds from window to window; the second of those longer than LONG
 LONG = 3.0

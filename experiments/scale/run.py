@@ -24,9 +24,10 @@ from experiments.harness import Row, Setting, markdown
 from experiments.material import recorded
 from experiments.scale.memory import Memory
 from experiments.scale.tweens import FPS, RATE, performed
-from motionmind import Engine, Motion, make_discretization, own_skeleton, read_motion
+from motionmind import Engine, Motion, own_skeleton, read_motion
 from motionmind.corpus.gather import gather
 from motionmind.corpus.recordings import Recording, Taking, take
+from motionmind.discretize import make_discretization
 from motionmind.executors.opening import open_team
 from motionmind.executors.workshop import Workshop
 from motionmind.formats.bvh import write_bvh

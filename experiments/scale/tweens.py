@@ -19,9 +19,10 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from motionmind import Engine, Motion, Posture, make_discretization, own_skeleton, read_motion
+from motionmind import Engine, Motion, Posture, own_skeleton, read_motion
 from motionmind.body.mirror import mirrored
 from motionmind.corpus.gather import gather
+from motionmind.discretize import make_discretization
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline
 

@@ -17,8 +17,9 @@ from time import perf_counter
 import numpy as np
 import pytoulbar2
 
-from motionmind import Engine, make_discretization, own_skeleton, read_motion
+from motionmind import Engine, own_skeleton, read_motion
 from motionmind._typing import Floats, Int32s, Ints
+from motionmind.discretize import make_discretization
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.progression import fit_progression
 from motionmind.search import bounding, solve

@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 from bench import RULES, Ends, joinable, moves_of
 
-from motionmind import Engine, make_discretization, own_skeleton, read_motion
+from motionmind import Engine, own_skeleton, read_motion
 from motionmind._typing import Floats
+from motionmind.discretize import make_discretization
 from motionmind.search import astar, bounding, heuristic, pair_chains, solve, trws
 from motionmind.search.heuristic import Heuristic
 from motionmind.search.problem import Model, Problem, costs_to_go, with_waits

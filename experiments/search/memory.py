@@ -16,7 +16,8 @@ from time import process_time
 
 import numpy as np
 
-from motionmind import Engine, make_discretization, own_skeleton, read_motion
+from motionmind import Engine, own_skeleton, read_motion
+from motionmind.discretize import make_discretization
 from motionmind.search import astar, pair_chains, trws
 from motionmind.search.heuristic import Heuristic
 from motionmind.search.problem import costs_to_go, with_waits

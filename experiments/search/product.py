@@ -20,7 +20,8 @@ import networkx as nx
 import numpy as np
 from bench import RULES, Ends, joinable, moves_of, toulbar2, written
 
-from motionmind import Engine, Motion, Skeleton, make_discretization, own_skeleton, read_motion
+from motionmind import Engine, Motion, Skeleton, own_skeleton, read_motion
+from motionmind.discretize import make_discretization
 from motionmind.grammar.grammar import Grammar
 from motionmind.search import solve
 from motionmind.search.problem import Model, Problem, Rules, costs_to_go, with_waits

@@ -14,7 +14,8 @@ from time import perf_counter
 import numpy as np
 import pytoulbar2
 
-from motionmind import Engine, Posture, Tween, make_discretization, own_skeleton, read_motion, write_posture
+from motionmind import Engine, Posture, Tween, own_skeleton, read_motion, write_posture
+from motionmind.discretize import make_discretization
 
 TIME_LIMIT = 60  # seconds that the general solver gets for one problem
 

@@ -74,7 +74,7 @@ from experiments.synthesis.tables import report
 from experiments.wince.dancers import Dancers, Seen, dancers, see
 from experiments.wince.followed import near
 from experiments.wince.run import BUDGET, own_of, pairs_of, row_of
-from motionmind import Engine, Motion, NoPathError, Posture, Tween, contact_sheet
+from motionmind import Engine, Motion, NoPathError, Posture, Tween, draw_sheet
 from motionmind._typing import Floats
 from motionmind.render.sheet import evenly, png
 
@@ -246,7 +246,7 @@ def draw(
             print(f"{name}-{title}: no path")
             continue
         motion, path = tween.motion, folder / f"{name}-{title}.png"
-        picture = contact_sheet(motion, evenly(range(len(motion)), SHOWN), columns=SHOWN)
+        picture = draw_sheet(motion, evenly(range(len(motion)), SHOWN), columns=SHOWN)
         if beside and (beside / path.name).exists():
             picture = _stacked(Image.open(beside / path.name).convert("RGB"), picture)
         path.write_bytes(png(picture))

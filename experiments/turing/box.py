@@ -22,7 +22,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from experiments.material import FPS, movement, recorded, without
-from motionmind import Motion, write_picture
+from motionmind import Motion, draw_picture
 
 SECONDS = 2.0
 FRAMES = round(SECONDS * FPS)
@@ -69,7 +69,7 @@ def fill(folder: Path, data: str | None, name: str, films: int, seed: int) -> No
         if kind == "made":
             engine = without(data, name, sequence)
             motion = engine.tween(real.posture(0), real.posture(-1), duration=SECONDS, fps=FPS).motion
-        write_picture(folder / f"{film}.gif", plain(motion))
+        draw_picture(folder / f"{film}.gif", plain(motion))
         key[film] = {"kind": kind, "corpus": name, "sequence": sequence, "seconds": float(real.times[0])}
     (folder / "key.json").write_text(json.dumps(key, indent=1, sort_keys=True) + "\n")
     (folder / "index.html").write_text(page(sorted(names)))

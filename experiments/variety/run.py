@@ -13,11 +13,12 @@ from experiments.harness import Row, Setting, markdown
 from experiments.inbetween.genmm import Examples, freely
 from experiments.material import FPS, RATE, RECORDED, corpus, part, recorded
 from experiments.variety.measures import CLOSELY, coverage, distances, global_diversity, local_diversity
-from motionmind import Engine, Motion, Piece, make_discretization, vary
+from motionmind import Engine, Motion, Piece, vary
 from motionmind.chaos.flows import FLOWS
 from motionmind.chaos.trajectories import trajectory
-from motionmind.metrics import angular_jerk
-from motionmind.metrics.measure import at_rate
+from motionmind.discretize import make_discretization
+from motionmind.metrics.figures import at_rate
+from motionmind.metrics.smoothness import angular_jerk
 
 SAMPLES = 10  # of each method, from each clip
 RECORDING = ("cmu-05", "05_12")  # the dancer's longest without a fault

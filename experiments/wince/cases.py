@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from motionmind import Engine, Posture, contact_sheet, own_skeleton, read_posture
+from motionmind import Engine, Posture, draw_sheet, own_skeleton, read_posture
 from motionmind._typing import Floats
 from motionmind.body.contact import lowest_height
 from motionmind.geometry import rotations as rot
@@ -83,7 +83,7 @@ def main() -> None:
         tween = engine.tween(*CASES[name]())
         motion = tween.motion
         path = asked.folder / f"{name}.png"
-        sheet = contact_sheet(motion, evenly(range(len(motion)), SHOWN), columns=SHOWN // 2)
+        sheet = draw_sheet(motion, evenly(range(len(motion)), SHOWN), columns=SHOWN // 2)
         path.write_bytes(png(sheet.reduce(2)))
         print(f"{path}: {tween.moves} moves in {motion.times[-1]:.2f} s")
 

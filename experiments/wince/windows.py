@@ -20,7 +20,7 @@ from experiments.material import FPS, families, movement
 from motionmind import NoPathError
 from motionmind._typing import Floats
 from motionmind.body.capsules import legs_depth
-from motionmind.metrics import skating
+from motionmind.body.contact import skating
 
 CROSSED = 0.03  # metres that legs are in each other
 MADE_BY = ("danced", "motionmind", "slerp")

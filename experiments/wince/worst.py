@@ -15,7 +15,7 @@ from experiments.harness import HERE
 from experiments.material import FPS, engine
 from experiments.wince.dancers import dancers, see
 from experiments.wince.run import BUDGET
-from motionmind import Motion, NoPathError, contact_sheet
+from motionmind import Motion, NoPathError, draw_sheet
 from motionmind.render.sheet import evenly, png
 
 SHOWN = 16  # postures of a movement
@@ -45,7 +45,7 @@ def main() -> None:
     tried.sort(key=lambda one: -one[0])
     for rank, (_, told, motion) in enumerate(tried[: asked.most], start=1):
         path = asked.folder / f"{asked.by}-{rank:02d}.png"
-        path.write_bytes(png(contact_sheet(motion, evenly(range(len(motion)), SHOWN), columns=SHOWN // 2)))
+        path.write_bytes(png(draw_sheet(motion, evenly(range(len(motion)), SHOWN), columns=SHOWN // 2)))
         print(f"{path}: {told}")
 
 

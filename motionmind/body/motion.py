@@ -371,14 +371,26 @@ class Velocity:
         rotations: angular velocities of the joints [J, 3], radians a second, each in the joint's own frame: a moment dt
             later the joint's rotation is `q exp(dt rotations)`.
         root: velocity of the root joint [3], metres a second, in the world's axes.
+
+    >>> import numpy as np
+    >>> from motionmind import Motion, Velocity, human23
+    >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (2, 23, 1))
+    >>> rising = Motion(human23(), at_rest, np.array([[0.0, 1.0, 0.0], [0.0, 1.1, 0.0]]), np.array([0.0, 0.1]))
+    >>> Velocity.at_end(rising).root.round(6)
+    array([0., 1., 0.])
     """
 
     rotations: Floats
     root: Floats
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rotations", as_floats("rotations", self.rotations))
+        object.__setattr__(self, "root", as_floats("root", self.root))
+
     @classmethod
     def at_start(cls, motion: Motion) -> Velocity:
         """Return the velocity with which a motion begins: see `at_end`."""
+        check_type("motion", motion, Motion)
         return cls._about(motion, 0, motion.times <= motion.times[0] + _VELOCITY_SPAN + _MOMENT, 1)
 
     @classmethod
@@ -391,6 +403,7 @@ class Velocity:
         Raises:
             MotionMindError: there is one frame only.
         """
+        check_type("motion", motion, Motion)
         return cls._about(motion, -1, motion.times >= motion.times[-1] - _VELOCITY_SPAN - _MOMENT, -2)
 
     @classmethod

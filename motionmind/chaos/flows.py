@@ -48,8 +48,8 @@ class Flow:
         dimensions: names of the coordinates [d]; by default x1, x2 and so on.
         about: the equations and their source.
 
-    >>> from motionmind import flow_of
-    >>> flow_of("lorenz").dimensions
+    >>> from motionmind.chaos import find_flow
+    >>> find_flow("lorenz").dimensions
     ('x', 'y', 'z')
     """
 
@@ -93,7 +93,7 @@ class Flow:
         return f"{self.name} ({values})" if values else self.name
 
 
-def flow_of(name: str, **parameters: float) -> Flow:
+def find_flow(name: str, **parameters: float) -> Flow:
     """Return the registered flow of this name.
 
     Args:
@@ -103,8 +103,8 @@ def flow_of(name: str, **parameters: float) -> Flow:
     Raises:
         MotionMindError: there is no flow or no parameter of that name, or a value is not a finite number.
 
-    >>> from motionmind import flow_of
-    >>> flow_of("lorenz", rho=28.0).parameters["rho"]
+    >>> from motionmind.chaos import find_flow
+    >>> find_flow("lorenz", rho=28.0).parameters["rho"]
     28.0
     """
     check_text("name", name)

@@ -95,8 +95,8 @@ def _draw(found: Collection, output: Path) -> None:
     import numpy as np
 
     from motionmind.body.motion import Motion
-    from motionmind.formats import write_atomically
-    from motionmind.render.sheet import contact_sheet, png
+    from motionmind.files import write_atomically
+    from motionmind.render.sheet import draw_sheet, png
 
     if not found.postures:
         raise MotionMindError(f"{found.word}: names no postures; motionmind sheet draws those of its clips")
@@ -108,4 +108,4 @@ def _draw(found: Collection, output: Path) -> None:
         np.arange(float(len(drawn))),
         found.word,
     )
-    write_atomically(output, png(contact_sheet(motion, captions=found.postures)))
+    write_atomically(output, png(draw_sheet(motion, captions=found.postures)))

@@ -71,12 +71,12 @@ def write(path: Path, movement: Motion | Posture) -> None:
     """Write a motion or a posture as movement or as a picture, by the suffix of `path`, and note what it leaves out."""
     from motionmind.body.motion import Posture
     from motionmind.formats import lossy_fields, write_motion, write_posture
-    from motionmind.render.pictures import write_picture
+    from motionmind.render.pictures import draw_picture
 
     motion = movement.as_motion() if isinstance(movement, Posture) else evened(path, movement)
     note_licences(path, motion)
     if path.suffix.lower() in PICTURES:
-        write_picture(path, motion)
+        draw_picture(path, motion)
         return
     if isinstance(movement, Posture):
         write_posture(path, movement)

@@ -56,11 +56,11 @@ def graph(corpus: str, joint: str, output: Path, home: Path | None) -> None:
     an arrow, the likelier the transition. In .svg, point at a state to see more, such as the states of the joint's
     parent that go with it. Pictures leave out states that no move leads to or from.
     """
-    from motionmind.plots.joint_graph import GRAPHS, write_joint_graph
+    from motionmind.plots.joint_graph import GRAPHS, draw_joint_graph
     from motionmind.tween.engine import Engine
 
     check_outputs([(output, GRAPHS)], [])
-    drawn = write_joint_graph(output, Engine.load(corpus, home), joint)
+    drawn = draw_joint_graph(output, Engine.load(corpus, home), joint)
     alone = sum(not any(other != state for other in (*drawn.succ[state], *drawn.pred[state])) for state in drawn)
     click.echo(
         f"{displayed_path(output)}: {displayed(joint)}, {count(len(drawn), 'state')}, "

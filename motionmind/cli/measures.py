@@ -18,7 +18,7 @@ from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
-    from motionmind.metrics.measure import Figure
+    from motionmind.metrics.figures import Figure
 
 
 @command("motionmind measure tween.json --corpus ballet")
@@ -50,7 +50,7 @@ def measure(
     import msgspec
     import numpy as np
 
-    from motionmind.metrics.measure import MeasureReport, measure
+    from motionmind.metrics.figures import MeasureReport, measure
     from motionmind.tween.engine import Engine
     from motionmind.tween.report import read_report
 

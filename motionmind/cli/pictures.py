@@ -103,8 +103,8 @@ def sheet(
     Each posture is drawn from the front and from the side, and its feet from above, with its time and its frame's
     number: 23 is SOURCE@23 where a posture is wanted.
     """
-    from motionmind.formats import write_atomically
-    from motionmind.render.sheet import check_frames, contact_sheet, png
+    from motionmind.files import write_atomically
+    from motionmind.render.sheet import check_frames, draw_sheet, png
 
     named = parse_movement(source, home)
     folder = output if named.source.kind != "file" and (output.is_dir() or not output.suffix) else None
@@ -119,7 +119,7 @@ def sheet(
     paths = _make_files(folder, motions, named.source.paths) if folder else [output]
     with all_or_none():
         for path, motion, drawn in zip(paths, motions, frames, strict=True):
-            picture = contact_sheet(motion, drawn, columns=columns, side=side)
+            picture = draw_sheet(motion, drawn, columns=columns, side=side)
             write_atomically(path, png(picture))
             number = count(len(drawn), "posture")
             click.echo(f"{displayed_path(path)}: {number} of {len(motion)}, {picture.width} x {picture.height} pixels")
@@ -168,7 +168,7 @@ def render(
     a sheet of up to 48 evenly spread ones (the sheet command offers more choice); an .html page plays the movement in
     any browser, from disk, offline. Inserted movement is drawn in violet; a green ball marks a joint that was bridged.
     """
-    from motionmind.render.pictures import write_picture
+    from motionmind.render.pictures import draw_picture
 
     drawing = {key: options.pop(key) for key in ("fps", "view", "size")}
     named = parse_movement(source, home)
@@ -179,7 +179,7 @@ def render(
     with all_or_none():
         for path in outputs:
             note_licences(path, motion)
-            write_picture(path, motion, first=frames.start, **drawing)
+            draw_picture(path, motion, first=frames.start, **drawing)
     seconds = motion.times[-1] - motion.times[0]
     for path in outputs:
         kilobytes = path.stat().st_size / 1000

@@ -175,7 +175,7 @@ def _check_pairs(
 
 def _draw_seams(path: Path, variation: Variation, home: Path | None) -> None:
     """Draw all seams of a variation."""
-    from motionmind.formats import write_atomically
+    from motionmind.files import write_atomically
     from motionmind.render.seam_sheet import seam_sheet
     from motionmind.render.sheet import png
 
@@ -184,14 +184,14 @@ def _draw_seams(path: Path, variation: Variation, home: Path | None) -> None:
 
 def _play(context: click.Context, file: Path, seam: int, alternative: int | None, output: Path | None) -> None:
     """Draw the movement around a seam of a variation in a file, with another of its insertions if one is given."""
-    from motionmind.render.pictures import write_picture
+    from motionmind.render.pictures import draw_picture
     from motionmind.variation.variation_json import read_variation
 
     if output is None:
         raise click.UsageError(f"--play draws into a file: name one by -o, such as -o seam-{seam}.gif", context)
     check_outputs([(output, PICTURES)], [file])
     motion = read_variation(file).around(seam, alternative)
-    write_picture(output, motion)
+    draw_picture(output, motion)
     seconds = motion.times[-1] - motion.times[0]
     click.echo(f"{displayed_path(output)}: seam {seam}, {count(len(motion), 'frame')}, {seconds:.2f} s")
 

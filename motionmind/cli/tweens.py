@@ -227,7 +227,7 @@ class _Files:
 
     def write(self, results: Sequence[Tween]) -> tuple[list[Path], list[TweenReport]]:
         """Write all that was asked for, or nothing if one file fails; return the files, and the reports if asked."""
-        from motionmind.formats import write_atomically
+        from motionmind.files import write_atomically
         from motionmind.tween.report import encode_report
         from motionmind.tween.result import report_of
 
@@ -249,7 +249,7 @@ class _Files:
 
     def write_diagnosis(self, error: NoPathError) -> None:
         """Write, or print, why there is no path in place of the first report, if there was to be one."""
-        from motionmind.formats import write_atomically
+        from motionmind.files import write_atomically
 
         text = json.dumps({"status": "no path", "message": str(error), "diagnosis": error.diagnosis})
         _, report, _ = self._files_of(1)

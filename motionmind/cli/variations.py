@@ -206,7 +206,7 @@ def vary(
 
     Ctrl-C ends the smoothing: what has been found by then is written, and the exit code is 130.
     """
-    from motionmind.chaos.flows import flow_of
+    from motionmind.chaos.flows import find_flow
     from motionmind.variation.departure import share_sought
     from motionmind.variation.variation import vary as make_variation
 
@@ -226,7 +226,7 @@ def vary(
     if asked["depart"] is not None and nudge is not None:
         raise click.UsageError("--depart seeks a nudge, and --nudge gives one; leave out one of them", context)
     asked["nudge"] = nudge[0] if nudge is not None and len(nudge) == 1 else nudge
-    asked["flow"] = flow_of(attractor, **parse_parameters(parameter))
+    asked["flow"] = find_flow(attractor, **parse_parameters(parameter))
     alternatives = options.pop("alternatives")
     piece, engine = _read_piece(context, named, corpus, home, by, **options)
     with Interruption() as interruption:
@@ -265,12 +265,12 @@ def attractor(variation: Path, output: Path) -> None:
     variation parts from the piece, and where it jumps. In .svg, point at a part to see more. The page turns in three
     dimensions, and a body dances the variation beside it.
     """
-    from motionmind.plots.attractor import ATTRACTORS, write_attractor
+    from motionmind.plots.attractor import ATTRACTORS, draw_attractor
     from motionmind.variation.variation_json import read_variation
 
     check_outputs([(output, ATTRACTORS)], [variation])
     found = read_variation(variation)
-    write_attractor(output, found)
+    draw_attractor(output, found)
     flow = found.course.flow if found.course else found.by
     click.echo(f"{displayed_path(output)}: {flow}, {len(found.piece)} sites, {len(found.order)} points")
 
@@ -393,7 +393,7 @@ def _write(outputs: Sequence[Path], report: Path | None, variation: Variation, f
     Returns:
         The hash of the first of the variation's files; None if there is none, or it went to a pipe.
     """
-    from motionmind.formats import write_atomically
+    from motionmind.files import write_atomically
     from motionmind.variation.variation_json import write_variation
 
     with all_or_none() as written:

@@ -392,24 +392,24 @@ def film() -> None:
     """Film a posture, as a command does last; no corpus need be learned."""
     from motionmind.names.finding import find_motion
     from motionmind.names.spelling import parse_source
-    from motionmind.render.pictures import write_picture
+    from motionmind.render.pictures import draw_picture
 
     with tempfile.TemporaryDirectory(prefix="motionmind-") as folder:
-        write_picture(Path(folder) / "posture.gif", find_motion(parse_source("ballet/arabesque"), as_clip=False))
+        draw_picture(Path(folder) / "posture.gif", find_motion(parse_source("ballet/arabesque"), as_clip=False))
 
 
 def draw() -> None:
     """Draw a clip in all other ways."""
-    from motionmind.plots.attractor import write_attractor
-    from motionmind.render.pictures import write_picture
+    from motionmind.plots.attractor import draw_attractor
+    from motionmind.render.pictures import draw_picture
     from motionmind.tween.engine import Engine
     from motionmind.variation.variation import vary
 
     engine = Engine.load("ballet")
     clip = engine.corpus.motion(engine.corpus.clips[0])
     with tempfile.TemporaryDirectory(prefix="motionmind-") as folder:
-        write_picture(Path(folder) / "clip.svg", clip.slice(0, 2))
-        write_attractor(Path(folder) / "attractor.png", vary(clip, stretch=4))
+        draw_picture(Path(folder) / "clip.svg", clip.slice(0, 2))
+        draw_attractor(Path(folder) / "attractor.png", vary(clip, stretch=4))
 
 
 def _problem() -> Problem:

@@ -55,6 +55,11 @@ class Corpus:
         origins: the corpora that its other clips were taken from.
         citation: how to cite it; "" if nobody asks for that.
         flip_degrees: the turn in one frame that counted as a flip in its own recordings.
+
+    >>> from motionmind import Corpus, Engine
+    >>> corpus = Engine.load("ballet").corpus
+    >>> isinstance(corpus, Corpus), corpus.rotations.shape == (len(corpus.root), len(corpus.skeleton), 4)
+    (True, True)
     """
 
     name: str

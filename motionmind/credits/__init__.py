@@ -1,1 +1,7 @@
 """Credits: whose movement a movement is made of, and under which licences."""
+
+from __future__ import annotations
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

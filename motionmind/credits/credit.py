@@ -38,7 +38,7 @@ class Credit:
         source: of the corpus.
         licence: of the corpus; "" where none is stated.
 
-    >>> from motionmind import Credit
+    >>> from motionmind.credits import Credit
     >>> Credit(0.75, "plies", performer="Ada", corpus="ballet", licence="CC0-1.0").share
     0.75
     """

@@ -56,6 +56,10 @@ class Library:
         licence: its licence.
         skeleton: the skeleton whose rest posture the orientations start from.
         path: the file that it was read from, for messages.
+
+    >>> from motionmind.discretize import Library, read_library
+    >>> isinstance(read_library("human23"), Library)
+    True
     """
 
     tables: Mapping[str, Mapping[str, str | tuple[float, ...]]]
@@ -231,7 +235,12 @@ def read_library(name_or_path: FilePath) -> Library:
 
     Raises:
         FormatError: there is no such library, or the file is not one; the message names the table and entry at fault.
+
+    >>> from motionmind.discretize import read_library
+    >>> read_library("human23").path.endswith("human23.toml")
+    True
     """
+    check_path("name_or_path", name_or_path)
     path = library_path(name_or_path)
     try:
         text = read_bytes(path).decode("utf-8-sig")
@@ -257,7 +266,8 @@ def write_library(path: FilePath, library: Library) -> None:
     ...   1     | stand
     ... '''
     >>> _ = Path("bends.score").write_text(text)
-    >>> from motionmind import name_states, read_score, write_library
+    >>> from motionmind import read_score
+    >>> from motionmind.discretize import name_states, write_library
     >>> write_library("mine.toml", name_states([read_score("bends.score")], 12.0))
     """
     check_path("path", path)

@@ -54,7 +54,8 @@ def name_states(
     ...   1     | stand
     ... '''
     >>> _ = Path("bends.score").write_text(text)
-    >>> from motionmind import name_states, read_score
+    >>> from motionmind import read_score
+    >>> from motionmind.discretize import name_states
     >>> name_states([read_score("bends.score")], 12.0).skeleton
     'human23'
     """

@@ -23,7 +23,7 @@ class Discretization(Protocol):
     Packages add a kind by an entry point in `motionmind.discretizations`: what is called with `tolerance` and
     `per_joint`, in degrees, or with what `to_spec` wrote, and makes one.
 
-    >>> from motionmind import Discretization, make_discretization
+    >>> from motionmind.discretize import Discretization, make_discretization
     >>> isinstance(make_discretization("codebook"), Discretization)
     True
     """

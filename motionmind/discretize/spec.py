@@ -48,7 +48,7 @@ def make_discretization(
         MotionMindError: a tolerance is out of range.
         FormatError: there is no such kind or library.
 
-    >>> from motionmind import make_discretization
+    >>> from motionmind.discretize import make_discretization
     >>> make_discretization("codebook", tolerance=10.0, per_joint={"left_hip": 5.0}).tolerance
     10.0
     """

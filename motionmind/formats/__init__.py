@@ -13,8 +13,8 @@
 | `.gltf`, `.vrm` | as `.glb` | |
 | `.vrma` | as `.glb` | motion of people |
 
-Installed packages may add others, each named after its suffix (`motionmind.formats.added`). `lossy_fields` names what a
-format cannot hold.
+Installed packages may add others, each named after its suffix (`MotionReader`, `MotionWriter`). `lossy_fields` names
+what a format cannot hold.
 """
 
 from __future__ import annotations
@@ -23,20 +23,17 @@ import warnings
 from numbers import Real
 from pathlib import Path
 
-from motionmind._moved import renamed
 from motionmind.arguments import check_integer, check_path, check_real, check_type
 from motionmind.body.human import SHORTEST, TALLEST
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
-from motionmind.files import FilePath, write_atomically
-from motionmind.formats.added import added_suffixes, read_added, write_added
+from motionmind.files import FilePath
+from motionmind.formats.added import MotionReader, MotionWriter, added_suffixes, read_added, write_added
 from motionmind.formats.lossy import WRITABLE, lossy_fields
 from motionmind.retarget.vertical import check_up, stood_up
 
-__all__ = ["lossy_fields", "read_motion", "read_posture", "write_atomically", "write_motion", "write_posture"]
-
-__getattr__ = renamed(__name__, {"lost": "lossy_fields"})
+__all__ = ["MotionReader", "MotionWriter", "lossy_fields"]
 
 _GLTF = (".glb", ".gltf", ".vrm", ".vrma")
 _READABLE = (".json", ".bvh", ".amc", ".txt", ".npz", ".pkl", ".npy", *_GLTF)

@@ -18,7 +18,7 @@ _GROUP: Group = "motionmind.formats"
 class MotionReader(Protocol):
     """A format that can be read; packages add one by an entry point in `motionmind.formats`, named after its suffix.
 
-    >>> from motionmind import MotionReader
+    >>> from motionmind.formats import MotionReader
     >>> class Dots:
     ...     def read_motion(self, path, *, fps):
     ...         ...
@@ -46,7 +46,7 @@ class MotionReader(Protocol):
 class MotionWriter(Protocol):
     """A format that can be written; the object of one entry point may be a `MotionReader` too.
 
-    >>> from motionmind import MotionWriter
+    >>> from motionmind.formats import MotionWriter
     >>> class Dots:
     ...     def motion_bytes(self, motion):
     ...         return b""

@@ -37,7 +37,8 @@ def lossy_fields(motion: Motion, path: FilePath, source: FilePath | None = None)
         The phrases; empty if nothing is lost.
 
     >>> import numpy as np
-    >>> from motionmind import Posture, human23, lossy_fields
+    >>> from motionmind import Posture, human23
+    >>> from motionmind.formats import lossy_fields
     >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (23, 1))
     >>> posture = Posture(human23(), at_rest, np.zeros(3))
     >>> lossy_fields(posture.as_motion(), "rest.txt")

@@ -1,1 +1,7 @@
 """Gaps of a corpus: which transitions to record next for cheaper tweens with fewer bridges."""
+
+from __future__ import annotations
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -98,7 +98,8 @@ class Gaps(msgspec.Struct, frozen=True):
         joints: the joint graphs, the worst first.
         transitions: transitions to record, in this order.
 
-    >>> from motionmind import Engine, find_gaps
+    >>> from motionmind import Engine
+    >>> from motionmind.gaps import find_gaps
     >>> gaps = find_gaps(Engine.load("macarena"), pairs=4, count=1)
     >>> gaps.pairs, len(gaps.joints)
     (4, 24)
@@ -137,7 +138,8 @@ def find_gaps(
     Raises:
         MotionMindError: a number is out of its range, or the corpus has a single posture.
 
-    >>> from motionmind import Engine, find_gaps
+    >>> from motionmind import Engine
+    >>> from motionmind.gaps import find_gaps
     >>> gaps = find_gaps(Engine.load("macarena"), pairs=4, count=1)
     >>> all(one.energy.cost < gaps.energy.cost for one in gaps.transitions)
     True

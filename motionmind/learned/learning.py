@@ -12,9 +12,8 @@ from motionmind._typing import Floats, States
 from motionmind.corpus.corpus import FACING, Corpus
 from motionmind.corpus.fingerprint import code_name
 from motionmind.corpus.kept import Kept
-from motionmind.discretize import Discretization, StateSpace
-from motionmind.discretize.protocol import ByJoint
-from motionmind.discretize.states import nearest
+from motionmind.discretize.protocol import ByJoint, Discretization
+from motionmind.discretize.states import StateSpace, nearest
 from motionmind.errors import CorpusError
 from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot

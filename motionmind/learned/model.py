@@ -13,7 +13,8 @@ from motionmind.body.motion import Motion
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import Gathering, gather
 from motionmind.corpus.recordings import Recording
-from motionmind.discretize import Codebook, Discretization
+from motionmind.discretize.codebook import Codebook
+from motionmind.discretize.protocol import Discretization
 from motionmind.executors.workshop import Workshop
 from motionmind.learned import persistence
 from motionmind.learned.learning import Learned, learn

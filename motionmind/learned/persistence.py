@@ -33,8 +33,10 @@ from motionmind.corpus.manifest import (
     SourceManifest,
     parse_manifest,
 )
-from motionmind.discretize import Discretization, StateSpace, from_spec
 from motionmind.discretize.library import library_path
+from motionmind.discretize.protocol import Discretization
+from motionmind.discretize.spec import from_spec
+from motionmind.discretize.states import StateSpace
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.formats import read_motion
 from motionmind.grammar.bridges import Bridges

@@ -60,7 +60,7 @@ class Sighting:
         unit: the unit of both; "" for shares and ratios.
         part: the body part with the greatest value, if it is one part: a joint, "facing" or "travel"; else "".
 
-    >>> from motionmind import Sighting
+    >>> from motionmind.learned import Sighting
     >>> Sighting(31.0, 18.5, "m/s^2").is_beyond
     True
     """

@@ -20,7 +20,7 @@ from motionmind.body.limbs import limbs_of, parts_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Corpus, Facing
 from motionmind.corpus.entries import Columns
-from motionmind.discretize import StateSpace
+from motionmind.discretize.states import StateSpace
 from motionmind.files import give_back
 from motionmind.learned.neighbours import node_bounds
 from motionmind.learned.peaks import LENGTHS

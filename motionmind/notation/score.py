@@ -104,6 +104,13 @@ class Score:
         phrases: phrases and clips by name, in order.
         postures: single postures by name, each a phrase of one line; those of scores that it includes, too.
         included: other scores by the prefix of their words here.
+
+    >>> from pathlib import Path
+    >>> lines = ["title Rest", "body human23", "legs", "  stand = stand", "clip rest: Still", "  start | stand"]
+    >>> _ = Path("rest.score").write_text("\\n".join(lines))
+    >>> from motionmind import Score, read_score
+    >>> isinstance(read_score("rest.score"), Score)
+    True
     """
 
     path: str

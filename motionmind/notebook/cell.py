@@ -63,7 +63,7 @@ def check_length(motion: Motion) -> None:
     if len(motion) * len(motion.skeleton) > MOST_PLACES:
         raise MotionMindError(
             f"{motion!r} is too long to play in a notebook: motion.slice(start, stop) and motion.resample(rate) make "
-            "it shorter, write_picture('clip.html', motion) writes a page of it all"
+            "it shorter, draw_picture('clip.html', motion) writes a page of it all"
         )
 
 

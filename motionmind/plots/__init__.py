@@ -1,1 +1,7 @@
 """Plots on one canvas, as SVG and PNG: joint graphs, and variations on their attractors."""
+
+from __future__ import annotations
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

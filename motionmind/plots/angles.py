@@ -31,7 +31,7 @@ _LOWEST, _APART = 26.0, 20.0
 _ROUND = 10.0  # degrees, to whose multiples each curve's range is widened
 
 
-def angle_chart(motion: Motion, joints: Sequence[str] | None = None) -> Plate:
+def draw_angles(motion: Motion, joints: Sequence[str] | None = None) -> Plate:
     """Draw how far joints are turned from rest, over time: a curve for each, all at one scale.
 
     Inserted movement is violet, with a dot at each of its moves, and green where no corpus attests a joint's move.
@@ -47,10 +47,11 @@ def angle_chart(motion: Motion, joints: Sequence[str] | None = None) -> Plate:
         SkeletonError: the skeleton has no such joint.
         MotionMindError: the motion has one frame, or no joint is to be drawn.
 
-    >>> from motionmind import Engine, angle_chart
+    >>> from motionmind import Engine
+    >>> from motionmind.plots import draw_angles
     >>> engine = Engine.load("ballet")
     >>> tween = engine.tween("ballet/arabesque", "ballet/fifth")
-    >>> angle_chart(tween.motion, ["left_knee", "right_knee"]).save("knees.svg")
+    >>> draw_angles(tween.motion, ["left_knee", "right_knee"]).save("knees.svg")
     """
     check_type("motion", motion, Motion)
     if joints is not None:

@@ -27,7 +27,7 @@ from motionmind.plots.symbols import LETTERS, SMALL
 from motionmind.render.palette import EDGE, INK, PIECE, PLOT_PALE, VARIATION
 from motionmind.variation.variation import Variation
 
-ATTRACTORS = (".png", ".svg", ".html")  # suffixes that `write_attractor` writes
+ATTRACTORS = (".png", ".svg", ".html")  # suffixes that `draw_attractor` writes
 
 # In pixels:
 _MARGIN = 44.0
@@ -36,7 +36,7 @@ _UNDER = 80.0  # between the attractor and the itineraries
 _GRAPH = 330.0  # height of the itineraries
 
 
-def write_attractor(path: FilePath, variation: Variation) -> None:
+def draw_attractor(path: FilePath, variation: Variation) -> None:
     """Write a picture of a variation on its attractor (`.png`, `.svg`), or a page with both in motion (`.html`).
 
     A picture has both trajectories, the cell of each posture, some of the postures, and both itineraries; in `.svg`
@@ -50,10 +50,11 @@ def write_attractor(path: FilePath, variation: Variation) -> None:
         MotionMindError: the suffix is unknown, the trajectories cannot be computed again (see `portrait_of`), or the
             file cannot be written.
 
-    >>> from motionmind import Engine, vary, write_attractor
+    >>> from motionmind import Engine, vary
+    >>> from motionmind.plots import draw_attractor
     >>> engine = Engine.load("ballet")
     >>> motion = engine.corpus.motion(engine.corpus.clips[0])
-    >>> write_attractor("attractor.svg", vary(motion, nudge=1.0))
+    >>> draw_attractor("attractor.svg", vary(motion, nudge=1.0))
     """
     check_path("path", path)
     check_type("variation", variation, Variation)

@@ -26,6 +26,12 @@ class Plate:
         marks: the marks.
         headings: marks that come first in the SVG, as they are read, but last in the PNG, over all others.
         style: attributes that all marks inherit in the SVG.
+
+    >>> from motionmind import Engine
+    >>> from motionmind.plots import Plate, draw_angles
+    >>> motion = Engine.load("ballet").tween("ballet/arabesque", "ballet/fifth").motion
+    >>> isinstance(draw_angles(motion), Plate)
+    True
     """
 
     width: int

@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
     from motionmind.tween.engine import Engine
 
-GRAPHS = (".svg", ".png", ".graphml", ".gexf")  # suffixes that `write_joint_graph` writes
+GRAPHS = (".svg", ".png", ".graphml", ".gexf")  # suffixes that `draw_joint_graph` writes
 
 _CURVE_POINTS = 17  # of an arrow in a PNG
 _HALO = 2.0  # width of the paper around words of a PNG, pixels
 
 
-def write_joint_graph(path: FilePath, engine: Engine, joint: str) -> nx.DiGraph:
+def draw_joint_graph(path: FilePath, engine: Engine, joint: str) -> nx.DiGraph:
     """Write what an engine's corpus teaches of a joint: its states, and how likely each follows another.
 
     `.svg` and `.png` are pictures: larger circles are visited more often, darker arrows are likelier, and states that
@@ -49,8 +49,9 @@ def write_joint_graph(path: FilePath, engine: Engine, joint: str) -> nx.DiGraph:
     Raises:
         MotionMindError: the suffix is unknown, the corpus has no such joint, or the file cannot be written.
 
-    >>> from motionmind import Engine, write_joint_graph
-    >>> graph = write_joint_graph("hip.svg", Engine.load("ballet"), "left_hip")
+    >>> from motionmind import Engine
+    >>> from motionmind.plots import draw_joint_graph
+    >>> graph = draw_joint_graph("hip.svg", Engine.load("ballet"), "left_hip")
     >>> graph.graph["joint"]
     'left_hip'
     """
@@ -65,7 +66,7 @@ def write_joint_graph(path: FilePath, engine: Engine, joint: str) -> nx.DiGraph:
 
 
 def write_graph(path: FilePath, graph: nx.DiGraph) -> None:
-    """Write a joint graph as `write_joint_graph` does.
+    """Write a joint graph as `draw_joint_graph` does.
 
     Args:
         path: the file.

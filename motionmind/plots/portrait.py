@@ -15,7 +15,7 @@ from itertools import takewhile
 import numpy as np
 
 from motionmind._typing import Floats, Int16s, Ints
-from motionmind.chaos.flows import Flow, flow_of
+from motionmind.chaos.flows import Flow, find_flow
 from motionmind.chaos.trajectories import trajectory
 from motionmind.errors import MotionMindError
 from motionmind.jit import jit
@@ -168,7 +168,7 @@ def portrait_of(variation: Variation) -> Portrait:
             f"{most} postures, {course.skip + 1} steps each"
         )
     variation = replace(variation, edits=tuple(takewhile(lambda edit: not isinstance(edit, Cut), variation.edits)))
-    flow, every = flow_of(course.flow, **course.parameters), course.skip + 1
+    flow, every = find_flow(course.flow, **course.parameters), course.skip + 1
     if course.skip < 0 or len(course.nudge) != len(flow.start):
         raise MotionMindError(
             f"a course of {flow.name} has a nudge of {len(flow.start)} numbers and skips 0 points or more, "

@@ -15,7 +15,7 @@ ON_A_SHEET = 48  # postures on a sheet, at most
 _FILMED = (".gif", ".mp4", ".svg")
 
 
-def write_picture(
+def draw_picture(
     path: FilePath,
     motion: Motion,
     *,
@@ -26,7 +26,7 @@ def write_picture(
 ) -> None:
     """Write a motion as a picture, a film or a page, as the file's suffix says.
 
-    `.png` is one posture, or a sheet of up to 48, evenly spread and numbered (`contact_sheet` has more options);
+    `.png` is one posture, or a sheet of up to 48, evenly spread and numbered (`draw_sheet` has more options);
     `.gif`, `.mp4` and `.svg` are films; `.html` is a page that plays the motion in any browser, from disk, offline.
     Inserted movement has another colour, bridged joints are marked, and the insertion's end postures show as ghosts.
 
@@ -46,10 +46,10 @@ def write_picture(
             many frames, the extra for MP4 is not installed, or the file cannot be written.
 
     >>> import numpy as np
-    >>> from motionmind import Posture, human23, write_picture
+    >>> from motionmind import Posture, draw_picture, human23
     >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (23, 1))
     >>> posture = Posture(human23(), at_rest, np.zeros(3))
-    >>> write_picture("rest.png", posture.as_motion(), view="front")
+    >>> draw_picture("rest.png", posture.as_motion(), view="front")
     """
     check_path("path", path)
     check_type("motion", motion, Motion)
@@ -71,9 +71,9 @@ def write_picture(
 
         write_svg(path, motion, fps=fps, first=first, **options)
     elif suffix == ".png" and len(motion) > 1:
-        from motionmind.render.sheet import contact_sheet, evenly, png
+        from motionmind.render.sheet import draw_sheet, evenly, png
 
-        write_atomically(path, png(contact_sheet(motion, evenly(range(len(motion)), ON_A_SHEET), first=first)))
+        write_atomically(path, png(draw_sheet(motion, evenly(range(len(motion)), ON_A_SHEET), first=first)))
     elif suffix == ".png":
         from motionmind.render.film import write_still
 

@@ -54,7 +54,7 @@ _STANDS = 0.03  # a foot lower than this stands on the floor, by the body's heig
 _SINKS = 0.006  # depth under the floor that is not yet marked, by the body's height
 
 
-def contact_sheet(
+def draw_sheet(
     motion: Motion,
     frames: Sequence[int] | None = None,
     *,
@@ -86,10 +86,10 @@ def contact_sheet(
             more or fewer captions than frames; or the side or the number of columns is invalid.
 
     >>> import numpy as np
-    >>> from motionmind import Posture, contact_sheet, human23
+    >>> from motionmind import Posture, draw_sheet, human23
     >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (23, 1))
     >>> posture = Posture(human23(), at_rest, np.zeros(3))
-    >>> contact_sheet(posture.as_motion()).mode
+    >>> draw_sheet(posture.as_motion()).mode
     'RGB'
     """
     check_type("motion", motion, Motion)
@@ -119,7 +119,7 @@ class Row(NamedTuple):
 
 
 def row_sheet(motion: Motion, rows: Sequence[Row]) -> Image.Image:
-    """Draw rows of postures of a motion, all as long as the first, each under its heading; see `contact_sheet`."""
+    """Draw rows of postures of a motion, all as long as the first, each under its heading; see `draw_sheet`."""
     drawn = [
         (frame, caption)
         for row in rows

@@ -51,7 +51,7 @@ def _view(name: str, azimuth: float, elevation: float) -> View:
     return View(name, (cos(a), 0.0, -sin(a)), (-sin(e) * sin(a), cos(e), -sin(e) * cos(a)), towards)
 
 
-# Views of films, by the name that `write_picture` takes; a little from above, as from a raised seat, to show the floor.
+# Views of films, by the name that `draw_picture` takes; a little from above, as from a raised seat, to show the floor.
 VIEWS: Mapping[str, View] = {
     "quarter": _view("three quarters, from the audience's left", -32.0, 17.0),
     "front": _view("from the front, as the audience sees it", 0.0, 9.0),

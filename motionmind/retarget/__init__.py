@@ -1,1 +1,7 @@
 """Retargeting: known rigs, mappings of their joints, and movement brought onto human23."""
+
+from __future__ import annotations
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -81,7 +81,7 @@ def read_joint_mapping(path: str | Path) -> dict[str, str]:
         FormatError: the file cannot be read, or names a joint that human23 does not have.
 
     >>> from pathlib import Path
-    >>> from motionmind import read_joint_mapping
+    >>> from motionmind.retarget import read_joint_mapping
     >>> _ = Path("rig.toml").write_text('Hips = "pelvis"')
     >>> read_joint_mapping("rig.toml")
     {'Hips': 'pelvis'}

@@ -8,7 +8,7 @@ from typing import Any
 from motionmind._typing import Floats
 from motionmind.chaos.flows import Flow
 from motionmind.chaos.trajectories import trajectory
-from motionmind.studio.varying import EVERY, flow_of
+from motionmind.studio.varying import EVERY, find_flow
 
 _SHEETS = 12_000  # points that show an attractor
 _MOST_DRAWN = 6_000  # points of a trajectory, beyond which a map thins it out
@@ -27,7 +27,7 @@ def map_of(name: str) -> dict[str, Any]:
     Raises:
         MotionMindError: no flow in three dimensions has this name.
     """
-    flow = flow_of(name)
+    flow = find_flow(name)
     points = trajectory(flow, count=_SHEETS, every=3)
     return {"flow": name, "axes": axes_of(flow), "points": points.round(4).tolist(), "about": flow.about}
 

@@ -245,7 +245,7 @@ def find_order(wanted: Wanted, count: int, length: int, insertions: Estimates | 
         MotionMindError: no flow has this name, or the request cannot be met.
     """
     stretch = min(wanted.stretch, count, length)
-    course = _course(flow_of(wanted.flow).name, wanted.start, count, length, stretch)
+    course = _course(find_flow(wanted.flow).name, wanted.start, count, length, stretch)
     nudge = wanted.nudge
     if nudge is None:
         limits = check_limits(None, stretch, count, length) if stretch > 1 else None
@@ -303,13 +303,13 @@ class _Course:
 @lru_cache(maxsize=8)
 def _course(flow: str, start: tuple[float, float, float] | None, count: int, length: int, stretch: int) -> _Course:
     """Return the course of a request; a start that the user chose is on the attractor and needs no transient."""
-    own = flow_of(flow)
+    own = find_flow(flow)
     transient = own.transient if start is None else 0
     piece = trajectory(own, start, count=(count - 1) * EVERY + 1, every=1, transient=transient)
     return _Course(own, piece, length, stretch, {})
 
 
-def flow_of(name: str) -> Flow:
+def find_flow(name: str) -> Flow:
     """Return a flow by name; raise MotionMindError if no flow in three dimensions has this name."""
     if name not in FLOWS or len(FLOWS[name].start) != 3:
         known = [known for known, flow in FLOWS.items() if len(flow.start) == 3]

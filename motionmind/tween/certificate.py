@@ -9,7 +9,7 @@ import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.corpus.corpus import Corpus
-from motionmind.discretize import StateSpace
+from motionmind.discretize.states import StateSpace
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Ints
-from motionmind.discretize import StateSpace
+from motionmind.discretize.states import StateSpace
 from motionmind.errors import MotionMindError, NoPathError
 from motionmind.search.problem import Model, Problem, Via, costs_to_go
 from motionmind.search.solve import feasible

@@ -14,9 +14,8 @@ from scipy.sparse.csgraph import breadth_first_order, shortest_path
 from motionmind._typing import Floats, Ints
 from motionmind.body.mirror import find_sides
 from motionmind.corpus.corpus import FACING, Corpus
-from motionmind.discretize import StateSpace
 from motionmind.discretize.codebook import codebook
-from motionmind.discretize.states import nearest
+from motionmind.discretize.states import StateSpace, nearest
 from motionmind.errors import SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.grammar import Grammar

@@ -371,10 +371,11 @@ def vary(
         SkeletonError: the piece is on another skeleton than the corpus.
         WrongTypeError: an argument is of another type, or there is no such argument.
 
-    >>> from motionmind import Engine, flow_of, vary
+    >>> from motionmind import Engine, vary
+    >>> from motionmind.chaos import find_flow
     >>> engine = Engine.load("ballet")
     >>> motion = engine.corpus.motion(engine.corpus.clips[0])
-    >>> variation = vary(motion, flow=flow_of("rossler"), nudge=0.5, length=40)
+    >>> variation = vary(motion, flow=find_flow("rossler"), nudge=0.5, length=40)
     >>> len(variation.order)
     40
     """
@@ -450,7 +451,7 @@ def _order_postures(
 ) -> tuple[Course, Itinerary]:
     """The course that `vary` asks for, its arguments checked, and the reordering of `count` postures that it gives."""
     flow = FLOWS["lorenz"] if flow is None else flow
-    check_type("flow", flow, Flow, wanted="a Flow, such as flow_of('lorenz') gives")
+    check_type("flow", flow, Flow, wanted="a Flow, such as find_flow('lorenz') gives")
     skip = check_whole("skip", SKIP if skip is None else skip, 0, LONGEST)
     step = check_number("step", flow.step if step is None else step)
     transient = check_whole("transient", flow.transient if transient is None else transient, 0, MOST_STEPS)

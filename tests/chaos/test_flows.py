@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from motionmind.chaos.flows import FLOWS, Flow, flow_of
+from motionmind.chaos.flows import FLOWS, Flow, find_flow
 from motionmind.chaos.trajectories import _compiled, largest_exponent, trajectory
 from motionmind.errors import MotionMindError
 
 # Sprott, "Chaos and Time-Series Analysis" (2003), appendix A; the third from Wolf et al., Physica D 16:285 (1985),
 # table 1: 2.16 bits a unit of time.
 EXPONENTS = [
-    (flow_of("lorenz", sigma=10.0, rho=28.0, beta=8.0 / 3.0), 0.9056),
-    (flow_of("rossler"), 0.0714),
-    (flow_of("lorenz", rho=45.92), 2.16 * np.log(2.0)),
-    (flow_of("chua"), 0.3271),
-    (flow_of("halvorsen"), 0.7899),
+    (find_flow("lorenz", sigma=10.0, rho=28.0, beta=8.0 / 3.0), 0.9056),
+    (find_flow("rossler"), 0.0714),
+    (find_flow("lorenz", rho=45.92), 2.16 * np.log(2.0)),
+    (find_flow("chua"), 0.3271),
+    (find_flow("halvorsen"), 0.7899),
 ]
 SMOOTH = [flow for flow in FLOWS.values() if flow.name != "chua"]  # whose field has kinks
 
@@ -82,7 +82,7 @@ def _with_parameters(x: np.ndarray, sigma: float, rho: float, beta: float) -> tu
 
 def test_any_function_is_a_flow_compiled_or_not() -> None:
     given = {"sigma": 10.0, "rho": 28.0, "beta": 8.0 / 3.0}
-    known = flow_of("lorenz", **given)
+    known = find_flow("lorenz", **given)
     points = trajectory(known, count=50, transient=200)
     for flow in (
         Flow("array", _lorenz, known.start, known.step),
@@ -97,14 +97,14 @@ def test_any_function_is_a_flow_compiled_or_not() -> None:
 @pytest.mark.parametrize(
     ("flow", "start"),
     [
-        (flow_of("lorenz", rho=0.5), None),  # one fixed point, the origin
-        (flow_of("lorenz", rho=10.0), None),  # two
-        (flow_of("rossler", c=2.5), None),  # a cycle
-        (flow_of("duffing", drive=0.2), None),
-        (flow_of("thomas", b=0.3), None),
-        (flow_of("thomas", b=1.1), None),
-        (flow_of("lorenz"), (0.0, 0.0, 0.0)),  # on an unstable fixed point, and on the way to it
-        (flow_of("lorenz"), (0.0, 0.0, 5.0)),
+        (find_flow("lorenz", rho=0.5), None),  # one fixed point, the origin
+        (find_flow("lorenz", rho=10.0), None),  # two
+        (find_flow("rossler", c=2.5), None),  # a cycle
+        (find_flow("duffing", drive=0.2), None),
+        (find_flow("thomas", b=0.3), None),
+        (find_flow("thomas", b=1.1), None),
+        (find_flow("lorenz"), (0.0, 0.0, 0.0)),  # on an unstable fixed point, and on the way to it
+        (find_flow("lorenz"), (0.0, 0.0, 5.0)),
         (Flow("spring", lambda x: (x[1], -x[0]), (1.0, 0.0), 0.05), None),
         (Flow("shear", lambda x: (x[1], 0.0), (0.0, 1.0), 1e-3), None),
     ],
@@ -116,11 +116,11 @@ def test_a_flow_that_settles_is_refused_with_its_exponent(flow: Flow, start: tup
 
 
 def test_a_cycle_has_an_exponent_of_nought_and_a_fixed_point_its_eigenvalue() -> None:
-    assert largest_exponent(flow_of("rossler", c=2.5), steps=200_000) == pytest.approx(0.0, abs=1e-3)
+    assert largest_exponent(find_flow("rossler", c=2.5), steps=200_000) == pytest.approx(0.0, abs=1e-3)
     # At the origin, with rho < 1: the larger root of (sigma + l) (1 + l) = sigma rho.
     sigma, rho = 16.0, 0.5
     slowest = 0.5 * (-(sigma + 1.0) + np.sqrt((sigma + 1.0) ** 2 - 4.0 * sigma * (1.0 - rho)))
-    assert largest_exponent(flow_of("lorenz", rho=rho), steps=200_000) == pytest.approx(slowest, rel=1e-3)
+    assert largest_exponent(find_flow("lorenz", rho=rho), steps=200_000) == pytest.approx(slowest, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -183,11 +183,11 @@ def test_what_is_out_of_range_is_refused(arguments: dict[str, object], message: 
 
 def test_unknown_names_are_told_what_there_is() -> None:
     with pytest.raises(MotionMindError, match="no flow 'moon'; there are chua, duffing"):
-        flow_of("moon")
+        find_flow("moon")
     with pytest.raises(MotionMindError, match="lorenz has no parameter 'r'; it has sigma, rho, beta"):
-        flow_of("lorenz", r=28.0)
+        find_flow("lorenz", r=28.0)
     with pytest.raises(MotionMindError, match="parameter rho must be a finite number"):
-        flow_of("lorenz", rho=np.inf)
+        find_flow("lorenz", rho=np.inf)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from command_line import Run
 import motionmind
 from motionmind.chaos.flows import FLOWS
 from motionmind.cli import completion
-from motionmind.discretize import Codebook
+from motionmind.discretize.codebook import Codebook
 from motionmind.names.finding import find_motion, find_posture, open_collection
 from motionmind.names.spelling import parse_source
 from motionmind.tween.engine import Engine

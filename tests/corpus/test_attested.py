@@ -17,7 +17,7 @@ from walks import dance
 from motionmind.body.human import human23
 from motionmind.body.mirror import find_sides, mirrored
 from motionmind.corpus.gather import gather
-from motionmind.discretize import Codebook
+from motionmind.discretize.codebook import Codebook
 from motionmind.errors import CorpusError, FormatError
 from motionmind.tween.certificate import Source
 from motionmind.tween.engine import Engine

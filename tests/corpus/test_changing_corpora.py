@@ -22,7 +22,7 @@ from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
 from motionmind.corpus.kept import Kept
 from motionmind.corpus.recordings import Flips
-from motionmind.discretize import Codebook
+from motionmind.discretize.codebook import Codebook
 from motionmind.errors import CorpusError
 from motionmind.executors.workshop import Workshop
 from motionmind.formats import write_motion

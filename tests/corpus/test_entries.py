@@ -15,7 +15,7 @@ from motionmind.corpus.clip import Clip
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.entries import Columns, Entries, Packed, StoredClips
 from motionmind.corpus.gather import gather
-from motionmind.discretize import Codebook
+from motionmind.discretize.codebook import Codebook
 from motionmind.geometry import rotations as rot
 from motionmind.learned.model import LearnedCorpus
 from motionmind.names.finding import find_posture

@@ -16,7 +16,7 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.flips import find_flips, repair_flips
 from motionmind.corpus.gather import gather
-from motionmind.discretize import Codebook
+from motionmind.discretize.codebook import Codebook
 from motionmind.geometry import rotations as rot
 from motionmind.tween.certificate import sources_of
 

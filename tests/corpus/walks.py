@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.discretize import Codebook
+from motionmind.discretize.codebook import Codebook
 from motionmind.geometry import rotations as rot
 from motionmind.tween.engine import Engine
 

@@ -15,23 +15,14 @@ from hypothesis import strategies as st
 
 from motionmind.body.human import human23
 from motionmind.bundled import bundled
-from motionmind.discretize import (
-    Codebook,
-    Discretization,
-    EulerGrid,
-    ExpertLibrary,
-    Library,
-    QuaternionGrid,
-    StateSpace,
-    from_spec,
-    make_discretization,
-    parse_library,
-    read_library,
-    to_spec,
-    write_library,
-)
 from motionmind.discretize import states as states_module
-from motionmind.discretize.library import format_library
+from motionmind.discretize.codebook import Codebook
+from motionmind.discretize.expert import ExpertLibrary
+from motionmind.discretize.grids import EulerGrid, QuaternionGrid
+from motionmind.discretize.library import Library, format_library, parse_library, read_library, write_library
+from motionmind.discretize.protocol import Discretization
+from motionmind.discretize.spec import from_spec, make_discretization, to_spec
+from motionmind.discretize.states import StateSpace
 from motionmind.discretize.turns import format_turns, parse_turns
 from motionmind.errors import CorpusError, FormatError, MotionMindError, SkeletonError
 from motionmind.geometry import rotations as rot

@@ -23,7 +23,8 @@ from motionmind.body.human import human23
 from motionmind.body.motion import Insertion, Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
-from motionmind.formats import read_motion, read_posture, write_atomically, write_motion, write_posture
+from motionmind.files import write_atomically
+from motionmind.formats import read_motion, read_posture, write_motion, write_posture
 from motionmind.geometry import rotations as rot
 
 Mutate = Callable[[str, random.Random], bytes]

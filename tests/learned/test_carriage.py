@@ -8,7 +8,7 @@ import pytest
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion
 from motionmind.corpus.gather import gather
-from motionmind.discretize import Codebook
+from motionmind.discretize.codebook import Codebook
 from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import learn_carriage
 from motionmind.learned.learning import learn

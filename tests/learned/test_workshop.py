@@ -16,7 +16,7 @@ from same import assert_learned_alike
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion
 from motionmind.corpus.gather import gather
-from motionmind.discretize import Codebook
+from motionmind.discretize.codebook import Codebook
 from motionmind.errors import SkeletonError
 from motionmind.executors import workshop as workshops
 from motionmind.executors.workshop import Workshop

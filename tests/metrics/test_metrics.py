@@ -16,32 +16,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motionmind._typing import Floats, Int32s
+from motionmind.body.contact import find_feet, find_floor, foot_slide, skating
 from motionmind.body.human import human23, human44
 from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.formats import read_motion, write_motion
 from motionmind.geometry import rotations as rot
-from motionmind.metrics import (
-    angular_jerk,
-    angular_speed,
-    arrival_spread,
-    arrivals,
-    find_feet,
-    find_floor,
-    fit_style_classifier,
-    foot_slide,
-    l2p,
-    l2q,
-    learn_habits,
-    learn_phrases,
-    npss,
-    position_spread,
-    seen,
-    skating,
-    sparc,
-)
-from motionmind.metrics.measure import _pieces, at_rate, measure
-from motionmind.metrics.style import features
+from motionmind.metrics.figures import _pieces, at_rate, measure
+from motionmind.metrics.inbetween import l2p, l2q, npss, position_spread, seen
+from motionmind.metrics.paths import arrival_spread, arrivals, learn_habits
+from motionmind.metrics.smoothness import angular_jerk, angular_speed, sparc
+from motionmind.metrics.style import features, fit_style_classifier
+from motionmind.metrics.verbatim import learn_phrases
 from motionmind.tween.engine import Engine
 
 seeds = st.integers(0, 2**32 - 1)

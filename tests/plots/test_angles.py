@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from motionmind import Engine, Motion, MotionMindError, Skeleton, SkeletonError, angle_chart
+from motionmind import Engine, Motion, MotionMindError, Skeleton, SkeletonError
 from motionmind.body.motion import Insertion
 from motionmind.geometry import rotations as rot
+from motionmind.plots import draw_angles
 from motionmind.plots.canvas import png
 from motionmind.plots.marks import Line
 from motionmind.render.markup import hexadecimal
@@ -32,7 +33,7 @@ def swinging(*insertions: Insertion) -> Motion:
 
 
 def curves(motion: Motion, *joints: str) -> list[Line]:
-    plate = angle_chart(motion, joints or None)
+    plate = draw_angles(motion, joints or None)
     return [mark for mark in plate.marks if isinstance(mark, Line) and mark.ink in (PIECE, VIOLET, BRIDGED)]
 
 
@@ -68,7 +69,7 @@ def test_the_joints_that_turn_most_are_drawn_unless_others_are_asked_for() -> No
 def test_the_picture_is_whole_whatever_turns(tmp_path: Path) -> None:
     """Each curve lies within its own two lines, and the words within the picture."""
     engine = Engine.load("walk-hexapod")
-    plate = angle_chart(engine.corpus.motion(engine.corpus.clips[0]), engine.corpus.skeleton.names)
+    plate = draw_angles(engine.corpus.motion(engine.corpus.clips[0]), engine.corpus.skeleton.names)
     plate.save(tmp_path / "chart.svg")
     root = ElementTree.parse(tmp_path / "chart.svg").getroot()
     assert root.attrib["viewBox"] == f"0 0 {plate.width} {plate.height}"
@@ -85,11 +86,11 @@ def test_the_picture_is_whole_whatever_turns(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("call", "error", "words"),
     [
-        (lambda: angle_chart(swinging().slice(0, 1)), MotionMindError, "swing has one frame"),
-        (lambda: angle_chart(swinging(), ["tail"]), SkeletonError, "no joint 'tail'"),
-        (lambda: angle_chart(swinging(), []), MotionMindError, "one joint at least"),
-        (lambda: angle_chart(swinging(), "elbow"), MotionMindError, re.escape("write ['elbow']")),
-        (lambda: angle_chart(swinging()).save("chart.gif"), MotionMindError, "chart.gif: suffix '.gif' is unknown"),
+        (lambda: draw_angles(swinging().slice(0, 1)), MotionMindError, "swing has one frame"),
+        (lambda: draw_angles(swinging(), ["tail"]), SkeletonError, "no joint 'tail'"),
+        (lambda: draw_angles(swinging(), []), MotionMindError, "one joint at least"),
+        (lambda: draw_angles(swinging(), "elbow"), MotionMindError, re.escape("write ['elbow']")),
+        (lambda: draw_angles(swinging()).save("chart.gif"), MotionMindError, "chart.gif: suffix '.gif' is unknown"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(call: Callable[[], Any], error: type[Exception], words: str) -> None:

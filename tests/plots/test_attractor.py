@@ -29,7 +29,7 @@ from motionmind.errors import MotionMindError
 from motionmind.notation.compose import motions
 from motionmind.notation.read import read_score
 from motionmind.plots import portrait as portraits
-from motionmind.plots.attractor import ATTRACTORS, attractor, write_attractor
+from motionmind.plots.attractor import ATTRACTORS, attractor, draw_attractor
 from motionmind.plots.canvas import Plate, png, svg
 from motionmind.plots.marks import Dot, Inset, Line, Region, Words
 from motionmind.plots.portrait import Portrait, portrait_of
@@ -345,7 +345,7 @@ def test_what_cannot_be_drawn_is_refused_in_a_line(run: Run) -> None:
     run("convert", "plain.bvh", "plain.json")
     assert "movement alone" in run("attractor", "--of", "plain.json", "-o", "a.png").err
     with pytest.raises(MotionMindError, match=r"an attractor is written as one of \.png"):
-        write_attractor("a.pdf", variation)
+        draw_attractor("a.pdf", variation)
     long = Variation(variation.piece, variation.course, np.zeros(10_001, dtype=np.int64))
     with pytest.raises(MotionMindError, match="10000 postures at most, not 10001"):
         portrait_of(long)
@@ -367,7 +367,7 @@ def danced() -> Variation:
 
 @pytest.fixture(scope="module")
 def page(danced: Variation, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    write_attractor(path := tmp_path_factory.mktemp("page") / "page.html", danced)
+    draw_attractor(path := tmp_path_factory.mktemp("page") / "page.html", danced)
     return path
 
 

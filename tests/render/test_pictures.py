@@ -25,7 +25,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import compose
 from motionmind.render import PICTURES
 from motionmind.render.page import page
-from motionmind.render.pictures import write_picture
+from motionmind.render.pictures import draw_picture
 from motionmind.render.stage import Stage
 
 CORPORA = Path(__file__).parents[2] / "corpora"
@@ -57,7 +57,7 @@ def bodies() -> dict[str, Motion]:
 def test_every_body_goes_into_every_picture(kind: str, suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"a{suffix}"
     small = {"size": 200} if suffix in FILMS else {}  # as films of any size are made, in less time
-    write_picture(path, bodies()[kind], **small)
+    draw_picture(path, bodies()[kind], **small)
     data = path.read_bytes()
     assert data.lstrip().lower().startswith(BEGINS[suffix].lower())
     assert len(data) > 500
@@ -68,9 +68,9 @@ def test_every_body_goes_into_every_picture(kind: str, suffix: str, tmp_path: Pa
 def test_what_is_written_again_is_the_same_bytes(suffix: str, tmp_path: Path) -> None:
     path, motion = tmp_path / f"a{suffix}", bodies()["a person, some of it inserted"]
     small = {"size": 200} if suffix in FILMS else {}
-    write_picture(path, motion, **small)
+    draw_picture(path, motion, **small)
     data = path.read_bytes()
-    write_picture(path, motion, **small)
+    draw_picture(path, motion, **small)
     assert path.read_bytes() == data
 
 
@@ -79,7 +79,7 @@ def test_where_nothing_can_be_written_nothing_is_left(suffix: str, tmp_path: Pat
     (tmp_path / f"a{suffix}").mkdir()
     for path in (tmp_path / "none" / f"a{suffix}", tmp_path / f"a{suffix}"):
         with pytest.raises(MotionMindError, match=rf"^{re.escape(str(path))}: cannot be written: ") as refusal:
-            write_picture(path, ballet_clip("jump").slice(0, 2))
+            draw_picture(path, ballet_clip("jump").slice(0, 2))
         assert "\n" not in str(refusal.value)
     assert [file.name for file in tmp_path.iterdir()] == [f"a{suffix}"]
 
@@ -90,7 +90,7 @@ def test_the_size_is_the_pictures_height_where_it_is_not_flat(view: str, suffix:
     motion = ballet_clip("jump").slice(0, 1 if suffix == ".png" else 3)
     heights = []
     for size in (160, 320):
-        write_picture(tmp_path / f"a{suffix}", motion, view=view, size=size)
+        draw_picture(tmp_path / f"a{suffix}", motion, view=view, size=size)
         with Image.open(tmp_path / f"a{suffix}") as picture:
             heights.append(picture.height)
             assert 0.4 * size < picture.height <= size
@@ -116,7 +116,7 @@ def test_what_a_picture_has_not_is_refused(
     name: str, frames: int, options: dict[str, object], message: str, tmp_path: Path
 ) -> None:
     with pytest.raises(MotionMindError, match=message):
-        write_picture(tmp_path / name, ballet_clip("jump").slice(0, frames), **options)  # type: ignore[arg-type]
+        draw_picture(tmp_path / name, ballet_clip("jump").slice(0, frames), **options)  # type: ignore[arg-type]
     assert not list(tmp_path.iterdir())
 
 
@@ -242,8 +242,6 @@ def test_odd_names_and_places_are_no_tracebacks(run: Run, tmp_path: Path) -> Non
 
 
 def test_a_picture_goes_through_a_pipe(tmp_path: Path) -> None:
-    program = (
-        "import sys; from motionmind.formats import write_atomically; write_atomically('/dev/stdout', b'all of it')"
-    )
+    program = "import sys; from motionmind.files import write_atomically; write_atomically('/dev/stdout', b'all of it')"
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
     assert ran.stdout == b"all of it"

@@ -23,7 +23,8 @@ from motionmind.body.mirror import LEFT, MIDDLE, RIGHT, sides_of
 from motionmind.body.motion import Insertion, Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
-from motionmind.formats import read_motion, read_posture, write_atomically, write_motion
+from motionmind.files import write_atomically
+from motionmind.formats import read_motion, read_posture, write_motion
 from motionmind.geometry import rotations as rot
 from motionmind.render import sheet as sheets
 from motionmind.render.body_shape import shape_of
@@ -32,7 +33,7 @@ from motionmind.render.camera import SMOOTH
 from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.figure import bridge_balls, colour, draw, given_colours, halved, inserted_colours
 from motionmind.render.palette import COLOURS, FACE, INK, INSERTED, SHEET_FLOOR, SHEET_PAPER, SUNK
-from motionmind.render.sheet import MOST, contact_sheet
+from motionmind.render.sheet import MOST, draw_sheet
 from motionmind.render.solids import EMPTY, Cones, Ellipsoids
 from motionmind.render.view import ABOVE, FRONT, STAGE_LEFT, STAGE_RIGHT, View, to_view
 
@@ -299,7 +300,7 @@ def test_a_body_without_any_extent_can_be_drawn() -> None:
     for names in (("point",), NAMES):
         skeleton = Skeleton("none", names, human23().parents[: len(names)], np.zeros((len(names), 3)))
         rotations = np.tile(rot.IDENTITY, (1, len(names), 1))
-        assert contact_sheet(Motion(skeleton, rotations, np.zeros((1, 3)), np.zeros(1))).width > 1
+        assert draw_sheet(Motion(skeleton, rotations, np.zeros((1, 3)), np.zeros(1))).width > 1
 
 
 # --- one posture ----------------------------------------------------------------------------------------------------
@@ -479,7 +480,7 @@ def words(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, str]]:
 @pytest.mark.parametrize("columns", [1, 3, 4, 99])
 def test_a_sheet_has_one_numbered_cell_a_posture(columns: int, words: list[tuple[float, float, str]]) -> None:
     frames = [0, 2, 3, 5, 7, 8, 9]
-    picture = contact_sheet(clip(10), frames, columns=columns)
+    picture = draw_sheet(clip(10), frames, columns=columns)
     numbers = [(y, x, text) for x, y, text in words if text.isdigit()]
     assert [text for _, _, text in numbers] == [str(frame) for frame in frames]
     assert numbers == sorted(numbers)  # row by row, from left to right
@@ -531,11 +532,11 @@ def test_one_floor_and_one_scale_for_the_whole_sheet() -> None:
 def test_the_camera_follows_the_body_across_the_stage_and_not_up() -> None:
     posture = read_posture(BALLET / "postures" / "fifth.json")
     motion = posture.as_motion()
-    still = contact_sheet(motion)
-    far = contact_sheet(moved(motion, 3.0, 0.0, -2.0))
+    still = draw_sheet(motion)
+    far = draw_sheet(moved(motion, 3.0, 0.0, -2.0))
     assert np.abs(np.asarray(still).astype(int) - np.asarray(far)).max() < 60
     assert np.mean(np.asarray(still) != np.asarray(far)) < 0.01
-    leapt = contact_sheet(moved(motion, 0.0, 0.5, 0.0))
+    leapt = draw_sheet(moved(motion, 0.0, 0.5, 0.0))
     assert leapt.height > still.height  # there is air under the feet, and no feet from above below it
 
 
@@ -581,7 +582,7 @@ def test_an_insect_has_six_legs_in_two_colours() -> None:
     rotations = np.tile(rot.IDENTITY, (len(skeleton), 1))
     body = shape_of(skeleton)
     assert sum(paint == LEFT for paint in body.paints) == sum(paint == RIGHT for paint in body.paints) == 9
-    picture = contact_sheet(Motion(skeleton, rotations[None], np.array([[0.0, 0.006, 0.0]]), np.zeros(1)))
+    picture = draw_sheet(Motion(skeleton, rotations[None], np.array([[0.0, 0.006, 0.0]]), np.zeros(1)))
     pixels = np.asarray(picture).astype(int)[70:]
     front = pixels[:, : pixels.shape[1] // 2]
     warm = front[..., 0] - front[..., 2]
@@ -594,15 +595,15 @@ def test_a_sheet_has_bounds() -> None:
     times = np.arange(MOST + 1.0)
     many = Motion(many.skeleton, many.rotations[np.zeros(MOST + 1, dtype=int)], np.zeros((MOST + 1, 3)), times, "long")
     with pytest.raises(MotionMindError, match=r"^long: a sheet holds 400 postures, not 401; .* --every 2$"):
-        contact_sheet(many)
+        draw_sheet(many)
     with pytest.raises(MotionMindError, match="no frame to draw"):
-        contact_sheet(many, [])
+        draw_sheet(many, [])
     with pytest.raises(MotionMindError, match="frames 0 to 400, no frame 401"):
-        contact_sheet(many, [401])
-    full = contact_sheet(many, range(MOST))
+        draw_sheet(many, [401])
+    full = draw_sheet(many, range(MOST))
     assert full.width * full.height < 1.3 * sheets._PIXELS
     leaps = replace(clip(2), root=np.array([[0.0, 1.0, 0.0], [0.0, 1e6, 0.0]]))
-    picture = contact_sheet(leaps)
+    picture = draw_sheet(leaps)
     assert max(picture.size) < 2000
 
 
@@ -668,7 +669,7 @@ def test_a_sheet_tells_what_the_engine_made(words: list[tuple[float, float, str]
     assert (counts[:, 1] > 100).tolist() == [False, True, False]
     for motion, legend in ((recorded, set()), (made, {"violet"}), (bridged, {"violet", "ball"})):
         words.clear()
-        contact_sheet(motion)
+        draw_sheet(motion)
         assert {text.split(":")[0] for _, _, text in words} & {"violet", "ball"} == legend
 
 
@@ -726,7 +727,7 @@ def test_the_command_draws_the_frames_that_are_asked_for(
 
 def test_the_file_has_the_colours_that_were_drawn(run: Run, jump: Path) -> None:
     assert run("sheet", jump, "-o", "jump.png")[0] == 0
-    drawn = np.asarray(contact_sheet(read_motion(jump))).astype(int)
+    drawn = np.asarray(draw_sheet(read_motion(jump))).astype(int)
     with Image.open("jump.png") as picture:
         written = np.asarray(picture.convert("RGB")).astype(int)
     off = np.abs(written - drawn).max(axis=-1)
@@ -877,7 +878,7 @@ def test_of_sheets_that_cannot_all_be_written_none_is_left(
             raise MotionMindError(f"{path}: cannot be written: the disk is full")
         write_atomically(path, data)
 
-    monkeypatch.setattr("motionmind.formats.write_atomically", full)
+    monkeypatch.setattr("motionmind.files.write_atomically", full)
     code, _, err = run("sheet", "walk-hexapod", "-o", "sheets", "--postures", 1)
     assert code == 2
     assert err == f"error: {Path('sheets/wave.png')}: cannot be written: the disk is full\n"
@@ -892,11 +893,11 @@ def test_other_commands_do_not_pay_for_pictures() -> None:
 @pytest.mark.parametrize("options", [{"columns": 0}, {"columns": -3}, {"side": "top"}])
 def test_a_sheet_has_columns_and_two_sides(options: dict[str, object]) -> None:
     with pytest.raises(MotionMindError, match="one column at least, and is seen from the right or left"):
-        contact_sheet(clip(2), **options)  # type: ignore[arg-type]
+        draw_sheet(clip(2), **options)  # type: ignore[arg-type]
 
 
 def test_a_body_far_under_or_over_the_floor_keeps_its_colours() -> None:
     for height in (-30.0, 30.0):
-        pixels = np.asarray(contact_sheet(moved(standing().as_motion(), 0.0, height, 0.0))).astype(int)
+        pixels = np.asarray(draw_sheet(moved(standing().as_motion(), 0.0, height, 0.0))).astype(int)
         assert (np.abs(pixels - SUNK).max(axis=-1) < 30).sum() < 300  # but for the words that explain it
         assert (pixels[..., 0] - pixels[..., 2] > 60).sum() > 500

@@ -38,7 +38,8 @@ from motionmind._typing import Floats
 from motionmind.body.anatomy_file import read_body
 from motionmind.corpus.manifest import SourceManifest, parse_manifest
 from motionmind.corpus.store import load, read_manifest
-from motionmind.discretize import from_spec, read_library
+from motionmind.discretize.library import read_library
+from motionmind.discretize.spec import from_spec
 from motionmind.errors import MotionMindError, MotionMindWarning
 from motionmind.formats.papers import read_papers
 from motionmind.geometry import rotations as rot

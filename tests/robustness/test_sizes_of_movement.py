@@ -19,7 +19,7 @@ from motionmind.errors import FormatError, MotionMindError
 from motionmind.files import parse_toml
 from motionmind.formats import read_motion, write_motion
 from motionmind.geometry import rotations as rot
-from motionmind.render.pictures import write_picture
+from motionmind.render.pictures import draw_picture
 from motionmind.render.timing import SLOWEST, film_rate, frame_times
 
 pytestmark = pytest.mark.long
@@ -89,7 +89,7 @@ def test_a_film_of_a_small_file_takes_no_longer_than_others(source: str, suffix:
 def test_nobody_may_ask_for_a_film_of_many_times_as_many_frames(suffix: str, tmp_path: Path) -> None:
     motion = read_motion(slow_bvh(tmp_path, 2800.0))
     with pytest.raises(MotionMindError, match=r"^slow: 70001 frames are more than a film of it may have, 4000 \("):
-        write_picture(tmp_path / f"out{suffix}", motion, fps=25.0)
+        draw_picture(tmp_path / f"out{suffix}", motion, fps=25.0)
     assert [path.name for path in tmp_path.iterdir()] == ["slow.bvh"]
 
 

@@ -21,7 +21,7 @@ from toys import random_toy, solution
 from motionmind._typing import Floats, Ints, States
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
-from motionmind.discretize import Codebook
+from motionmind.discretize.codebook import Codebook
 from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
 from motionmind.grammar import coordination

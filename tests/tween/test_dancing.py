@@ -16,7 +16,7 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.bundled import bundled
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
-from motionmind.discretize import Codebook
+from motionmind.discretize.codebook import Codebook
 from motionmind.errors import MotionMindError, NoPathError
 from motionmind.formats import read_posture
 from motionmind.geometry import rotations as rot

@@ -15,7 +15,7 @@ from command_line import Run
 
 from motionmind.body.mirror import mirrored
 from motionmind.body.motion import Motion, Posture
-from motionmind.discretize import Codebook
+from motionmind.discretize.codebook import Codebook
 from motionmind.errors import NoPathError
 from motionmind.formats import read_posture, write_motion, write_posture
 from motionmind.tween.engine import Engine

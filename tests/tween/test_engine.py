@@ -23,7 +23,7 @@ from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store
-from motionmind.discretize import Codebook
+from motionmind.discretize.codebook import Codebook
 from motionmind.errors import CorpusError, FormatError, MotionMindError, NoPathError, SkeletonError
 from motionmind.footing.root import stand
 from motionmind.formats import read_motion, read_posture, write_motion, write_posture

@@ -15,7 +15,7 @@ from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Facing
-from motionmind.discretize import Codebook
+from motionmind.discretize.codebook import Codebook
 from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
 from motionmind.tween.engine import Engine

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from motionmind.body.contact import contact_points
 from motionmind.body.limbs import TRUNK, sided_parts
 from motionmind.body.motion import Insertion, Motion
-from motionmind.chaos.flows import FLOWS, flow_of
+from motionmind.chaos.flows import FLOWS, find_flow
 from motionmind.chaos.reorder import itinerary, runs
 from motionmind.credits.credit import Credit
 from motionmind.errors import FormatError, MotionMindError, WrongTypeError
@@ -89,7 +89,7 @@ def test_a_shuffle_is_a_permutation(count: int, seed: int) -> None:
 def test_chunks_are_those_of_the_attractors_order_with_the_same_options(
     seed: int, flow: str, skip: int, options: dict[str, Any]
 ) -> None:
-    options = {**options, "flow": flow_of(flow), "skip": skip}
+    options = {**options, "flow": find_flow(flow), "skip": skip}
     own, found = vary(adagio(), **options), vary(adagio(), by="chunks", seed=seed, **options)
     assert sorted(found.order) == list(range(len(adagio())))
     assert sorted(runs(found.order)) == sorted(runs(own.order))

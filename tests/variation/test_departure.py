@@ -12,7 +12,7 @@ from bundled_clips import ballet_clip
 from command_line import Run
 
 from motionmind._typing import Ints
-from motionmind.chaos.flows import FLOWS, flow_of
+from motionmind.chaos.flows import FLOWS, find_flow
 from motionmind.errors import MotionMindError
 from motionmind.formats import write_motion
 from motionmind.tween.engine import Engine
@@ -73,11 +73,11 @@ def test_nudges_that_lead_nowhere_end_the_search() -> None:
 @pytest.mark.parametrize("flow", ["lorenz", "rossler"])
 def test_a_variation_departs_as_asked_however_long_its_piece_is(clip: str, flow: str) -> None:
     piece = ballet_clip(clip)
-    found = vary(piece, flow=flow_of(flow), depart=0.25)
+    found = vary(piece, flow=find_flow(flow), depart=0.25)
     assert abs(departure(found.order) - 0.25) <= WITHIN
-    again = vary(piece, flow=flow_of(flow), nudge=found.course.nudge[0])
+    again = vary(piece, flow=find_flow(flow), nudge=found.course.nudge[0])
     np.testing.assert_array_equal(again.order, found.order)
-    np.testing.assert_array_equal(vary(piece, flow=flow_of(flow)).order, found.order)  # a quarter is the default
+    np.testing.assert_array_equal(vary(piece, flow=find_flow(flow)).order, found.order)  # a quarter is the default
 
 
 @pytest.mark.parametrize("flow", sorted(FLOWS))
@@ -87,7 +87,7 @@ def test_by_default_a_fifth_at_least_leaves_the_order_of_pieces_long_and_short(f
     frames = np.arange(count) % len(clip)
     step = clip.times[1] - clip.times[0]
     piece = replace(clip, rotations=clip.rotations[frames], root=clip.root[frames], times=step * np.arange(count))
-    assert departure(vary(piece, flow=flow_of(flow)).order) >= 0.2
+    assert departure(vary(piece, flow=find_flow(flow)).order) >= 0.2
 
 
 # As runs of the piece's postures, (the first, how many): what a nudge of 0.1 has always given.
@@ -103,11 +103,11 @@ def test_a_trajectory_that_is_given_gives_the_same_piece_as_ever_byte_for_byte(f
     piece = ballet_clip("adagio")
     engine = Engine.load("ballet")
     order = np.concatenate([np.arange(first, first + count) for first, count in OF_OLD[flow]])
-    nudged = vary(piece, flow=flow_of(flow), nudge=0.1)
+    nudged = vary(piece, flow=find_flow(flow), nudge=0.1)
     np.testing.assert_array_equal(nudged.order[: len(order)], order)
-    started = vary(piece, flow=flow_of(flow), start=flow_of(flow).start)  # to name a start is to take its own nudge
-    for options in ({"nudge": 0.1}, {"start": flow_of(flow).start}):
-        judged = vary(piece, engine, flow=flow_of(flow), watch=lambda _: True, **options)  # type: ignore[arg-type]
+    started = vary(piece, flow=find_flow(flow), start=find_flow(flow).start)  # to name a start is to take its own nudge
+    for options in ({"nudge": 0.1}, {"start": find_flow(flow).start}):
+        judged = vary(piece, engine, flow=find_flow(flow), watch=lambda _: True, **options)  # type: ignore[arg-type]
         np.testing.assert_array_equal(judged.postures, nudged.order)
     for name, one in (("nudged", nudged), ("started", started)):
         write_variation(tmp_path / f"{name}.json", one)

@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motionmind._typing import Ints, Singles
-from motionmind.chaos.flows import FLOWS, flow_of
+from motionmind.chaos.flows import FLOWS, find_flow
 from motionmind.chaos.reorder import Itinerary, reorder
 from motionmind.cli.variations import print_seams_beyond
 from motionmind.errors import FormatError, MotionMindError
@@ -115,7 +115,8 @@ def test_no_order_with_such_stretches_is_cheaper(
 @pytest.mark.parametrize("flow", sorted(FLOWS))
 def test_without_price_and_stretches_it_is_the_trajectorys_own_order(flow: str, kata: Piece) -> None:
     np.testing.assert_array_equal(
-        vary(kata, flow=flow_of(flow), nudge=0.3, stretch=1).postures, vary(kata, flow=flow_of(flow), nudge=0.3).order
+        vary(kata, flow=find_flow(flow), nudge=0.3, stretch=1).postures,
+        vary(kata, flow=find_flow(flow), nudge=0.3).order,
     )
 
 
@@ -139,7 +140,7 @@ def test_seams_that_a_corpus_knows_are_estimated_to_insert_nothing_and_no_others
 @pytest.mark.parametrize("flow", ["lorenz", "rossler"])
 @pytest.mark.parametrize(("share", "stretch"), [(0.3, None), (0.3, 1), (0.1, 2), (0.0, 4), (1.0, 8)])
 def test_limits_hold(short: Piece, karate: Engine, flow: str, share: float, stretch: int | None) -> None:
-    found = vary(short, karate, flow=flow_of(flow), inserted=share, stretch=stretch, alternatives=1)
+    found = vary(short, karate, flow=find_flow(flow), inserted=share, stretch=stretch, alternatives=1)
     assert min(stretches(found.postures)) >= (stretch or 4)
     inserted = sum(seam.insertion.motion.times[-1] for seam in found.seams if seam.insertion)
     seconds = found.motion().times[-1]

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from motionmind.body.mirror import find_sides, mirrored
 from motionmind.body.motion import Insertion, Motion, Velocity
-from motionmind.chaos.flows import FLOWS, flow_of
+from motionmind.chaos.flows import FLOWS, find_flow
 from motionmind.errors import FormatError, MotionMindError, SkeletonError
 from motionmind.formats import lossy_fields, read_motion, write_motion
 from motionmind.geometry import rotations as rot
@@ -222,7 +222,7 @@ def test_the_same_asked_twice_is_the_same_to_the_byte(kata: Piece, karate: Engin
         ({"skip": np.float64(10.0)}, "skip must be a whole number"),
         ({"transient": 10.5}, "transient must be a whole number from 0 to 1000000000, not 10.5"),
         ({"transient": 10**30}, "transient must be a whole number"),
-        ({"flow": "lorenz"}, "flow must be a Flow, such as flow_of"),
+        ({"flow": "lorenz"}, "flow must be a Flow, such as find_flow"),
     ],
 )
 def test_what_cannot_be_asked_is_refused(kata: Piece, options: dict[str, object], message: str) -> None:
@@ -774,12 +774,12 @@ def test_pictures_too_refuse_what_is_for_files(run: Run, command: str) -> None:
 
 
 def test_the_exponent_is_reported_and_says_how_fast_trajectories_part(kata: Piece) -> None:
-    found = vary(kata, flow=flow_of("lorenz", rho=45.92), skip=4, step=0.005)
+    found = vary(kata, flow=find_flow("lorenz", rho=45.92), skip=4, step=0.005)
     assert found.course.exponent == pytest.approx(2.16 * np.log(2.0), rel=0.03)  # Wolf et al., Physica D 16:285 (1985)
     assert found.report()["course"]["parting"] == pytest.approx(found.course.exponent * 5 * 0.005)
 
 
 def test_the_exponent_is_the_flows_however_small_the_step(kata: Piece) -> None:
-    usual, tiny = (vary(kata, flow=flow_of("rossler"), step=step, length=5).course for step in (None, 1e-6))
+    usual, tiny = (vary(kata, flow=find_flow("rossler"), step=step, length=5).course for step in (None, 1e-6))
     assert tiny.exponent == usual.exponent
     assert tiny.parting == pytest.approx(usual.parting * 1e-6 / usual.step)

@@ -45,7 +45,8 @@ class Figure:
         unit: the unit of all three; "" for counts and shares.
         about: a description in words.
 
-    >>> from motionmind import Engine, measure
+    >>> from motionmind import Engine
+    >>> from motionmind.metrics import measure
     >>> engine = Engine.load("ballet")
     >>> motion = engine.corpus.motion(engine.corpus.clips[0])
     >>> measure(motion, engine)["speed"].unit
@@ -142,7 +143,8 @@ def measure(motion: Motion, learned: LearnedCorpus, path: States | None = None) 
         SkeletonError: the movement is on other joints.
         MotionMindError: the movement is too short to measure, or the path is of another corpus.
 
-    >>> from motionmind import Engine, measure
+    >>> from motionmind import Engine
+    >>> from motionmind.metrics import measure
     >>> engine = Engine.load("ballet")
     >>> motion = engine.corpus.motion(engine.corpus.clips[0])
     >>> figures = measure(motion, engine)

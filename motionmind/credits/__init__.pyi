@@ -1,0 +1,3 @@
+from .credit import Credit as Credit
+
+__all__ = ["Credit"]

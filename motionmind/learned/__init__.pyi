@@ -1,0 +1,3 @@
+from .plausibility import Sighting as Sighting
+
+__all__ = ["Sighting"]
