@@ -15,7 +15,7 @@ from experiments.material import corpus, families, part, take_of
 from motionmind._typing import Floats
 from motionmind.learned.carriage import learn_carriage
 from motionmind.learned.trust import RATIOS, Squares
-from motionmind.walks.evidence import LASTS, errors_of_lasting, gather_evidence
+from motionmind.walks.evidence import DECAY_CANDIDATES_S, errors_of_lasting, gather_evidence
 
 DANCERS = ("cmu-05", "cmu-16", "cmu-29", "cmu-135")  # dance, runs and leaps, slow gestures, karate
 WINDOWS = 120  # of each length
@@ -38,7 +38,7 @@ def main(data: str) -> None:
 
 def _tell(name: str, found: Squares, lasting: Floats) -> None:
     table = found.fitted(np.zeros(len(RATIOS)), STRENGTH)
-    print(f"{name}: shares {table.round(2).tolist()}, velocities last {LASTS[int(lasting.argmin())]} s")
+    print(f"{name}: shares {table.round(2).tolist()}, velocities last {DECAY_CANDIDATES_S[int(lasting.argmin())]} s")
 
 
 if __name__ == "__main__":

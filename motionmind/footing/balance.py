@@ -7,13 +7,13 @@ import numpy as np
 from motionmind._typing import Bools, Floats
 from motionmind.jit import jit
 
-DEEP = 0.1  # metres beyond the allowed overhang at which a body surely falls
-WALKS = 0.5  # metres a second: a body that travels faster falls from foot to foot, as walkers do
+SURELY_FALLS_M = 0.1  # metres beyond the allowed overhang at which a body surely falls
+WALKING_MPS = 0.5  # metres a second: a body that travels faster falls from foot to foot, as walkers do
 
 
 def walks(root: Floats, fps: float) -> bool:
     """Return whether a body travels too fast to balance over each foot, from its root's positions [N, 3], metres."""
-    return bool(np.linalg.norm((root[-1] - root[0])[[0, 2]]) * fps > WALKS * (len(root) - 1))
+    return bool(np.linalg.norm((root[-1] - root[0])[[0, 2]]) * fps > WALKING_MPS * (len(root) - 1))
 
 
 def is_beyond(points: Floats, touches: Bools, centre: Floats, overhang: float) -> Bools:
@@ -41,7 +41,7 @@ def falls_without(points: Floats, low: Bools, feet: Bools, centre: Floats, overh
     out = np.zeros((len(centre), len(feet)))
     for number, own in enumerate(feet):
         far = np.linalg.norm(centre - nearest_in_support(points, low & ~own, centre), axis=1)
-        out[:, number] = np.clip((far - overhang) / DEEP, 0.0, 1.0)
+        out[:, number] = np.clip((far - overhang) / SURELY_FALLS_M, 0.0, 1.0)
     return out
 
 

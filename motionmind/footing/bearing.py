@@ -15,17 +15,21 @@ from motionmind.footing.footfalls import Stance, find_stances, standing_costs
 from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
 
-UNDER = 0.02  # metres above the lowest limb at which a limb's share of the support has fallen to 1/e
-BEARS = 4  # exponent: a limb's firmness to this power is its share of the support
-TOUCHES = 0.03  # metres above a limb's lowest point up to which its other points touch the floor
-MOSTLY = 0.3  # share of the support above which a part other than a foot holds the body up
-LOADS = 0.12  # seconds for a foot to take over the body's weight
-ALONE = 0.05  # metres above a body's lowest point up to which another part bears it, too
-HEAVY = 6.0  # per second: cost of swinging a foot that bears the whole weight of a body at rest
-FALLS = 30.0  # per second: cost of swinging a foot without which the body falls; chosen on ballet and karate
-RESTS = 0.3  # seconds from a motionless end during which low feet stand
-UPSIDE = 0.15  # metres above a body's lowest point up to which its lowest foot may bear it
-NEAR = 0.1  # metres: largest displacement of some point of a foot that stays in place, though it may roll or turn
+SUPPORT_SHARE_HEIGHT_M = 0.02  # metres above the lowest limb at which a limb's share of the support has fallen to 1/e
+FIRMNESS_EXPONENT = 4  # exponent: a limb's firmness to this power is its share of the support
+LIMB_TOUCHES_M = 0.03  # metres above a limb's lowest point up to which its other points touch the floor
+HOLDS_UP_SHARE = 0.3  # share of the support above which a part other than a foot holds the body up
+WEIGHT_TAKEOVER_S = 0.12  # seconds for a foot to take over the body's weight
+ALSO_BEARS_M = 0.05  # metres above a body's lowest point up to which another part bears it, too
+SWING_LOADED_NATS_PER_S = 6.0  # per second: cost of swinging a foot that bears the whole weight of a body at rest
+SWING_FALLING_NATS_PER_S = (
+    30.0  # per second: cost of swinging a foot without which the body falls; chosen on ballet and karate
+)
+STANDS_AT_REST_S = 0.3  # seconds from a motionless end during which low feet stand
+LOWEST_FOOT_BEARS_M = 0.15  # metres above a body's lowest point up to which its lowest foot may bear it
+STAYING_FOOT_REACH_M = (
+    0.1  # metres: largest displacement of some point of a foot that stays in place, though it may roll or turn
+)
 
 
 class Shape(NamedTuple):
@@ -89,7 +93,7 @@ def _touching(places: Floats, parts: Bools, low: Floats, bears: Bools) -> Bools:
     """Return whether each point belongs to a bearing part and is about as low as its lowest [N, P]."""
     out = np.zeros(places.shape[:2], dtype=np.bool_)
     for own, lowest_of, on in zip(parts, low.T, bears.T, strict=True):
-        out[:, own] |= on[:, None] & (places[:, own, 1] < (lowest_of + TOUCHES)[:, None])
+        out[:, own] |= on[:, None] & (places[:, own, 1] < (lowest_of + LIMB_TOUCHES_M)[:, None])
     return out
 
 
@@ -121,7 +125,7 @@ class Bearing(NamedTuple):
         still[1:] &= self.stands[:-1]
         still[:-1] &= self.stands[1:]
         feet = _touching(shape.places, shape.feet, shape.low, still)
-        return feet | _touching(shape.places, shape.others, shape.low_others, self.others > MOSTLY)
+        return feet | _touching(shape.places, shape.others, shape.low_others, self.others > HOLDS_UP_SHARE)
 
 
 def find_bearing(
@@ -154,16 +158,16 @@ def find_bearing(
     """
     low = shape.lowest[:, None]
     far = np.minimum(shape.low_others - low, 1.0)
-    bears = np.maximum(firm, 1e-3) ** BEARS
+    bears = np.maximum(firm, 1e-3) ** FIRMNESS_EXPONENT
     if feet:  # without a foot near the floor, the lowest part bears, whatever the corpus shows
-        lifted = np.clip((shape.low.min(axis=1, keepdims=True) - low) / UPSIDE - 1.0, 0.0, 1.0)
+        lifted = np.clip((shape.low.min(axis=1, keepdims=True) - low) / LOWEST_FOOT_BEARS_M - 1.0, 0.0, 1.0)
         bears = np.maximum(bears, lifted)
-    others = bears * np.exp(-far / UNDER) * np.isfinite(shape.low_others)
+    others = bears * np.exp(-far / SUPPORT_SHARE_HEIGHT_M) * np.isfinite(shape.low_others)
     others[flying] = 0.0
-    rests = others.max(axis=1, initial=0.0) > MOSTLY
+    rests = others.max(axis=1, initial=0.0) > HOLDS_UP_SHARE
     frames = np.arange(len(root)) / fps
     rest = [
-        np.zeros(len(root)) if moves else np.maximum(1.0 - away / RESTS, 0.0)
+        np.zeros(len(root)) if moves else np.maximum(1.0 - away / STANDS_AT_REST_S, 0.0)
         for moves, away in zip(moving, (frames, frames[::-1]), strict=True)
     ]
     still = np.maximum(*rest)
@@ -171,9 +175,9 @@ def find_bearing(
         standing_costs(shape.low[:, k] - low[:, 0], np.maximum(firm[:, foot.limb], still))
         for k, foot in enumerate(feet)
     ]
-    weighs = HEAVY * still[:, None] * _weights(shape, mass)
+    weighs = SWING_LOADED_NATS_PER_S * still[:, None] * _weights(shape, mass)
     if falls is not None:
-        weighs += FALLS * falls
+        weighs += SWING_FALLING_NATS_PER_S * falls
     costs = [(stand, swing + weighs[:, k]) for k, (stand, swing) in enumerate(costs)]
     tracks = shape.tracks + root[:, None]
     stands = np.stack([stand <= swing for stand, swing in costs], axis=1) if feet else np.zeros((len(root), 0), bool)
@@ -195,7 +199,7 @@ def find_bearing(
     loads, places = np.zeros(stands.shape), tracks.copy()
     for k, own in enumerate(stances):
         for stance in own:
-            _write_stance(*stance, LOADS * fps, k, places, loads)
+            _write_stance(*stance, WEIGHT_TAKEOVER_S * fps, k, places, loads)
     return Bearing(stances, loads, stands, places - shape.tracks, others)
 
 
@@ -216,13 +220,13 @@ def find_staying(shape: Shape, root: Floats) -> int | None:
         root: level positions of the root [N, 2], metres.
     """
     low = np.concatenate([shape.low, shape.low_others], axis=1)[[0, -1]]
-    bears = low < low.min(axis=1, keepdims=True) + ALONE
+    bears = low < low.min(axis=1, keepdims=True) + ALSO_BEARS_M
     if np.any(bears.sum(axis=1) != 1) or np.any(bears[0] != bears[1]) or not bears[0, : shape.low.shape[1]].any():
         return None
     foot = int(bears[0].argmax())
     places = shape.places[[0, -1]][:, shape.feet[foot]][..., [0, 2]]
     moved = places[1] + root[-1] - places[0] - root[0]
-    return foot if np.linalg.norm(moved, axis=1).min() < NEAR else None
+    return foot if np.linalg.norm(moved, axis=1).min() < STAYING_FOOT_REACH_M else None
 
 
 @jit

@@ -11,7 +11,7 @@ from motionmind.body.legs import find_hinge, find_legs
 from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.jit import jit
 
-GRIP = 0.015  # metres above the lower end of a foot at which the other end's grip has fallen to 1/e
+FOOT_END_GRIP_M = 0.015  # metres above the lower end of a foot at which the other end's grip has fallen to 1/e
 
 
 class Foot(NamedTuple):
@@ -111,5 +111,5 @@ def _write_track(ends: Floats, holds: Floats, first: Floats, whole: Floats, out:
 
 def _hold(height: Floats) -> Floats:
     """Return the grip of each end of a foot [..., 2], by its height [..., 2], metres; both add up to 1."""
-    share = np.exp(-(height - height.min(axis=-1, keepdims=True)) / GRIP)
+    share = np.exp(-(height - height.min(axis=-1, keepdims=True)) / FOOT_END_GRIP_M)
     return np.asarray(share / share.sum(axis=-1, keepdims=True))

@@ -18,12 +18,12 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import mass_of, size_of
 from motionmind.body.tempo import runs_of
 
-SURELY = 0.5  # share of the corpus's walks that are in the air where a given posture is
-EVER = 0.05  # share of them from which a movement may be
-HOVERS = 0.04  # metres above the floor from which a given posture is in the air, if walks there are
-SHORTEST, LONGEST = 0.15, 0.8  # seconds: duration of a flight
-PUSHES = 0.25  # seconds: shortest push-off or landing
-PAUSES = 0.1  # seconds for which a fall may be slower than that, as where legs are drawn up
+FLIGHT_CERTAIN_SHARE = 0.5  # share of the corpus's walks that are in the air where a given posture is
+FLIGHT_POSSIBLE_SHARE = 0.05  # share of them from which a movement may be
+AIRBORNE_FROM_M = 0.04  # metres above the floor from which a given posture is in the air, if walks there are
+SHORTEST_FLIGHT_S, LONGEST_FLIGHT_S = 0.15, 0.8  # seconds: duration of a flight
+SHORTEST_PUSH_OFF_S = 0.25  # seconds: shortest push-off or landing
+SLOW_FALL_S = 0.1  # seconds for which a fall may be slower than that, as where legs are drawn up
 
 
 class Flight(NamedTuple):
@@ -63,7 +63,7 @@ def find_flights(
     last = len(aloft) - 1
     lands, rises = 0, last
     first = second = None
-    push = PUSHES * fps
+    push = SHORTEST_PUSH_OFF_S * fps
     if hovering[0]:
         lands, rate = _time_of_fall(
             standing, masses[0], None if rates[0] is None else -rates[0], last - push, gravity, fps
@@ -77,12 +77,12 @@ def find_flights(
         return [Flight(0, last, (None, None))]
     out = [first] if first else []
     begin, end = lands + push, rises - push
-    for start, stop in runs_of(aloft > EVER):
+    for start, stop in runs_of(aloft > FLIGHT_POSSIBLE_SHARE):
         if (start == 0 and hovering[0]) or (stop > last and hovering[1]):
             continue
         share, frames = aloft[start:stop], np.arange(start, stop)
         height = float(share @ leaps[start:stop] / share.sum())
-        seconds = min(2.0 * np.sqrt(2.0 * height / gravity), LONGEST)
+        seconds = min(2.0 * np.sqrt(2.0 * height / gravity), LONGEST_FLIGHT_S)
         # Walks jump at different times: this is the expected number of flights in this interval.
         count = round(share.sum() / (seconds * fps))
         middles = np.interp((np.arange(count) + 0.5) / max(count, 1), np.cumsum(share) / share.sum(), frames)
@@ -91,7 +91,7 @@ def find_flights(
             top = float(np.clip(middle, begin + half, max(end - half, begin + half)))
             # The inner rounding keeps rounding errors from deciding ties midway between two frames.
             flight = Flight(round(round(top - half, 6)), round(round(top + half, 6)), (None, None))
-            if half >= 0.5 * SHORTEST * fps and flight.end - flight.start > 2:
+            if half >= 0.5 * SHORTEST_FLIGHT_S * fps and flight.end - flight.start > 2:
                 out.append(flight)
                 begin = flight.end + push
     return [*out, second] if second else out
@@ -162,7 +162,7 @@ def find_falls(skeleton: Skeleton, posed: Posed, given: Bools, fps: float) -> tu
         return posed.places[:, 0], []
     fall = np.zeros(len(low))
     fall[1:-1] = -(fps**2) * np.diff(mass[:, 1], 2) / GRAVITY
-    return mass, _falls(fall, up, (bool(off_floor[0]), bool(off_floor[-1])), round(PAUSES * fps))
+    return mass, _falls(fall, up, (bool(off_floor[0]), bool(off_floor[-1])), round(SLOW_FALL_S * fps))
 
 
 def _falls(fall: Floats, up: Bools, in_air: tuple[bool, bool], pauses: int) -> list[tuple[int, int]]:

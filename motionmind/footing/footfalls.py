@@ -14,20 +14,20 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Ints
 from motionmind.jit import jit
 
-LIFTED = 0.02, 0.08  # metres above the lowest limb: from here on a foot hardly stands, from there on not at all
-HIGH = 8.0  # per second: cost of standing with a foot lifted to the upper height; proportional above
-MOVING = 3.0  # per second: cost of standing with a foot that the corpus moves
-FIRM = 1.0  # per second: cost of swinging a foot that stands firmly
-STRAYS = 0.08  # metres off its track at which a standing foot costs 1 per second
-STEP_COST = 0.5  # cost of each step
-QUICK = 1.2  # m/s: mean speed of a step that costs as much as standing STRAYS off the track
-BRIEF = 0.33  # seconds: shortest step
-ALONE = 40.0  # per second: cost of swinging while nothing else bears the body
-OUTSIDE = 0.8  # share of a sideways course during a stance that a foot spends on its own side of its track
-CROSSES = 4.0  # cost factor for being off the track towards the other feet
-SHIFTS = 0.08  # seconds to shift the weight from one foot to another
-SOON = 12.0  # per second: cost of swinging before the weight has shifted
-SLIPS = 0.02  # metres that a foot may slip without a step
+LIFTED_FOOT_M = 0.02, 0.08  # metres above the lowest limb: from here on a foot hardly stands, from there on not at all
+STAND_LIFTED_NATS_PER_S = 8.0  # per second: cost of standing with a foot lifted to the upper height; proportional above
+STAND_MOVING_NATS_PER_S = 3.0  # per second: cost of standing with a foot that the corpus moves
+SWING_FIRM_NATS_PER_S = 1.0  # per second: cost of swinging a foot that stands firmly
+STANCE_DRIFT_M = 0.08  # metres off its track at which a standing foot costs 1 per second
+STEP_COST_NATS = 0.5  # cost of each step
+QUICK_STEP_MPS = 1.2  # m/s: mean speed of a step that costs as much as standing STANCE_DRIFT_M off the track
+SHORTEST_STEP_S = 0.33  # seconds: shortest step
+SWING_UNSUPPORTED_NATS_PER_S = 40.0  # per second: cost of swinging while nothing else bears the body
+OWN_SIDE_SHARE = 0.8  # share of a sideways course during a stance that a foot spends on its own side of its track
+CROSSING_COST_RATIO = 4.0  # cost factor for being off the track towards the other feet
+WEIGHT_SHIFT_S = 0.08  # seconds to shift the weight from one foot to another
+SWING_EARLY_NATS_PER_S = 12.0  # per second: cost of swinging before the weight has shifted
+STANCE_SLIP_M = 0.02  # metres that a foot may slip without a step
 
 
 class Stance(NamedTuple):
@@ -49,9 +49,12 @@ def standing_costs(above: Floats, firm: Floats) -> tuple[Floats, Floats]:
         above: height of its lowest point above that of the lowest limb [N], metres.
         firm: firmness of the corpus's feet [N], 0 to 1.
     """
-    low, high = LIFTED
-    stand = HIGH * np.maximum((above - low) / (high - low), 0.0) + MOVING * (1.0 - firm) ** 2
-    swing = FIRM * firm * np.clip(1.0 - above / high, 0.0, 1.0)
+    low, high = LIFTED_FOOT_M
+    stand = (
+        STAND_LIFTED_NATS_PER_S * np.maximum((above - low) / (high - low), 0.0)
+        + STAND_MOVING_NATS_PER_S * (1.0 - firm) ** 2
+    )
+    swing = SWING_FIRM_NATS_PER_S * firm * np.clip(1.0 - above / high, 0.0, 1.0)
     return stand, swing
 
 
@@ -81,8 +84,8 @@ def find_stances(
         passing: whether the body passes through the first and the last frame; if not, a foot in the air takes its time.
     """
     track, outward = np.ascontiguousarray(track), np.ascontiguousarray(outward)
-    brief = max(2, round(BRIEF * fps))
-    stand, swing = _costs(stand, swing, others, flying, round(SHIFTS * fps), fps)
+    brief = max(2, round(SHORTEST_STEP_S * fps))
+    stand, swing = _costs(stand, swing, others, flying, round(WEIGHT_SHIFT_S * fps), fps)
     # A foot given in the air lands within half a step; if the body passes through or flies, it lands as it falls.
     first, last = (0 if goes or flies else brief // 2 for goes, flies in zip(passing, flying[[0, -1]], strict=True))
     parted = _part(track - track[0], outward, _crossing(track, outward), stand, swing, brief, (first, last), fps)
@@ -106,9 +109,9 @@ def _costs(
         if not flying[t]:
             stands[t], swings[t] = stand[t], swing[t]
             if not others[t]:
-                swings[t] += ALONE
+                swings[t] += SWING_UNSUPPORTED_NATS_PER_S
             elif t < around or t + around >= len(stand) or not others[t - around : t + around + 1].all():
-                swings[t] += SOON
+                swings[t] += SWING_EARLY_NATS_PER_S
     return stands / fps, swings / fps
 
 
@@ -128,7 +131,7 @@ def _places(track: Floats, outward: Floats, parted: Ints, brief: int) -> tuple[F
         beyond = 0.0
         for t in range(start, end + 1):
             beyond = max(beyond, (track[t, 0] - place[0]) * side[0] + (track[t, 1] - place[1]) * side[1])
-        place += OUTSIDE * beyond * side
+        place += OWN_SIDE_SHARE * beyond * side
         # A foot that comes from the air has no time to move elsewhere.
         place = track[start] + min(start / brief, 1.0) * (place - track[start])
         places[k] = track[end] + min((last - end) / brief, 1.0) * (place - track[end])
@@ -178,7 +181,11 @@ def _part(  # noqa: PLR0915 - one table, filled in one go
             off = squares[t + 1] - squares[s]
             if s == 0 and t == last:
                 far = np.sqrt((track[last, 0] - track[0, 0]) ** 2 + (track[last, 1] - track[0, 1]) ** 2)
-                spread = off - (x * x + y * y) / n + n * (max(far - SLIPS, 0.0) / SLIPS) ** 2 * STRAYS**2
+                spread = (
+                    off
+                    - (x * x + y * y) / n
+                    + n * (max(far - STANCE_SLIP_M, 0.0) / STANCE_SLIP_M) ** 2 * STANCE_DRIFT_M**2
+                )
             elif s == 0 or t == last:
                 px, py = (track[0, 0], track[0, 1]) if s == 0 else (track[last, 0], track[last, 1])
                 spread = off - 2.0 * (px * x + py * y) + n * (px * px + py * py)
@@ -187,14 +194,18 @@ def _part(  # noqa: PLR0915 - one table, filled in one go
             else:
                 spread = off - (x * x + y * y) / n
                 moved_x, moved_y = track[t, 0] - track[s, 0], track[t, 1] - track[s, 1]
-                across = 0.5 * OUTSIDE * (moved_x * outward[(s + t) // 2, 0] + moved_y * outward[(s + t) // 2, 1])
+                across = (
+                    0.5 * OWN_SIDE_SHARE * (moved_x * outward[(s + t) // 2, 0] + moved_y * outward[(s + t) // 2, 1])
+                )
                 spread += n * across * across
-            cost = least + max(spread, 0.0) / (STRAYS**2 * fps)
+            cost = least + max(spread, 0.0) / (STANCE_DRIFT_M**2 * fps)
             if cost < best[0, t]:
                 best[0, t], came[0, t] = cost, s
         for s in range(t + 1):  # swinging from s to t
             n = t - s + 1
-            if (s == 0 and stand[0] * fps < FIRM) or (t == last and stand[last] * fps < FIRM):
+            if (s == 0 and stand[0] * fps < SWING_FIRM_NATS_PER_S) or (
+                t == last and stand[last] * fps < SWING_FIRM_NATS_PER_S
+            ):
                 continue  # it stands where it is given
             steps = s > 0 and t < last
             if n < (brief if steps else half[0] if s == 0 else half[1]):
@@ -205,9 +216,9 @@ def _part(  # noqa: PLR0915 - one table, filled in one go
                 continue
             stood, stands = max(s - 1, 0), min(t + 1, last)
             x, y = track[stands, 0] - track[stood, 0], track[stands, 1] - track[stood, 1]
-            cost = least + (x * x + y * y) / ((n + 1) / fps * QUICK**2)
+            cost = least + (x * x + y * y) / ((n + 1) / fps * QUICK_STEP_MPS**2)
             if steps:
-                cost += STEP_COST
+                cost += STEP_COST_NATS
             if cost < best[1, t]:
                 best[1, t], came[1, t] = cost, s
     out = np.empty((count, 2), np.int64)
@@ -226,4 +237,4 @@ def _crossing(track: Floats, outward: Floats) -> Floats:
     """Return the cumulative cost of a stance foot that the body overtakes, from A and to B [2, N + 1]: legs cross."""
     off = track - track[[0, -1], None]
     inward = np.maximum(np.sum(off * outward, axis=2), 0.0)
-    return np.concatenate([np.zeros((2, 1)), np.cumsum(CROSSES * inward**2, axis=1)], axis=1)
+    return np.concatenate([np.zeros((2, 1)), np.cumsum(CROSSING_COST_RATIO * inward**2, axis=1)], axis=1)

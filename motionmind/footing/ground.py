@@ -12,14 +12,17 @@ from motionmind.body.contact import Posed
 from motionmind.body.skeleton import Skeleton
 from motionmind.footing.bearing import lowest, points_of_feet
 from motionmind.footing.feet import Foot
-from motionmind.footing.flight import EVER, SURELY
+from motionmind.footing.flight import FLIGHT_CERTAIN_SHARE, FLIGHT_POSSIBLE_SHARE
 from motionmind.footing.root import root_trajectory, stand, steps_easily
 from motionmind.geometry.splines import natural_spline
 from motionmind.walks.minimal import departure
 
-SPREADS = 0.03, 0.04  # metres, standard deviations of the height at a given posture: of walks in stance, and in flight
-LEAPS = 0.18  # metres above walks in stance from which a posture is in the air, though no walk is
-UNEVEN = 0.015  # metres by which feet in stance are above a recording's floor
+HEIGHT_SD_M = (
+    0.03,
+    0.04,
+)  # metres, standard deviations of the height at a given posture: of walks in stance, and in flight
+LEAP_FROM_M = 0.18  # metres above walks in stance from which a posture is in the air, though no walk is
+STANCE_ABOVE_FLOOR_M = 0.015  # metres by which feet in stance are above a recording's floor
 
 
 class Stance(NamedTuple):
@@ -182,14 +185,14 @@ def _hovering(stance: Stance, ends: Floats) -> Bools:
     than any step.
     """
     aloft, leaps, clearance = stance.aloft[[0, -1]], stance.leaps[[0, -1]], stance.clearance[[0, -1]]
-    surely = aloft > SURELY
+    surely = aloft > FLIGHT_CERTAIN_SHARE
     standing = np.maximum(clearance - aloft * leaps, 0.0) / np.maximum(1.0 - aloft, 1e-9)
     floor = np.where(surely, np.minimum(ends, 0.0), np.maximum(np.minimum(ends, 0.0), ends - clearance))[::-1]
     taller, lower = ends - floor - standing, leaps - (ends - floor)
-    stands = (1.0 - aloft) / SPREADS[0] * np.exp(-0.5 * (np.maximum(taller, 0.0) / SPREADS[0]) ** 2)
-    flies = aloft / SPREADS[1] * np.exp(-0.5 * (np.maximum(lower, 0.0) / SPREADS[1]) ** 2)
+    stands = (1.0 - aloft) / HEIGHT_SD_M[0] * np.exp(-0.5 * (np.maximum(taller, 0.0) / HEIGHT_SD_M[0]) ** 2)
+    flies = aloft / HEIGHT_SD_M[1] * np.exp(-0.5 * (np.maximum(lower, 0.0) / HEIGHT_SD_M[1]) ** 2)
     as_high = (flies > stands) & (taller > np.abs(lower))  # a posture far from both may be on a floor of its own
-    return np.asarray(surely | ((aloft > EVER) & as_high) | (taller > LEAPS))
+    return np.asarray(surely | ((aloft > FLIGHT_POSSIBLE_SHARE) & as_high) | (taller > LEAP_FROM_M))
 
 
 def _floor_under(half_steps: Floats, clearance: Floats, ends: Floats, hovering: Bools) -> Floats:
@@ -199,7 +202,7 @@ def _floor_under(half_steps: Floats, clearance: Floats, ends: Floats, hovering: 
     bodies in such a stance is higher. The floor includes the height of their feet above it, up to UNEVEN, or a body
     would sink as it leaves the end. An end in the air (`hovering` [2]) does not show its floor: the other end's holds.
     """
-    above = np.maximum(np.minimum(ends, 0.0), ends - np.maximum(clearance[[0, -1]] - UNEVEN, 0.0))
+    above = np.maximum(np.minimum(ends, 0.0), ends - np.maximum(clearance[[0, -1]] - STANCE_ABOVE_FLOOR_M, 0.0))
     above = np.where(hovering, np.minimum(ends, 0.0 if hovering.all() else above[::-1]), above)
     return np.asarray(np.interp(half_steps, half_steps[[0, -1]], above))
 

@@ -10,14 +10,14 @@ from motionmind.body.limbs import limb_of_points
 from motionmind.body.skeleton import Skeleton
 from motionmind.footing.smoothing import smoothed
 
-GRIP = 0.015  # metres above the floor at which a foot's hold on it has fallen to 1/e
-SLIP = 0.15  # weight of the corpus's travel, relative to 1 for a standing foot
-WALKS = 0.3  # m/s of missing travel at which half of it is spread evenly over time
-STARTS = 0.3  # seconds in which even travel starts and stops
-RAISED = 0.1, 0.25  # metres from the lowest foot to the second: even travel begins to shrink, and is least
-LEAST = 0.3  # share of even travel that remains: no dancer walks with a leg in the air
-GATHERS = 0.2  # seconds over which travel shrinks and grows again
-BEARS = 4  # exponent of a limb's firmness: of two feet, mostly the firmer one bears the body
+FLOOR_GRIP_M = 0.015  # metres above the floor at which a foot's hold on it has fallen to 1/e
+CORPUS_TRAVEL_WEIGHT = 0.15  # weight of the corpus's travel, relative to 1 for a standing foot
+HALF_SPREAD_MPS = 0.3  # m/s of missing travel at which half of it is spread evenly over time
+TRAVEL_STARTS_S = 0.3  # seconds in which even travel starts and stops
+RAISED_FOOT_M = 0.1, 0.25  # metres from the lowest foot to the second: even travel begins to shrink, and is least
+LEAST_TRAVEL_SHARE = 0.3  # share of even travel that remains: no dancer walks with a leg in the air
+TRAVEL_SHRINKS_S = 0.2  # seconds over which travel shrinks and grows again
+FOOT_FIRMNESS_EXPONENT = 4  # exponent of a limb's firmness: of two feet, mostly the firmer one bears the body
 
 
 def root_trajectory(
@@ -53,16 +53,16 @@ def root_trajectory(
     """
     points = posed.places[:, : 2 * len(skeleton)]
     height = points[..., 1] - points[..., 1].min(axis=-1, keepdims=True) + clearance[:, None]
-    firm = (stands**BEARS)[:, limb_of_points(skeleton)]
-    hold = np.exp(-np.maximum(height[1:], height[:-1]) / GRIP) * firm
-    weight = SLIP + hold.sum(axis=1)
-    steps = (SLIP * drift - np.einsum("np,npk->nk", hold, np.diff(points, axis=0))) / weight[:, None]
+    firm = (stands**FOOT_FIRMNESS_EXPONENT)[:, limb_of_points(skeleton)]
+    hold = np.exp(-np.maximum(height[1:], height[:-1]) / FLOOR_GRIP_M) * firm
+    weight = CORPUS_TRAVEL_WEIGHT + hold.sum(axis=1)
+    steps = (CORPUS_TRAVEL_WEIGHT * drift - np.einsum("np,npk->nk", hold, np.diff(points, axis=0))) / weight[:, None]
     slack = (1.0 / weight) / np.sum(1.0 / weight)
     missing = b - a - steps.sum(axis=0)
     fast = np.linalg.norm(missing) / seconds
-    evenly = fast**2 / (fast**2 + WALKS**2)
+    evenly = fast**2 / (fast**2 + HALF_SPREAD_MPS**2)
     since = np.linspace(0.0, seconds, len(steps) + 2)[1:-1]
-    ramp = easily * np.minimum(np.minimum(since, since[::-1]) / STARTS, 1.0)
+    ramp = easily * np.minimum(np.minimum(since, since[::-1]) / TRAVEL_STARTS_S, 1.0)
     slack = (1.0 - evenly) * slack + evenly * ramp / ramp.sum()
     steps += slack[:, None] * missing
     return np.asarray(a + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]))
@@ -78,9 +78,9 @@ def steps_easily(heights: Floats, fps: float) -> Floats:
     if heights.shape[1] < 2:
         return np.ones(len(heights) - 1)
     first, second = np.sort(heights, axis=1)[:, :2].T
-    low, high = RAISED
+    low, high = RAISED_FOOT_M
     s = np.clip((second - first - low) / (high - low), 0.0, 1.0)
-    easily = smoothed(1.0 - (1.0 - LEAST) * s * s * (3.0 - 2.0 * s), 0.5 * GATHERS, fps)
+    easily = smoothed(1.0 - (1.0 - LEAST_TRAVEL_SHARE) * s * s * (3.0 - 2.0 * s), 0.5 * TRAVEL_SHRINKS_S, fps)
     return np.asarray(0.5 * (easily[1:] + easily[:-1]))
 
 

@@ -18,7 +18,7 @@ from motionmind.walks.stops import Stop
 
 # Distance that a chain may keep from its state at a move, in tolerances: where a request constrains the chain (below 1,
 # to leave room for the arc between two frames), and elsewhere.
-FIRMLY, FREELY = 0.95, 3.0
+FIRM_PULL_RATIO, FREE_PULL_RATIO = 0.95, 3.0
 
 
 def allowed_off(chains: Floats, path: Int32s, grammar: Grammar, tolerances: Floats, wished: Bools) -> Floats:
@@ -33,7 +33,7 @@ def allowed_off(chains: Floats, path: Int32s, grammar: Grammar, tolerances: Floa
         centres = grammar.centres[starts[chain] : starts[chain + 1]]
         nearest[:, chain] = np.abs(chains[:, chain] @ centres.T).max(axis=1)
     beyond = np.maximum(2.0 * np.arccos(np.minimum(nearest, 1.0)) - tolerances, 0.0)
-    return np.where(wished, FIRMLY * tolerances, FREELY * tolerances + beyond)
+    return np.where(wished, FIRM_PULL_RATIO * tolerances, FREE_PULL_RATIO * tolerances + beyond)
 
 
 def bend_to_states(

@@ -14,9 +14,9 @@ from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import postures_near
 
-NEAREST = 8  # postures of the corpus to try for each end
-SEVERAL = 4  # times as many candidates in a large corpus, whose trees use another metric
-UNUSED = 0.05  # RMS radians per joint: cost of each move that the recordings do not fill
+N_DETOUR_POSTURES = 8  # postures of the corpus to try for each end
+N_CANDIDATES_RATIO = 4  # times as many candidates in a large corpus, whose trees use another metric
+UNRECORDED_MOVE_COST_RAD = 0.05  # RMS radians per joint: cost of each move that the recordings do not fill
 
 
 def detour(corpus: Corpus, carriage: Carriage, ends: tuple[Floats, Floats], moves: int, own: int) -> Floats:
@@ -46,7 +46,7 @@ def detour(corpus: Corpus, carriage: Carriage, ends: tuple[Floats, Floats], move
             on = np.arange(after + 1)
             into = np.minimum(spare - on, before)
             apart = np.sqrt(np.mean(rot.angle(shown[i + on], shown[k - into]) ** 2, axis=-1))
-            costs = apart + first_off + last_off + UNUSED * (spare - on - into)
+            costs = apart + first_off + last_off + UNRECORDED_MOVE_COST_RAD * (spare - on - into)
             if costs.min() < best:
                 best, n = float(costs.min()), int(costs.argmin())
                 way = int(i), n, int(k), int(into[n])
@@ -63,7 +63,11 @@ def _nearest(carriage: Carriage, shown: Floats, posture: Floats) -> tuple[Ints, 
     """Return the indices of the postures [N, J, 4] nearest to one [J, 4], and their distances, radians per joint."""
     some = np.arange(len(shown))
     if carriage.trees is not None:
-        some = np.sort(postures_near(carriage.trees, carriage.orientations, posture, SEVERAL * NEAREST, len(shown)))
+        some = np.sort(
+            postures_near(
+                carriage.trees, carriage.orientations, posture, N_CANDIDATES_RATIO * N_DETOUR_POSTURES, len(shown)
+            )
+        )
     off = np.sqrt(np.mean(rot.angle(shown[some], posture) ** 2, axis=-1))
-    order = np.argsort(off, kind="stable")[:NEAREST]
+    order = np.argsort(off, kind="stable")[:N_DETOUR_POSTURES]
     return some[order], off[order]

@@ -25,11 +25,11 @@ from motionmind.grammar.grammar import Grammar
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.bending import allowed_off, bend_to_states
 from motionmind.realise.retime import (
-    ENDS_AT,
-    HEADROOM,
-    JOINTS_AT,
-    JUMPS_AT,
-    LONGER,
+    COMPARED_DURATION_RATIO,
+    FINAL_PEAK_RATIO,
+    JOINT_SPEED_RATIO,
+    JUMP_RISE_RATIO,
+    SPEED_HEADROOM_RATIO,
     jump_in_time,
     keep_pace,
     land_between,
@@ -47,11 +47,11 @@ from motionmind.walks.stops import Stop, stop_at
 DANCED_WITHIN = (
     0.9  # tolerances by which a passage may take a joint off its state; the rest is for the arc between frames
 )
-SOLVES = 3  # most solves: the first, then others on slower clocks
-KEEPS = 0.97  # share of the speed bounds given to the solve, which exceeds them slightly
-SLIGHTLY = 1.02  # smallest stretch of a step worth another solve
-_SAME = 1e-9  # radians: orientations no farther apart differ by rounding alone
-_UNSEEN = 2e-3  # radians: a joint that returns to its start and goes no farther does not move
+MAX_SOLVES = 3  # most solves: the first, then others on slower clocks
+SPEED_BOUND_RATIO = 0.97  # share of the speed bounds given to the solve, which exceeds them slightly
+MIN_STRETCH_RATIO = 1.02  # smallest stretch of a step worth another solve
+_SAME_ORIENTATION_RAD = 1e-9  # radians: orientations no farther apart differ by rounding alone
+_MOTIONLESS_RAD = 2e-3  # radians: a joint that returns to its start and goes no farther does not move
 
 
 class Realised(NamedTuple):
@@ -163,17 +163,17 @@ def realise(path: Int32s, style: Style, wishes: Wishes) -> Realised:
     pace = max(wishes.pace, 1.0)
     lasts, most, caps = wishes.length is not None, None, None
     if style.peaks is not None:
-        caps = most = style.peaks(LONGER * float(clock.frames[-1]), pace)
+        caps = most = style.peaks(COMPARED_DURATION_RATIO * float(clock.frames[-1]), pace)
     if lasts or not wishes.slows:  # fast parts then take time from slow ones, or stay
         most = None
     if most is not None and caps is not None:
         given = [0, *(2 * move for move in wishes.through), -1]
-        stance = _without_high_jumps(stance, JUMPS_AT * most[-2] * a.skeleton.height, given)
+        stance = _without_high_jumps(stance, JUMP_RISE_RATIO * most[-2] * a.skeleton.height, given)
         caps = _quickest(caps, style.fastest, pace, joints)
-    travels = np.inf if style.fastest is None or lasts else HEADROOM * pace * float(style.fastest[-1])
+    travels = np.inf if style.fastest is None or lasts else SPEED_HEADROOM_RATIO * pace * float(style.fastest[-1])
     wished = wishes.wished[:joints].copy()
     wished[0] |= wishes.wished[joints:].any()  # the root turns the facing
-    kept = None if caps is None else KEEPS * caps
+    kept = None if caps is None else SPEED_BOUND_RATIO * caps
     bounds = Bounds(
         wishes.fixed[:joints],
         wished,
@@ -187,13 +187,13 @@ def realise(path: Int32s, style: Style, wishes: Wishes) -> Realised:
     )
     ends = Given(reference.low, (a.root, b.root), (_rate(wishes.leaving), _rate(wishes.arriving)))
     before: Synthesis | None = None
-    for number in range(SOLVES):
+    for number in range(MAX_SOLVES):
         made = synthesise(a.skeleton, rotations, clock.frames, stance, ends, bounds, wishes.without, before)
         motion = _exact(a, b, made.rotations, made.root, clock)
-        if caps is None or not wishes.slows or number == SOLVES - 1:
+        if caps is None or not wishes.slows or number == MAX_SOLVES - 1:
             break
         slower = slower_steps(motion, caps, wishes.moving, pace * style.slides, lasts)
-        if slower.max() < SLIGHTLY:
+        if slower.max() < MIN_STRETCH_RATIO:
             break
         was, end = clock.frames, clock.frames[-1]
         clock, at = stretch(clock, was, slower, wishes.fps)
@@ -372,9 +372,9 @@ def _for_jumps(
 def _quickest(most: Floats, speeds: Floats | None, pace: float, joints: int) -> Floats:
     """Return the bounds of the finished movement [J + 4]: a little less than `most` and, for joints, little more than
     the speeds of all but a hundredth of the corpus's samples [J + 2], at a pace."""
-    out = ENDS_AT * most
+    out = FINAL_PEAK_RATIO * most
     if speeds is not None:
-        out[:joints] = np.minimum(out[:joints], JOINTS_AT * pace * speeds[:joints])
+        out[:joints] = np.minimum(out[:joints], JOINT_SPEED_RATIO * pace * speeds[:joints])
     return out
 
 
@@ -442,8 +442,8 @@ def _limit(rotations: Floats, postures: Mapping[int, Posture], loose: Bools) -> 
     given = np.stack([posture.rotations for posture in postures.values()])
     out = within_limits(first.skeleton, rot.normalise(rotations), given, loose)
     # Fingers that were not recorded, for example, may have other values in walks.
-    still = rot.angle(given, first.rotations).max(axis=0) < _SAME
-    still &= rot.angle(out, first.rotations).max(axis=0) < _UNSEEN
+    still = rot.angle(given, first.rotations).max(axis=0) < _SAME_ORIENTATION_RAD
+    still &= rot.angle(out, first.rotations).max(axis=0) < _MOTIONLESS_RAD
     out[:, still] = first.rotations[still]
     out[0], out[-1] = first.rotations, last.rotations
     return out

@@ -24,26 +24,26 @@ from motionmind.body.plausibility import GRAVITY
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, size_of
 from motionmind.corpus.corpus import Corpus
-from motionmind.footing.flight import PUSHES, find_falls
+from motionmind.footing.flight import SHORTEST_PUSH_OFF_S, find_falls
 from motionmind.footing.smoothing import bell, sliding_max
 from motionmind.geometry import rotations as rot
 from motionmind.learned.pace import moved_in, steps_of, ways
 from motionmind.learned.peaks import accelerations
 from motionmind.walks.expectation import Expectation
 
-HEADROOM = 0.9  # share of the fastest speeds allowed: passages and the synthesis add to them later
-ENDS_AT = 0.92  # share of the peaks allowed in the end; chosen on cmu-05
-JOINTS_AT = 1.13  # largest speed of a joint, relative to the 99th percentile in the corpus; for ballet
-JUMPS_AT = 0.95  # share of the fastest rise allowed to a jump on the way
-AROUND = 1.0 / 6.0  # seconds around an excess in which the clock slows down
-LONGER = 1.1  # largest factor on a movement's duration when comparing it with movements as long
-SPARES = 0.3  # share of the spare time of slow parts that fast parts may take
-SLIGHT = 1e-3  # smallest change of the clock worth making
-LEFT = 0.1  # metres, for a person: walks no higher than this have not left the floor
-SITS = 0.1  # metres, for a person: do not hurry a take-off that is at most this much lower than possible
-HIGHER = 0.02  # metres, for a person: smallest gain in height worth a longer fall
-HURRIES = 2.5  # largest speed of a joint in a leap, relative to the 99th percentile in the corpus
-SETTLES = 0.3  # seconds from an end with a given velocity in which the clock may begin to slow down
+SPEED_HEADROOM_RATIO = 0.9  # share of the fastest speeds allowed: passages and the synthesis add to them later
+FINAL_PEAK_RATIO = 0.92  # share of the peaks allowed in the end; chosen on cmu-05
+JOINT_SPEED_RATIO = 1.13  # largest speed of a joint, relative to the 99th percentile in the corpus; for ballet
+JUMP_RISE_RATIO = 0.95  # share of the fastest rise allowed to a jump on the way
+SLOWDOWN_AROUND_S = 1.0 / 6.0  # seconds around an excess in which the clock slows down
+COMPARED_DURATION_RATIO = 1.1  # largest factor on a movement's duration when comparing it with movements as long
+SPARE_TIME_SHARE = 0.3  # share of the spare time of slow parts that fast parts may take
+MIN_CLOCK_CHANGE_RATIO = 1e-3  # smallest change of the clock worth making
+LEFT_FLOOR_M = 0.1  # metres, for a person: walks no higher than this have not left the floor
+TAKEOFF_LOWER_M = 0.1  # metres, for a person: do not hurry a take-off that is at most this much lower than possible
+MIN_HEIGHT_GAIN_M = 0.02  # metres, for a person: smallest gain in height worth a longer fall
+LEAP_JOINT_SPEED_RATIO = 2.5  # largest speed of a joint in a leap, relative to the 99th percentile in the corpus
+SLOWDOWN_FROM_END_S = 0.3  # seconds from an end with a given velocity in which the clock may begin to slow down
 
 
 def keep_pace(
@@ -72,13 +72,13 @@ def keep_pace(
     speeds = way.parts / np.diff(frames)[:, None]
     slower = np.ones(len(travel))
     step = np.searchsorted(times, 0.5 * (frames[1:] + frames[:-1])) - 1
-    np.maximum.at(slower, step.clip(0, len(slower) - 1), (speeds / (HEADROOM * fastest)).max(axis=1))
+    np.maximum.at(slower, step.clip(0, len(slower) - 1), (speeds / (SPEED_HEADROOM_RATIO * fastest)).max(axis=1))
     # The maximum of five covers the mean of five: no half step slows down less than it needs.
     slower = _mean_around(sliding_max(slower, 2), np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0)
     middle = 0.5 * (times[1:] + times[:-1])
     for is_moving, since in zip(moving, (middle - times[0], times[-1] - middle), strict=True):
         if is_moving:
-            slower = 1.0 + (slower - 1.0) * np.clip(since / SETTLES, 0.0, 1.0)
+            slower = 1.0 + (slower - 1.0) * np.clip(since / SLOWDOWN_FROM_END_S, 0.0, 1.0)
     return np.asarray(slower)
 
 
@@ -106,7 +106,7 @@ def jump_in_time(
         low: height of the lowest point above the floor in the first and in the last posture [2], metres.
         in_air: whether each is in the air with no velocity given [2].
         reach: half steps from each to the next given posture.
-        fastest: speeds of the joints, rad/s [J]; a hurried step stays below HURRIES times these.
+        fastest: speeds of the joints, rad/s [J]; a hurried step stays below LEAP_JOINT_SPEED_RATIO times these.
     """
     out, still = np.ones(len(seconds)), np.zeros((len(rotations), 3))
     mass = centre_of_mass(skeleton, rotations, still) if in_air.any() else None
@@ -119,7 +119,7 @@ def jump_in_time(
         # Onwards from the first posture, or back from the last.
         high, takes, best, highest, hurries, quicker = standing[onward], 0.0, np.inf, 0.0, 0.0, (0, 1.0)
         for step in range(1, reach[end] + 1):
-            if heights[onward][step] < LEFT * size:
+            if heights[onward][step] < LEFT_FLOOR_M * size:
                 break
             turned = rot.angle(rotations[onward][step - 1], rotations[onward][step])
             hurries = max(hurries, float((turned / fastest).max()) / seconds[onward][step - 1])
@@ -130,10 +130,10 @@ def jump_in_time(
             if share >= 1.0:
                 continue
             if np.isinf(best):  # before this step it would leave the floor
-                best = min(high[step - 1], high[step]) + SITS * size
-            if high[step] > best and hurries <= HURRIES * share:
-                best, quicker = high[step] + HIGHER * size, (step, share)
-        if high[quicker[0]] > highest - SITS * size:  # halfway down, legs would still be apart
+                best = min(high[step - 1], high[step]) + TAKEOFF_LOWER_M * size
+            if high[step] > best and hurries <= LEAP_JOINT_SPEED_RATIO * share:
+                best, quicker = high[step] + MIN_HEIGHT_GAIN_M * size, (step, share)
+        if high[quicker[0]] > highest - TAKEOFF_LOWER_M * size:  # halfway down, legs would still be apart
             out[onward][: quicker[0]] = quicker[1]
     return out
 
@@ -151,8 +151,8 @@ def land_between(seconds: Floats, heights: Floats, size: float, moving: tuple[bo
     takes = float(seconds.sum())
     rate = (heights[1] - heights[0]) / takes + 0.5 * GRAVITY * takes
     top = heights[0] + 0.5 * rate**2 / GRAVITY if 0.0 < rate < GRAVITY * takes else heights.max()
-    needs = np.sqrt(2.0 * heights / GRAVITY).sum() + 3.0 * PUSHES
-    if top <= heights.max() + LEFT * size or takes >= needs:
+    needs = np.sqrt(2.0 * heights / GRAVITY).sum() + 3.0 * SHORTEST_PUSH_OFF_S
+    if top <= heights.max() + LEFT_FLOOR_M * size or takes >= needs:
         return np.ones(len(seconds))
     middles = np.cumsum(seconds) - 0.5 * seconds
     free = _away(middles, [at for at, given in zip((0.0, takes), moving, strict=True) if given], np.inf)
@@ -193,7 +193,9 @@ def _slower(
     times, body = motion.times, motion.skeleton
     middles, fps = 0.5 * (times[1:] + times[:-1]), 1.0 / float(times[1] - times[0])
     ends = [time for fixed, time in zip(moving, times[[0, -1]], strict=True) if fixed]
-    free = np.minimum(_away(middles, ends, fps), _away(middles, times[_falling(body, posed, fps)], fps, PUSHES))
+    free = np.minimum(
+        _away(middles, ends, fps), _away(middles, times[_falling(body, posed, fps)], fps, SHORTEST_PUSH_OFF_S)
+    )
     moved = moved_in(motion)
     shown = (fps * steps_of(motion) / most[:-1]).max(axis=1)
     # Twice as slow a movement has a quarter of its accelerations; each is between two steps.
@@ -203,8 +205,8 @@ def _slower(
     if np.isfinite(slides) and body.height >= TALL:
         slid = slides_between(body, posed.places, _floor(times, posed.lowest, times))
         shown = np.maximum(shown, fps * slid.max(axis=1, initial=0.0) / (slides * body.height))
-    shown[free < SLIGHT] = 1.0
-    reach = max(1, round(AROUND * fps))
+    shown[free < MIN_CLOCK_CHANGE_RATIO] = 1.0
+    reach = max(1, round(SLOWDOWN_AROUND_S * fps))
 
     def around(values: Floats) -> Floats:
         return _mean_around(sliding_max(values, reach), bell(reach))
@@ -228,7 +230,7 @@ def _braking(moved: Floats, moving: tuple[bool, bool], fps: float) -> Bools:
         fps: frames a second.
     """
     faster, out = np.diff(np.linalg.norm(moved, axis=1)), np.zeros(len(moved) - 1, dtype=np.bool_)
-    near = round(SETTLES * fps)
+    near = round(SLOWDOWN_FROM_END_S * fps)
     if moving[0]:
         out[:near] |= faster[:near] < 0.0
     if moving[1]:
@@ -246,7 +248,7 @@ def _within(slower: Floats, slack: Floats, seconds: Floats) -> Floats:
         seconds: durations of the steps [N - 1].
     """
     more, spare = float((slower - 1.0) @ seconds), float(slack @ seconds)
-    if more > SPARES * spare:
+    if more > SPARE_TIME_SHARE * spare:
         return np.ones(len(slower))
     return np.asarray(slower - slack * (more / max(spare, 1e-9)))
 
@@ -268,7 +270,7 @@ def _away(middles: Floats, times: Iterable[float], fps: float, beside: float = 0
     since = np.full(len(middles), np.inf)
     for time in times:
         since = np.minimum(since, np.abs(middles - time))
-    return np.clip((since - 0.5 / fps - beside) / SETTLES, 0.0, 1.0)
+    return np.clip((since - 0.5 / fps - beside) / SLOWDOWN_FROM_END_S, 0.0, 1.0)
 
 
 def _falling(skeleton: Skeleton, posed: Posed, fps: float) -> Bools:

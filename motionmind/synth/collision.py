@@ -12,11 +12,11 @@ from motionmind.body.capsules import LEG, capsules_of, pair_depths
 from motionmind.body.tempo import runs_of
 from motionmind.footing.smoothing import sliding_max
 from motionmind.synth.kinematics import Rows, State
-from motionmind.synth.one_sided import EDGE, OneSided, once_per_state
+from motionmind.synth.one_sided import BOUND_TOLERANCE_RATIO, OneSided, once_per_state
 from motionmind.synth.system import Normal
 
-NEAR_M = 0.06  # between legs that may pass through each other within a frame
-OPPOSITE = 0.2  # cosine between the directions from leg to leg below which they have changed sides
+LEGS_NEAR_M = 0.06  # between legs that may pass through each other within a frame
+SIDE_CHANGE_COSINE = 0.2  # cosine between the directions from leg to leg below which they have changed sides
 
 
 @dataclass
@@ -50,25 +50,27 @@ class Collision(OneSided):
         frames, skeleton = np.arange(len(deep)), state.body.skeleton
         away, closest = ways[frames, nearest], deep[frames, nearest]
         sides = state.places[:, skeleton.index("left_hip")] - state.places[:, skeleton.index("right_hip")]
-        sides /= np.maximum(np.linalg.norm(sides, axis=1, keepdims=True), EDGE)
-        passes = (np.sum(away[1:] * away[:-1], axis=1) < OPPOSITE) & (np.minimum(closest[1:], closest[:-1]) > -NEAR_M)
+        sides /= np.maximum(np.linalg.norm(sides, axis=1, keepdims=True), BOUND_TOLERANCE_RATIO)
+        passes = (np.sum(away[1:] * away[:-1], axis=1) < SIDE_CHANGE_COSINE) & (
+            np.minimum(closest[1:], closest[:-1]) > -LEGS_NEAR_M
+        )
         meets = closest > 0.0
         meets[1:] |= passes
         meets[:-1] |= passes
         for begin, end in runs_of(sliding_max(meets, self.around)):
             before, after = away[max(begin - 1, 0)], away[min(end, len(away) - 1)]
             share = np.linspace(0.0, 1.0, end - begin + 2)[1:-1, None]
-            if before @ after < OPPOSITE:
+            if before @ after < SIDE_CHANGE_COSINE:
                 first, last = np.maximum(1.0 - 2.0 * share, 0.0), np.maximum(2.0 * share - 1.0, 0.0)
                 planes[begin:end] = first * before + (1.0 - first - last) * sides[begin:end] + last * after
             else:
                 planes[begin:end] = (1.0 - share) * before + share * after
-        planes /= np.maximum(np.linalg.norm(planes, axis=1, keepdims=True), EDGE)
+        planes /= np.maximum(np.linalg.norm(planes, axis=1, keepdims=True), BOUND_TOLERANCE_RATIO)
         if len(self._planes):  # legs that have come apart stay on their sides
             planes = np.where(np.any(planes != 0.0, axis=1, keepdims=True), planes, self._planes)
         self._planes = planes
         # Later a pair that comes near would count with its whole distance from the plane at once, and steps be refused.
-        self._on_plane = legs & np.any(planes != 0.0, axis=1, keepdims=True) & (deep > -NEAR_M)
+        self._on_plane = legs & np.any(planes != 0.0, axis=1, keepdims=True) & (deep > -LEGS_NEAR_M)
 
     def _legs(self, state: State) -> Bools:
         """Return which pairs are of the two legs [P]."""
@@ -113,14 +115,14 @@ class Collision(OneSided):
     def add(self, state: State, normal: Normal) -> None:
         """Add the rows; see `Term.add`."""
         deep, ways, at = self._over(state)
-        pushes = deep > EDGE
+        pushes = deep > BOUND_TOLERANCE_RATIO
         self._rows(state, pushes, ways, at).add_alike(state, normal, deep[pushes], self.spread)
         normal.cost += float(np.sum(deep[pushes] ** 2)) * self.spread**-2.0
 
     def foresee(self, state: State, step: Floats, normal: Normal) -> bool:
         """Add the rows that a step breaks; see `OneSided.foresee`."""
         deep, ways, at = self._over(state)
-        chosen = (deep <= EDGE) & (deep > -NEAR_M)
+        chosen = (deep <= BOUND_TOLERANCE_RATIO) & (deep > -LEGS_NEAR_M)
         rows = self._rows(state, chosen, ways, at)
         return rows.add_broken(state, step, normal, deep[chosen], self.spread)
 

@@ -23,7 +23,7 @@ from motionmind.synth.kinematics import Rows, State, inverse_right_jacobian, row
 from motionmind.synth.system import Normal
 
 UP = np.array([0.0, 1.0, 0.0])
-EDGE = 1e-6  # in a term's unit: tolerance of its bound
+BOUND_TOLERANCE_RATIO = 1e-6  # in a term's unit: tolerance of its bound
 
 
 R = TypeVar("R")
@@ -105,7 +105,7 @@ class VectorBound(OneSided):
 def beyond(vectors: Floats, most: Floats | float) -> Floats:
     """Return the part of vectors [..., k] beyond a length [...]."""
     size = np.linalg.norm(vectors, axis=-1)
-    return np.asarray(vectors * np.maximum(1.0 - most / np.maximum(size, EDGE), 0.0)[..., None])
+    return np.asarray(vectors * np.maximum(1.0 - most / np.maximum(size, BOUND_TOLERANCE_RATIO), 0.0)[..., None])
 
 
 @dataclass
@@ -133,14 +133,14 @@ class Floor(OneSided):
         """Add the rows; see `Term.add`."""
         deep = self._deep(state)
         deep[[0, -1]] = -1.0
-        pushes = deep > EDGE
+        pushes = deep > BOUND_TOLERANCE_RATIO
         self._rows(pushes).add_alike(state, normal, deep[pushes], self.spread)
         normal.cost += float(np.sum(deep[pushes] ** 2)) * self.spread**-2.0
 
     def foresee(self, state: State, step: Floats, normal: Normal) -> bool:
         """Add the rows that a step breaks; see `OneSided.foresee`."""
         deep = self._deep(state)
-        above = deep <= EDGE
+        above = deep <= BOUND_TOLERANCE_RATIO
         above[[0, -1]] = False
         return self._rows(above).add_broken(state, step, normal, deep[above], self.spread)
 
@@ -261,7 +261,7 @@ class Limits(OneSided):
     def _excess(self, state: State) -> Floats:
         """Return rotation vectors from the nearest rotations within the limits [N, J, 3], in the joints' frames."""
         off = rot.log(rot.inv_mul(self._allowed(state, state.rotations), state.rotations))
-        return np.where(rot.norm(off)[..., None] > EDGE, off, 0.0)
+        return np.where(rot.norm(off)[..., None] > BOUND_TOLERANCE_RATIO, off, 0.0)
 
     def _rows(self, state: State, normal: Normal, off: Floats, chosen: Bools) -> None:
         chosen[[0, -1]] = False
@@ -284,7 +284,7 @@ class Limits(OneSided):
             turned[:, joint] = np.einsum("td,tdx->tx", step[:, columns], state.own_axes[:, own])
         then = rot.mul(state.rotations, rot.exp(turned))
         allowed = self._allowed(state, then)
-        chosen = (rot.angle(allowed, then) > EDGE) & ~np.any(self._excess(state) != 0.0, axis=2)
+        chosen = (rot.angle(allowed, then) > BOUND_TOLERANCE_RATIO) & ~np.any(self._excess(state) != 0.0, axis=2)
         self._rows(state, normal, rot.log(rot.inv_mul(allowed, state.rotations)), chosen)
         return bool(chosen.any())
 

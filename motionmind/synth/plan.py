@@ -13,29 +13,39 @@ from motionmind.body.contact import Posed
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import standing_rises
 from motionmind.footing.balance import falls_without, is_beyond, walks
-from motionmind.footing.bearing import MOSTLY, Bearing, Shape, find_bearing, find_staying, shape_of
-from motionmind.footing.bearing import TOUCHES as LOW
+from motionmind.footing.bearing import (
+    HOLDS_UP_SHARE,
+    LIMB_TOUCHES_M,
+    Bearing,
+    Shape,
+    find_bearing,
+    find_staying,
+    shape_of,
+)
 from motionmind.footing.feet import Foot
-from motionmind.footing.flight import HOVERS, SURELY, Flight, find_flights, flying_frames
+from motionmind.footing.flight import AIRBORNE_FROM_M, FLIGHT_CERTAIN_SHARE, Flight, find_flights, flying_frames
 from motionmind.footing.ground import Ground
 from motionmind.synth.terms import Contacts
 
-GRIP_M = 0.015  # height above a foot's lowest point at which the grip of a point has fallen to 1/e
-STANDS_M = 0.003  # standard deviation of the position of a point in stance
-PLACE_M = 0.1  # the same, level, of a stance that includes no given posture: the solve finds its place
-SWINGS_M = 0.04  # the same, level, of a swinging foot
-LIFTS_M = 0.02  # the same, of its height
-SWINGS_LOW, HIGH_M = 0.2, 0.08  # share of both at the floor, and height from which they apply in full
-SLIPS = 0.3  # m/s: speed of a foot that the corpus counts as half firm
-LOW_M = 0.02  # height of a swinging foot at which its grip has fallen to 1/e
-SKIMS = 0.15  # m/s, standard deviation of a swinging foot's level speed at the floor
-STILL = 0.03  # m/s, standard deviation of the firmest foot's speed
-RESTS = 0.1  # m/s, standard deviation of the speed of a supporting hand, knee or trunk
-RISES = 0.33  # share of a step in which the foot rises, and in which it comes down
-LIFT_M = 0.105  # height of a step whose reference does not lift the foot; chosen on cmu-05 and cmu-16
-FAR_M = 0.3  # length of a step from which it is that high
-SETTLES = 0.3  # seconds for a foot given above the floor to come down
-TIPTOE_M = 0.12  # height above the floor up to which one foot may stay throughout (`find_staying`)
+POINT_GRIP_M = 0.015  # height above a foot's lowest point at which the grip of a point has fallen to 1/e
+STANCE_SD_M = 0.003  # standard deviation of the position of a point in stance
+STANCE_PLACE_SD_M = 0.1  # the same, level, of a stance that includes no given posture: the solve finds its place
+SWING_SD_M = 0.04  # the same, level, of a swinging foot
+SWING_HEIGHT_SD_M = 0.02  # the same, of its height
+LOW_SWING_SD_SHARE, FULL_SWING_SD_FROM_M = (
+    0.2,
+    0.08,
+)  # share of both at the floor, and height from which they apply in full
+HALF_FIRM_MPS = 0.3  # m/s: speed of a foot that the corpus counts as half firm
+SWING_GRIP_M = 0.02  # height of a swinging foot at which its grip has fallen to 1/e
+LOW_SWING_SPEED_SD_MPS = 0.15  # m/s, standard deviation of a swinging foot's level speed at the floor
+FIRM_FOOT_SPEED_SD_MPS = 0.03  # m/s, standard deviation of the firmest foot's speed
+SUPPORT_SPEED_SD_MPS = 0.1  # m/s, standard deviation of the speed of a supporting hand, knee or trunk
+STEP_RISE_SHARE = 0.33  # share of a step in which the foot rises, and in which it comes down
+STEP_HEIGHT_M = 0.105  # height of a step whose reference does not lift the foot; chosen on cmu-05 and cmu-16
+LONG_STEP_M = 0.3  # length of a step from which it is that high
+FOOT_COMES_DOWN_S = 0.3  # seconds for a foot given above the floor to come down
+STAYING_FOOT_HEIGHT_M = 0.12  # height above the floor up to which one foot may stay throughout (`find_staying`)
 
 
 class Stretch(NamedTuple):
@@ -173,20 +183,20 @@ class Plan:
             for stance in bearing.stances[k]:
                 own[stance.start : stance.end + 1] = stance.start > 0 and stance.end < len(root) - 1
             firm = np.clip(ground.firm[:, foot.limb], 1e-2, 1.0)
-            speed = np.hypot(SLIPS * np.sqrt(1.0 / firm - 1.0), STILL)
+            speed = np.hypot(HALF_FIRM_MPS * np.sqrt(1.0 / firm - 1.0), FIRM_FOOT_SPEED_SD_MPS)
             high = np.maximum(shape.low[:, k] + root[:, 1] + off[:, k, 1] - ground.floor, 0.0)
-            free = np.where(self.flying, np.inf, np.clip(high / HIGH_M, SWINGS_LOW, 1.0))
+            free = np.where(self.flying, np.inf, np.clip(high / FULL_SWING_SD_FROM_M, LOW_SWING_SD_SHARE, 1.0))
             still = stands[1:] & stands[:-1]
-            slip = np.where(still, 0.5 * (speed[1:] + speed[:-1]), SKIMS) / self.fps
+            slip = np.where(still, 0.5 * (speed[1:] + speed[:-1]), LOW_SWING_SPEED_SD_MPS) / self.fps
             for point in np.flatnonzero(shape.feet[k]):
                 at = shape.places[:, point] + root + off[:, k]
-                hold = np.exp(-(shape.places[:, point, 1] - shape.low[:, k]) / GRIP_M)
-                firmly = STANDS_M / np.sqrt(np.maximum(hold, 1e-3))
-                height = np.where(stands, firmly, LIFTS_M * free)
-                level = np.where(stands, np.where(own, PLACE_M, firmly), SWINGS_M * free)
+                hold = np.exp(-(shape.places[:, point, 1] - shape.low[:, k]) / POINT_GRIP_M)
+                firmly = STANCE_SD_M / np.sqrt(np.maximum(hold, 1e-3))
+                height = np.where(stands, firmly, SWING_HEIGHT_SD_M * free)
+                level = np.where(stands, np.where(own, STANCE_PLACE_SD_M, firmly), SWING_SD_M * free)
                 if not steps:
                     level[:] = np.inf
-                bears = np.where(stands, hold, np.where(self.flying, 0.0, hold * np.exp(-high / LOW_M)))
+                bears = np.where(stands, hold, np.where(self.flying, 0.0, hold * np.exp(-high / SWING_GRIP_M)))
                 both = np.minimum(bears[1:], bears[:-1])
                 slips = np.where((both > 1e-2) & steps, slip / np.sqrt(np.maximum(both, 1e-9)), np.inf)
                 moves = np.where(still[:, None], np.diff(at[:, [0, 2]], axis=0), 0.0)
@@ -195,14 +205,14 @@ class Plan:
     def _of_others(self, root: Floats) -> Iterator[_Point]:
         """Yield the targets of supporting hands, knees or the trunk: on the floor, in their own places."""
         shape = self.shape
-        rests = self.bearing.others > MOSTLY
+        rests = self.bearing.others > HOLDS_UP_SHARE
         for part in np.flatnonzero(rests.any(axis=0)):
             for point in np.flatnonzero(shape.others[part]):
                 at = shape.places[:, point] + root
                 at[:, 1] = self.stretch.ground.floor + shape.places[:, point, 1] - shape.low_others[:, part]
-                on = rests[:, part] & (shape.places[:, point, 1] < shape.low_others[:, part] + LOW)
-                spreads = np.where(on[:, None], [PLACE_M, STANDS_M, PLACE_M], np.inf)
-                slips = np.where(on[1:] & on[:-1], RESTS / self.fps, np.inf)
+                on = rests[:, part] & (shape.places[:, point, 1] < shape.low_others[:, part] + LIMB_TOUCHES_M)
+                spreads = np.where(on[:, None], [STANCE_PLACE_SD_M, STANCE_SD_M, STANCE_PLACE_SD_M], np.inf)
+                slips = np.where(on[1:] & on[:-1], SUPPORT_SPEED_SD_MPS / self.fps, np.inf)
                 yield _Point(int(point), at, spreads, on, np.diff(at[:, [0, 2]], axis=0), slips)
 
     def _off(self, root: Floats) -> Floats:
@@ -216,7 +226,7 @@ class Plan:
         level = bearing.targets - root[:, None, [0, 2]]
         height = shape.low + root[:, 1:2] - self.stretch.ground.floor[:, None]
         # Never lift a foot that alone supports the body.
-        support = bearing.stands.sum(axis=1) + (bearing.others > MOSTLY).sum(axis=1) + self.flying
+        support = bearing.stands.sum(axis=1) + (bearing.others > HOLDS_UP_SHARE).sum(axis=1) + self.flying
         borne = support[:, None] > bearing.stands
         for k in range(len(self.feet)):
             off = out[:, k]
@@ -225,7 +235,7 @@ class Plan:
                 off[here, 0], off[here, 2] = level[here, k].T
                 wanted = np.zeros(count)
                 for edge in {stance.start, stance.end} & {0, count - 1}:
-                    near = np.clip(1.0 - np.abs(np.arange(count) - edge) / (SETTLES * self.fps), 0.0, 1.0)
+                    near = np.clip(1.0 - np.abs(np.arange(count) - edge) / (FOOT_COMES_DOWN_S * self.fps), 0.0, 1.0)
                     wanted += height[edge, k] * _eased(near)
                 off[here, 1] = (wanted - height[:, k])[here]
             edges = [0, *(frame for stance in bearing.stances[k] for frame in (stance.start, stance.end)), count - 1]
@@ -239,12 +249,14 @@ class Plan:
                     continue
                 places = shape.tracks[part, k] + root[part][:, [0, 2]] + off[part][:, [0, 2]]
                 step = places[-1] - places[0]
-                far = min(float(np.linalg.norm(step)) / FAR_M, 1.0)
-                lift = np.where(borne[part, k], LIFT_M * far * _eased(np.minimum(share, share[::-1]) / RISES), 0.0)
+                far = min(float(np.linalg.norm(step)) / LONG_STEP_M, 1.0)
+                lift = np.where(
+                    borne[part, k], STEP_HEIGHT_M * far * _eased(np.minimum(share, share[::-1]) / STEP_RISE_SHARE), 0.0
+                )
                 off[part, 1] += np.maximum(lift - height[part, k] - off[part, 1], 0.0)
                 # Near the floor a foot moves straight from place to place, whatever the reference does.
                 strays = places - places[0] - _eased(share)[:, None] * step
-                low = (1.0 - far) * (1.0 - _eased((height[part, k] + off[part, 1]) / HIGH_M))
+                low = (1.0 - far) * (1.0 - _eased((height[part, k] + off[part, 1]) / FULL_SWING_SD_FROM_M))
                 off[part, 0], off[part, 2] = (off[part][:, [0, 2]] - low[:, None] * strays).T
         return out
 
@@ -281,9 +293,10 @@ def plan_contacts(
     shape, root, count = shape_of(skeleton, stretch.posed, feet), stretch.ground.root, len(stretch.ground.root)
     standing = stretch.ground.floor - shape.lowest
     above = root[[0, -1], 1] - standing[[0, -1]]
-    staying = find_staying(shape, root[:, [0, 2]]) if above.max() < TIPTOE_M else None
+    staying = find_staying(shape, root[:, [0, 2]]) if above.max() < STAYING_FOOT_HEIGHT_M else None
     hovers = tuple(
-        bool(staying is None and stretch.ground.aloft[end] > SURELY and above[end] > HOVERS) for end in (0, -1)
+        bool(staying is None and stretch.ground.aloft[end] > FLIGHT_CERTAIN_SHARE and above[end] > AIRBORNE_FROM_M)
+        for end in (0, -1)
     )
     flights: list[Flight] = []
     # A body that stands on the same limb, in one place, at both ends does not hop either.

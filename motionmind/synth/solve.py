@@ -14,14 +14,14 @@ from motionmind.synth.one_sided import OneSided
 from motionmind.synth.system import Normal
 from motionmind.synth.terms import Term
 
-LOOKS = 4  # iterations after which the terms are planned again at the latest
-DAMPING = 0.3  # added to the diagonal, so that unknowns without rows stay
-STEP = 0.6  # metres and radians: largest change of an unknown in an iteration
-SHORTER = 0.4  # factor that shortens a step after which the sum of squares is too great
-RISES = 1.2  # factor by which a step may raise the sum of squares: limbs that meet push only from then on
-TRIES = 3  # step lengths tried
-LESS = 0.01  # share of the sum of squares: an iteration that gains less is the last
-STILL = 0.004  # metres and radians: an iteration that changes every unknown by less is the last
+MAX_ITERATIONS_PER_PLAN = 4  # iterations after which the terms are planned again at the latest
+DIAGONAL_DAMPING = 0.3  # added to the diagonal, so that unknowns without rows stay
+MAX_STEP_M_RAD = 0.6  # metres and radians: largest change of an unknown in an iteration
+STEP_SHRINK_RATIO = 0.4  # factor that shortens a step after which the sum of squares is too great
+MAX_RISE_RATIO = 1.2  # factor by which a step may raise the sum of squares: limbs that meet push only from then on
+MAX_STEP_TRIES = 3  # step lengths tried
+MIN_GAIN_SHARE = 0.01  # share of the sum of squares: an iteration that gains less is the last
+CONVERGED_M_RAD = 0.004  # metres and radians: an iteration that changes every unknown by less is the last
 
 
 class Problem(NamedTuple):
@@ -68,25 +68,27 @@ def solve(
     least = normal.cost
     for number in range(iterations):
         cost = normal.cost
-        step = normal.step(DAMPING, problem.fixed)
+        step = normal.step(DIAGONAL_DAMPING, problem.fixed)
         broken = [term.foresee(state, step, normal) for term in terms if isinstance(term, OneSided)]
         if any(broken):
             normal.expand(state.mass_jacobian)
-            step = normal.step(DAMPING, problem.fixed)
+            step = normal.step(DIAGONAL_DAMPING, problem.fixed)
         # The root counts as a whole: which way the body faces must not matter.
         greatest = float(max(rot.norm(step[:, :3]).max(), np.abs(step[:, 3:]).max(initial=0.0)))
-        share = min(1.0, 2.0 * farthest, STEP / max(greatest, STILL))
-        for _ in range(TRIES):
+        share = min(1.0, 2.0 * farthest, MAX_STEP_M_RAD / max(greatest, CONVERGED_M_RAD))
+        for _ in range(MAX_STEP_TRIES):
             there = problem.state(state.x + share * step)
             normal = _linearised(there, terms)
-            if normal.cost <= RISES * cost:
+            if normal.cost <= MAX_RISE_RATIO * cost:
                 break
-            share *= SHORTER
+            share *= STEP_SHRINK_RATIO
         state, farthest = there, share
         if normal.cost < least:
             best, least = state, normal.cost
-        settled = share * greatest < STILL or (share == 1.0 and 0.0 <= cost - normal.cost < LESS * cost)
-        if (settled or number % LOOKS == LOOKS - 1) and replan(best):
+        settled = share * greatest < CONVERGED_M_RAD or (
+            share == 1.0 and 0.0 <= cost - normal.cost < MIN_GAIN_SHARE * cost
+        )
+        if (settled or number % MAX_ITERATIONS_PER_PLAN == MAX_ITERATIONS_PER_PLAN - 1) and replan(best):
             state = best
             normal = _linearised(state, terms)
             least = normal.cost  # of other terms

@@ -30,21 +30,21 @@ from motionmind.geometry.splines import natural_spline
 from motionmind.synth.collision import Collision
 from motionmind.synth.gave import Gave
 from motionmind.synth.kinematics import Freedom, State, body_of
-from motionmind.synth.one_sided import EDGE, Balance, Floor, Limits, Speed, Travel
+from motionmind.synth.one_sided import BOUND_TOLERANCE_RATIO, Balance, Floor, Limits, Speed, Travel
 from motionmind.synth.plan import Plan, Stretch, plan_contacts
 from motionmind.synth.solve import Problem, solve
 from motionmind.synth.terms import Ballistic, Contacts, Run, Term, Track
 from motionmind.synth.weights import WEIGHTS, Weights
 
-STILL_RAD = 2e-3  # a joint outside the legs that the reference turns less has no unknowns
-LONG_M = 0.3  # of a person: a joint outside the legs with a shorter reach has no unknowns
-PASSES_S = 0.12  # before legs meet and after they part, in which the plane between them turns; chosen on cmu-05
-SWAYS_S = 0.5  # for a body given out of balance to come over its support
-WINDOW = 400  # frames solved at once
-OVERLAP = 60  # frames at the end of a window that the next one solves again
-ITERATIONS = 16, 10  # most iterations of a first solve, and of one that starts from another
-REPLANS = 2, 0  # times that steps are planned again, in the same
-LENGTHS = "cm", "m/s^2"  # units that scale with the body
+MOTIONLESS_JOINT_RAD = 2e-3  # a joint outside the legs that the reference turns less has no unknowns
+LONG_REACH_M = 0.3  # of a person: a joint outside the legs with a shorter reach has no unknowns
+LEGS_PASS_S = 0.12  # before legs meet and after they part, in which the plane between them turns; chosen on cmu-05
+REGAINS_BALANCE_S = 0.5  # for a body given out of balance to come over its support
+WINDOW_FRAMES = 400  # frames solved at once
+WINDOW_OVERLAP_FRAMES = 60  # frames at the end of a window that the next one solves again
+MAX_ITERATIONS = 16, 10  # most iterations of a first solve, and of one that starts from another
+MAX_REPLANS = 2, 0  # times that steps are planned again, in the same
+LENGTH_UNITS = "cm", "m/s^2"  # units that scale with the body
 LEVEL = np.array([1.0, 0.0, 1.0])
 
 
@@ -139,7 +139,7 @@ def synthesise(
     root = size * state.root
     root[0], root[-1] = given.ends
     gave = tuple(
-        Gave(term, size * most if unit in LENGTHS else most, unit, float(times[frame]))
+        Gave(term, size * most if unit in LENGTH_UNITS else most, unit, float(times[frame]))
         for term, (most, unit, frame) in scene.gave.items()
     )
     return Synthesis(rot.normalise(state.rotations), root, scene.freedom, x, scene.falls(), gave)
@@ -192,22 +192,31 @@ class _Scene:
         self.plans = list(self._planned(x))
         if not self.plans:
             return x
-        starts = [0, *range(WINDOW - OVERLAP, count - OVERLAP, WINDOW - OVERLAP)]
+        starts = [
+            0,
+            *range(
+                WINDOW_FRAMES - WINDOW_OVERLAP_FRAMES,
+                count - WINDOW_OVERLAP_FRAMES,
+                WINDOW_FRAMES - WINDOW_OVERLAP_FRAMES,
+            ),
+        ]
         for begin in starts:
-            frames = slice(begin, min(begin + WINDOW, count))
+            frames = slice(begin, min(begin + WINDOW_FRAMES, count))
             problem = self.problem(frames)
             if begin:
                 problem.fixed[:2] = True
             terms = self._terms(frames, self.ground.root[frames] + x[frames, :3])
             which = 0 if self.before is None else 1
-            replan = self._replanner(frames, terms, REPLANS[which])
-            state = solve(problem, terms, x[frames], replan, ITERATIONS[which])
+            replan = self._replanner(frames, terms, MAX_REPLANS[which])
+            state = solve(problem, terms, x[frames], replan, MAX_ITERATIONS[which])
             x[frames] = state.x
             for term in terms:
-                last = count if frames.stop == count else frames.stop - OVERLAP  # the next window solves the rest again
+                last = (
+                    count if frames.stop == count else frames.stop - WINDOW_OVERLAP_FRAMES
+                )  # the next window solves the rest again
                 off, name = term.gives(state)[: last - begin], type(term).__name__
                 worst = int(np.argmax(off))
-                if term.unit and off[worst] > self.gave.get(name, (EDGE,))[0]:
+                if term.unit and off[worst] > self.gave.get(name, (BOUND_TOLERANCE_RATIO,))[0]:
                     self.gave[name] = float(off[worst]), term.unit, begin + worst
         return x
 
@@ -263,13 +272,13 @@ class _Scene:
         if len(self.freedom.joints):
             terms.append(Limits(self.reference[self.fixed], bounds.loose, w.limits))
         if self.body.weighs and "balance" not in self.without:
-            away = np.arange(len(self.reference)) / (SWAYS_S * fps)
+            away = np.arange(len(self.reference)) / (REGAINS_BALANCE_S * fps)
             near = 1.0 - _eased(np.stack([away, away[::-1]]))
             balance = self._touches(frames), floor, self.overhang, w.room, near[:, frames], self.gravity, fps, w.balance
             terms.append(Balance(*balance))
         if "limbs" not in self.without and len(capsules_of(self.skeleton).names):
             usual = np.maximum(bounds.touches, w.touches)
-            terms.append(Collision(usual, w.collision, max(1, round(PASSES_S * fps))))
+            terms.append(Collision(usual, w.collision, max(1, round(LEGS_PASS_S * fps))))
         if bounds.fastest is not None:
             terms.append(Speed(bounds.fastest, bounds.turns, fps, w.speed))
         for axes, most in ((LEVEL, bounds.travels), (1.0 - LEVEL, bounds.rises)):
@@ -327,10 +336,10 @@ def _freedom(skeleton: Skeleton, fixed: Bools, reference: Floats) -> Freedom:
     A joint that must not change has none, nor has a joint outside the legs that the reference does not turn. Knees and
     elbows are hinges.
     """
-    moves = rot.angle(reference, reference[:1]).max(axis=0) > STILL_RAD
+    moves = rot.angle(reference, reference[:1]).max(axis=0) > MOTIONLESS_JOINT_RAD
     joints, axes, legs, reach = [], [], _in_legs(skeleton), _reach(skeleton)
     # The first joint of a long limb is a collarbone.
-    chosen = reach > LONG_M
+    chosen = reach > LONG_REACH_M
     chosen[[limb[0] for limb in limbs_of(skeleton) if len(limb) > 3]] = False
     for joint in range(len(skeleton)):
         free = legs[joint] <= 1 if joint in legs else chosen[joint]

@@ -12,7 +12,7 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Indices
 from motionmind.jit import jit
 
-SPAN = 3  # frames that a row may span
+ROW_SPAN_FRAMES = 3  # frames that a row may span
 
 
 class Normal:
@@ -27,10 +27,10 @@ class Normal:
     """
 
     def __init__(self, frames: int, unknowns: int) -> None:
-        self.blocks = np.zeros((frames, unknowns, SPAN * unknowns))
+        self.blocks = np.zeros((frames, unknowns, ROW_SPAN_FRAMES * unknowns))
         self.gradient = np.zeros((frames, unknowns))
         self.cost = 0.0
-        self.weights = np.zeros((SPAN, frames, 3, 3))
+        self.weights = np.zeros((ROW_SPAN_FRAMES, frames, 3, 3))
         self.pull = np.zeros((frames, 3))
 
     def block(self, k: int) -> Floats:
@@ -48,9 +48,9 @@ class Normal:
             weight: of their squares [R].
         """
         weighted = ways * weight[:, None, None]
-        for a in range(SPAN):
+        for a in range(ROW_SPAN_FRAMES):
             self.pull[first + a] += weighted[:, a] * residual[:, None]
-            for b in range(a, SPAN):
+            for b in range(a, ROW_SPAN_FRAMES):
                 self.weights[b - a, first + a] += weighted[:, a, :, None] * ways[:, b, None, :]
 
     def add_joint(self, first: Indices, columns: slice, jacobian: Floats, residual: Floats, weight: float) -> None:
@@ -73,7 +73,7 @@ class Normal:
         """Turn rows in the centre of mass into rows in the unknowns, by its Jacobian [N, 3, n]."""
         self.gradient += np.einsum("txi,tx->ti", jacobian, self.pull)
         across = np.ascontiguousarray(np.swapaxes(jacobian, 1, 2))
-        for k in range(SPAN):
+        for k in range(ROW_SPAN_FRAMES):
             count = len(jacobian) - k
             self.block(k)[:count] += across[:count] @ (self.weights[k, :count] @ jacobian[k:])
         self.weights[:], self.pull[:] = 0.0, 0.0
@@ -85,7 +85,7 @@ class Normal:
         step[fixed] = 0.0
         blocks = self.blocks.copy()
         blocks[fixed] = 0.0
-        for k in range(1, SPAN):
+        for k in range(1, ROW_SPAN_FRAMES):
             blocks[:-k, :, k * n : (k + 1) * n][fixed[k:]] = 0.0
         diagonal = np.arange(n)
         blocks[:, diagonal, diagonal] += np.where(fixed[:, None], 1.0, damping)

@@ -24,19 +24,23 @@ from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.trust import NO_WAY, PRIOR, Squares, Trust, counts, fit_table
-from motionmind.walks.likelihood import SIZES
+from motionmind.walks.likelihood import BODY_PART_WEIGHTS
 from motionmind.walks.mean_walk import Walk, walk_between
 from motionmind.walks.minimal import departure, minimal_movement
 from motionmind.walks.stops import Stop, stop_at
 
-LENGTHS = (0.4, 0.6, 1.2, 2.0, 4.0)  # window lengths, seconds
-BRIEF = LENGTHS[1:3]  # window lengths at which end velocities matter most
-WINDOWS = 12  # windows per length, evenly spread over the clips
-MOST = 2_000  # postures to learn from, about: the time per window is proportional to it
-PIECES = 8  # least number of clips to take them from
-PAIRS = 1_000  # random pairs of postures
-FEWEST = 3  # least number of clip families: with two, each is judged by the other alone
-LASTS = (0.3, 0.45, 0.6)  # candidate decay times of end velocities, seconds; 1.0 cost a take of cmu-29 23 points
+WINDOW_LENGTHS_S = (0.4, 0.6, 1.2, 2.0, 4.0)  # window lengths, seconds
+BRIEF_LENGTHS_S = WINDOW_LENGTHS_S[1:3]  # window lengths at which end velocities matter most
+N_WINDOWS_PER_LENGTH = 12  # windows per length, evenly spread over the clips
+N_POSTURES_TO_LEARN_FROM = 2_000  # postures to learn from, about: the time per window is proportional to it
+MIN_CLIPS = 8  # least number of clips to take them from
+N_RANDOM_PAIRS = 1_000  # random pairs of postures
+MIN_FAMILIES = 3  # least number of clip families: with two, each is judged by the other alone
+DECAY_CANDIDATES_S = (
+    0.3,
+    0.45,
+    0.6,
+)  # candidate decay times of end velocities, seconds; 1.0 cost a take of cmu-29 23 points
 
 
 class _Piece(NamedTuple):
@@ -73,11 +77,13 @@ def learn_trust(corpus: Corpus, carriage: Carriage, workshop: Workshop | None = 
         workshop: threads; None for the current one.
     """
     spread = spread_of(corpus, carriage)
-    evidence = gather_evidence(corpus, carriage, WINDOWS, workshop) if len(corpus.clips) >= FEWEST else []
-    if len(evidence) < FEWEST:
+    evidence = (
+        gather_evidence(corpus, carriage, N_WINDOWS_PER_LENGTH, workshop) if len(corpus.clips) >= MIN_FAMILIES else []
+    )
+    if len(evidence) < MIN_FAMILIES:
         return replace(PRIOR, spread=spread)
-    errors = errors_of_lasting(corpus, 2 * WINDOWS)
-    lasts = LASTS[int(np.argmin(errors))] if errors.any() else PRIOR.lasts[0]
+    errors = errors_of_lasting(corpus, 2 * N_WINDOWS_PER_LENGTH)
+    lasts = DECAY_CANDIDATES_S[int(np.argmin(errors))] if errors.any() else PRIOR.lasts[0]
     return Trust(fit_table(evidence, PRIOR.table), np.array([lasts]), spread)
 
 
@@ -91,7 +97,7 @@ def gather_evidence(corpus: Corpus, carriage: Carriage, count: int, workshop: Wo
         workshop: threads; None for the current one.
     """
     pieces, spread = [piece for piece in _pieces(corpus) if piece.stop - piece.start > 1], spread_of(corpus, carriage)
-    windows = [window for seconds in LENGTHS for window in _windows(corpus, pieces, seconds, count)]
+    windows = [window for seconds in WINDOW_LENGTHS_S for window in _windows(corpus, pieces, seconds, count)]
     families = sorted({window.piece.family for window in windows})
     if len({piece.family for piece in pieces}) < 2:
         return []
@@ -106,7 +112,7 @@ def gather_evidence(corpus: Corpus, carriage: Carriage, count: int, workshop: Wo
 
 def spread_of(corpus: Corpus, carriage: Carriage) -> Floats:
     """Return the RMS distance per joint between two random postures, for each body part [P], radians."""
-    one, other = np.random.default_rng(0).integers(len(corpus), size=(2, PAIRS))
+    one, other = np.random.default_rng(0).integers(len(corpus), size=(2, N_RANDOM_PAIRS))
     turned = rot.angle(carriage.orientations[one], carriage.orientations[other]) ** 2
     return np.array([max(float(np.sqrt(turned[:, part].mean())), NO_WAY) for part in parts_of(corpus.skeleton)])
 
@@ -150,12 +156,16 @@ def _pieces(corpus: Corpus) -> list[_Piece]:
     """Choose pieces of clips that represent a corpus, with about MOST postures in total at most."""
     starts = corpus.columns.starts
     numbers = np.arange(len(starts) - 1)
-    if len(corpus) > MOST:
-        share = max(MOST / len(corpus), PIECES / len(numbers))
+    if len(corpus) > N_POSTURES_TO_LEARN_FROM:
+        share = max(N_POSTURES_TO_LEARN_FROM / len(corpus), MIN_CLIPS / len(numbers))
         numbers = numbers[
             np.unique((np.arange(0.0, 1.0, 1.0 / max(share * len(numbers), 1.0)) * len(numbers)).astype(int))
         ]
-    longest = max(MOST // PIECES, MOST // len(numbers)) if len(corpus) > MOST else len(corpus)
+    longest = (
+        max(N_POSTURES_TO_LEARN_FROM // MIN_CLIPS, N_POSTURES_TO_LEARN_FROM // len(numbers))
+        if len(corpus) > N_POSTURES_TO_LEARN_FROM
+        else len(corpus)
+    )
     out = []
     for number in numbers.tolist():
         clip = corpus.clips[number]
@@ -208,7 +218,7 @@ def _squares(corpus: Corpus, carriage: Carriage, others: Carriage, spread: Float
 def _of_joints(walk: Walk, spread: Floats) -> Floats:
     """Return the weight of each table entry in the share of each joint [J, 5]."""
     of_parts = counts(walk.nearest.mean(axis=1), walk.ways, spread)
-    return np.asarray(np.einsum("k,jkc->jc", np.array(SIZES), of_parts[walk.members]))
+    return np.asarray(np.einsum("k,jkc->jc", np.array(BODY_PART_WEIGHTS), of_parts[walk.members]))
 
 
 def errors_of_lasting(corpus: Corpus, count: int) -> Floats:
@@ -219,8 +229,8 @@ def errors_of_lasting(corpus: Corpus, count: int) -> Floats:
         corpus: the movement.
         count: windows per length.
     """
-    pieces, out = _pieces(corpus), np.zeros(len(LASTS))
-    for window in (window for seconds in BRIEF for window in _windows(corpus, pieces, seconds, count)):
+    pieces, out = _pieces(corpus), np.zeros(len(DECAY_CANDIDATES_S))
+    for window in (window for seconds in BRIEF_LENGTHS_S for window in _windows(corpus, pieces, seconds, count)):
         clip = corpus.clips[window.piece.clip]
         if clip.start < window.first and window.last < clip.stop - 1:
             out += _errors_in(corpus, clip, window)
@@ -240,8 +250,8 @@ def _errors_in(corpus: Corpus, clip: Clip, window: _Window) -> Floats:
     true, times = corpus.to_chains(motion.rotations)[:, : len(skeleton)], motion.times
     truly = rot.log(rot.inv_mul(minimal_movement(true[[0, -1]], times, None, None), true))
     even = rot.log(rot.inv_mul(true[0], true[-1])) / (times[-1] - times[0])
-    out = np.empty(len(LASTS))
-    for k, lasts in enumerate(LASTS):
+    out = np.empty(len(DECAY_CANDIDATES_S))
+    for k, lasts in enumerate(DECAY_CANDIDATES_S):
         off = truly - departure(times, leaves.joints - even, arrives.joints - even, lasts=lasts)
         out[k] = np.sqrt(np.sum(off**2, axis=-1) @ _carried(skeleton)).mean()
     return out

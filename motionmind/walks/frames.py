@@ -18,10 +18,10 @@ from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import postures_near
 from motionmind.walks.likelihood import squared_distances
 
-NEAREST = 8  # neighbours sought for each posture of a movement, in a large corpus
-BESIDE = 8  # postures taken before and after each neighbour, at least
-LEAVES = 32  # tree leaves searched for the neighbours
-KNOTS = 4  # spline knots beyond each end of a stretch: farther ones change it by a hundredth
+N_FRAME_NEIGHBORS = 8  # neighbours sought for each posture of a movement, in a large corpus
+N_POSTURES_BESIDE = 8  # postures taken before and after each neighbour, at least
+N_LEAVES_SEARCHED = 32  # tree leaves searched for the neighbours
+N_KNOTS_BEYOND = 4  # spline knots beyond each end of a stretch: farther ones change it by a hundredth
 
 
 class Frames(NamedTuple):
@@ -49,20 +49,26 @@ def all_frames(corpus: Corpus) -> Frames:
     return _joined([_sample(corpus, int(a), int(b) - 1, (int(a), int(b))) for a, b in pairwise(starts)])
 
 
-def frames_near(corpus: Corpus, carriage: Carriage, poses: Floats, beside: int = BESIDE) -> Frames:
+def frames_near(corpus: Corpus, carriage: Carriage, poses: Floats, beside: int = N_POSTURES_BESIDE) -> Frames:
     """Return the recordings within `beside` postures of the neighbours of `poses` [K, J, 4]; all recordings of a
     corpus without trees."""
     if carriage.trees is None:
         return all_frames(corpus)
     count, starts = len(corpus), corpus.columns.starts
-    near = [postures_near(carriage.trees, carriage.orientations, pose, NEAREST, count, LEAVES) for pose in poses]
+    near = [
+        postures_near(carriage.trees, carriage.orientations, pose, N_FRAME_NEIGHBORS, count, N_LEAVES_SEARCHED)
+        for pose in poses
+    ]
     around = np.unique(np.clip(np.concatenate(near)[:, None] + np.arange(-beside, beside + 1), 0, count - 1))
     clips = np.searchsorted(starts, around, side="right") - 1
     breaks = np.flatnonzero((np.diff(around) > 1) | (np.diff(clips) > 0)) + 1
     parts = []
     for run in np.split(around, breaks):
         clip = int(np.searchsorted(starts, run[0], side="right")) - 1
-        known = max(int(run[0]) - KNOTS, int(starts[clip])), min(int(run[-1]) + KNOTS + 1, int(starts[clip + 1]))
+        known = (
+            max(int(run[0]) - N_KNOTS_BEYOND, int(starts[clip])),
+            min(int(run[-1]) + N_KNOTS_BEYOND + 1, int(starts[clip + 1])),
+        )
         parts.append(_sample(corpus, int(run[0]), int(run[-1]), known))
     return _joined(parts)
 
@@ -117,7 +123,14 @@ def frames_of(corpus: Corpus, clip: int, begin: float, end: float) -> Frames:
     lower = first + max(int(np.searchsorted(times, begin, side="right")) - 1, 0)
     upper = first + min(int(np.searchsorted(times, end)), stop - first - 1)
     return _joined(
-        [_sample(corpus, lower, max(upper, lower), (max(lower - KNOTS, first), min(upper + KNOTS + 1, stop)))]
+        [
+            _sample(
+                corpus,
+                lower,
+                max(upper, lower),
+                (max(lower - N_KNOTS_BEYOND, first), min(upper + N_KNOTS_BEYOND + 1, stop)),
+            )
+        ]
     )
 
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
-from motionmind.walks.minimal import LASTS, departure
+from motionmind.walks.minimal import END_VELOCITY_DECAY_S, departure
 
-NEARLY = np.radians(150.0)  # turns from here to 180 degrees may go either way
-SPINS = 4.0  # rad/s: a body that turns faster at an end continues as the corpus does, even the long way round
-RUN = 0.5  # seconds for which a turning body keeps turning
+HALF_TURN_FROM_RAD = np.radians(150.0)  # turns from here to 180 degrees may go either way
+SPIN_RADPS = 4.0  # rad/s: a body that turns faster at an end continues as the corpus does, even the long way round
+KEEPS_TURNING_S = 0.5  # seconds for which a turning body keeps turning
 
 
 def turn_with_walks(
@@ -24,7 +24,7 @@ def turn_with_walks(
     facing: Mapping[int, Floats],
     rates: tuple[float | None, float | None],
     near: bool = False,
-    lasts: float = LASTS,
+    lasts: float = END_VELOCITY_DECAY_S,
 ) -> Floats:
     """Return unwrapped headings [2 T + 1] of a body that turns as the walks do and meets the given facings.
 
@@ -47,9 +47,9 @@ def turn_with_walks(
         near: turn the short way from each facing to the next.
         lasts: seconds for which a turning rate at an end has effect, at most.
     """
-    spins = [rate for rate in rates if rate is not None and abs(rate) >= SPINS]
+    spins = [rate for rate in rates if rate is not None and abs(rate) >= SPIN_RADPS]
     varies = np.maximum(spread - turn**2, 1e-4)
-    variance = varies.sum() * RUN * len(turn) / (half_steps[-1] - half_steps[0])
+    variance = varies.sum() * KEEPS_TURNING_S * len(turn) / (half_steps[-1] - half_steps[0])
     turn = trust * turn * (turn.sum() ** 2 / (turn.sum() ** 2 + variance))
     varies = trust * varies + (1.0 - trust) * varies.mean()
     out = np.concatenate([[0.0], np.cumsum(turn)]) + rot.heading(facing[0])
@@ -59,7 +59,7 @@ def turn_with_walks(
         way -= 2.0 * np.pi * np.round(way / (2.0 * np.pi))
         missing -= 2.0 * np.pi * np.round(missing / (2.0 * np.pi))
         if near:  # at most one extra turn, for a spin or a turn of nearly 180 degrees
-            either = abs(way) >= NEARLY
+            either = abs(way) >= HALF_TURN_FROM_RAD
             fewest = -int(either or any(rate < 0.0 for rate in spins))
             most = int(either or any(rate > 0.0 for rate in spins))
             turns = np.round((out[end] + missing - out[start] - way) / (2.0 * np.pi))

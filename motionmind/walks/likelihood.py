@@ -21,19 +21,19 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Ints
 from motionmind.jit import jit, read_only
 
-# Standard deviation of a walk's ends about the given postures, radians per joint: OF_NEAREST times the distance of the
-# corpus's nearest posture, clipped to ENDS_WITHIN. Where movement recurs, the nearest postures predict best.
-ENDS_WITHIN = 0.03, 0.09
-OF_NEAREST = 0.75
-LEAVES_WITHIN = 1.0  # standard deviation of its joint velocities about the given ones, rad/s per joint
-TURNS_WITHIN = 1.0  # standard deviation of the body's turning rate, rad/s
-TRAVELS_WITHIN = 0.5  # standard deviation of the travel velocity, m/s
-FOLLOWS_WITHIN = 0.35  # standard deviation about a given path, radians per joint
-SIZES = (0.25, 0.25, 0.5)  # weights of walks of the whole body, a joint's half of it, and the joint's limb
-STRAIGHT_ON = 0.6  # probability that a walk continues in its clip after a step
-AT_ONCE = 32  # samples read side by side, so that their memory latencies overlap
-_BLOCK = 256  # samples measured at a time: their sums fit the processor's cache
-ANYWHERE = 0.006  # probability of a jump to any posture after a step: some walk joins any two
+# Standard deviation of a walk's ends about the given postures, radians per joint: END_SD_NEAREST_SHARE times the
+# distance of the corpus's nearest posture, clipped to END_SD_RAD. Where movement recurs, the nearest predict best.
+END_SD_RAD = 0.03, 0.09
+END_SD_NEAREST_SHARE = 0.75
+END_VELOCITY_SD_RADPS = 1.0  # standard deviation of its joint velocities about the given ones, rad/s per joint
+END_TURN_SD_RADPS = 1.0  # standard deviation of the body's turning rate, rad/s
+END_TRAVEL_SD_MPS = 0.5  # standard deviation of the travel velocity, m/s
+PATH_SD_RAD = 0.35  # standard deviation about a given path, radians per joint
+BODY_PART_WEIGHTS = (0.25, 0.25, 0.5)  # weights of walks of the whole body, a joint's half of it, and the joint's limb
+P_CONTINUE = 0.6  # probability that a walk continues in its clip after a step
+N_INTERLEAVED = 32  # samples read side by side, so that their memory latencies overlap
+_N_PER_BLOCK = 256  # samples measured at a time: their sums fit the processor's cache
+P_TELEPORT = 0.006  # probability of a jump to any posture after a step: some walk joins any two
 
 
 def squared_distances(orientations: Floats, members: Ints, parts: int, postures: Floats) -> Floats:
@@ -53,9 +53,13 @@ def squared_distances(orientations: Floats, members: Ints, parts: int, postures:
 @jit
 def _sums_of_squares(orientations: Floats, members: Ints, parts: int, postures: Floats) -> Floats:
     """Return the distances of `squared_distances` as sums over joints, not means [P, K, N]."""
-    out, shown, own = np.zeros((parts, len(postures), len(orientations))), np.empty((4, _BLOCK)), np.empty(_BLOCK)
-    for first in range(0, len(orientations), _BLOCK):
-        count = min(_BLOCK, len(orientations) - first)
+    out, shown, own = (
+        np.zeros((parts, len(postures), len(orientations))),
+        np.empty((4, _N_PER_BLOCK)),
+        np.empty(_N_PER_BLOCK),
+    )
+    for first in range(0, len(orientations), _N_PER_BLOCK):
+        count = min(_N_PER_BLOCK, len(orientations) - first)
         for joint in range(len(members)):
             for i in range(count):  # contiguous, for vector instructions
                 for c in range(4):
@@ -82,8 +86,8 @@ def show(orientations: Floats, moments: Ints, part: Ints) -> Floats:
         part: the joints of the part [m].
     """
     out = np.empty((len(part), len(moments), 4))
-    for first in range(0, len(moments), AT_ONCE):
-        here = moments[first : first + AT_ONCE]
+    for first in range(0, len(moments), N_INTERLEAVED):
+        here = moments[first : first + N_INTERLEAVED]
         for i in range(len(here)):  # prefetch: request the memory of all before waiting for the first
             touched = 0.0
             for j in range(0, len(part), 2):
@@ -105,9 +109,9 @@ def distances_of(shown: Floats, postures: Floats) -> Floats:
         postures: of the part [K, m, 4].
     """
     joints, count, _ = shown.shape
-    out, own = np.zeros((len(postures), count)), np.empty((4, AT_ONCE))
-    for first in range(0, count, AT_ONCE):
-        many = min(AT_ONCE, count - first)
+    out, own = np.zeros((len(postures), count)), np.empty((4, N_INTERLEAVED))
+    for first in range(0, count, N_INTERLEAVED):
+        many = min(N_INTERLEAVED, count - first)
         for j in range(joints):
             for i in range(many):
                 for c in range(4):
@@ -134,8 +138,8 @@ def variance_at_ends(nearest: float) -> float:
     Args:
         nearest: distance of the corpus's nearest sample from the posture, radians per joint.
     """
-    least, most = ENDS_WITHIN
-    return min(max(OF_NEAREST * nearest, least), most) ** 2
+    least, most = END_SD_RAD
+    return min(max(END_SD_NEAREST_SHARE * nearest, least), most) ** 2
 
 
 def nearest_to_ends(off: Floats) -> tuple[float, float]:
@@ -155,7 +159,7 @@ def in_variances(off: Floats, of_first: float, of_last: float) -> Floats:
         off: squared distances from the first posture, the last, and those of a path [K, n], radians^2.
         of_first, of_last: variances of walks' ends about the given postures, radians^2.
     """
-    variances = np.full((len(off), 1), FOLLOWS_WITHIN**2)
+    variances = np.full((len(off), 1), PATH_SD_RAD**2)
     variances[:2, 0] = of_first, of_last
     return np.asarray(off / variances)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.jit import jit
-from motionmind.walks.likelihood import ANYWHERE, STRAIGHT_ON
+from motionmind.walks.likelihood import P_CONTINUE, P_TELEPORT
 
 
 @jit
@@ -30,8 +30,8 @@ def posterior_marginals(
         weights: of the samples [N], above 0.
         near: likelihood of each sample at each step [S + 1, N].
     """
-    over = (1.0 - STRAIGHT_ON - ANYWHERE) / np.bincount(clusters, weights)
-    anywhere = ANYWHERE / weights.sum()
+    over = (1.0 - P_CONTINUE - P_TELEPORT) / np.bincount(clusters, weights)
+    anywhere = P_TELEPORT / weights.sum()
     out = _forward_messages(begins, ends, shares, clusters, weights, over, anywhere, near)
     _times_backward_messages(out, begins, ends, shares, clusters, weights, over, anywhere, near)
     return out
@@ -50,7 +50,7 @@ def _forward_messages(
 ) -> Floats:
     """Return alpha [S + 1, N] with alpha[t] = near[t] * mixed(alpha[t - 1] moved on by a step), rows scaled to sum 1.
 
-    Mixing keeps the share STRAIGHT_ON of the mass in each sample. Each sample also receives its weight times
+    Mixing keeps the share P_CONTINUE of the mass in each sample. Each sample also receives its weight times
     (over[k] * mass in its cluster k + anywhere * total mass).
     """
     out = np.empty_like(near)
@@ -65,7 +65,7 @@ def _forward_messages(
         whole = anywhere * _pool(came, clusters, pooled)
         shared = over * pooled[0] + whole
         for i in range(len(came)):
-            out[t, i] = near[t, i] * (STRAIGHT_ON * came[i] + weights[i] * shared[clusters[i]])
+            out[t, i] = near[t, i] * (P_CONTINUE * came[i] + weights[i] * shared[clusters[i]])
         _scale(out[t])
     return out
 
@@ -93,7 +93,7 @@ def _times_backward_messages(
         whole = anywhere * _pool(weighs, clusters, pooled)
         shared = over * pooled[0]
         for i in range(len(on)):
-            on[i] = STRAIGHT_ON * on[i] + shared[clusters[i]] + whole
+            on[i] = P_CONTINUE * on[i] + shared[clusters[i]] + whole
         back[:] = 0.0
         for m in range(len(begins)):
             back[begins[m]] += shares[m] * on[ends[m]]

@@ -21,10 +21,10 @@ from motionmind.jit import jit, read_only
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.trust import Trust
 from motionmind.walks.likelihood import (
-    LEAVES_WITHIN,
-    SIZES,
-    TRAVELS_WITHIN,
-    TURNS_WITHIN,
+    BODY_PART_WEIGHTS,
+    END_TRAVEL_SD_MPS,
+    END_TURN_SD_RADPS,
+    END_VELOCITY_SD_RADPS,
     by_step,
     distances_of,
     in_variances,
@@ -41,9 +41,11 @@ from motionmind.walks.minimal import departure, minimal_movement
 from motionmind.walks.sparse import Chosen, all_of, choose, merged, steps_on
 from motionmind.walks.stops import Rates, Stop
 
-STRIDE = 0.5  # radians per joint that count as much as travelling one body height; chosen on cmu-05 and cmu-16
-THREADS = min(4, os.cpu_count() or 1)  # one body part each at a time; results do not depend on the number
-BUSY = 4000  # samples per thread: with fewer, another thread costs more than it saves
+RAD_PER_BODY_HEIGHT = (
+    0.5  # radians per joint that count as much as travelling one body height; chosen on cmu-05 and cmu-16
+)
+N_THREADS = min(4, os.cpu_count() or 1)  # one body part each at a time; results do not depend on the number
+MIN_SAMPLES_PER_THREAD = 4000  # samples per thread: with fewer, another thread costs more than it saves
 
 _Item = TypeVar("_Item")
 _Made = TypeVar("_Made")
@@ -132,7 +134,9 @@ class Walk(NamedTuple):
 
     def trusted(self, trust: Trust) -> Floats:
         """Return the share of the departure that each joint keeps [J], from 0 to 1."""
-        return np.asarray(trust.shares(self.nearest.mean(axis=1), self.ways)[self.members] @ np.array(SIZES))
+        return np.asarray(
+            trust.shares(self.nearest.mean(axis=1), self.ways)[self.members] @ np.array(BODY_PART_WEIGHTS)
+        )
 
 
 class _PartWalk(NamedTuple):
@@ -217,7 +221,7 @@ def walk_between(
     def off(postures: Floats) -> Floats:
         return squared_distances(shown, members, len(parts), postures)
 
-    threads = min(THREADS, 1 + len(carriage.weights) // BUSY)
+    threads = min(N_THREADS, 1 + len(carriage.weights) // MIN_SAMPLES_PER_THREAD)
     with ThreadPoolExecutor(threads - 1) if threads > 1 else Here() as pool:
         distances = []
         if trees is None:
@@ -237,7 +241,7 @@ def walk_between(
             likely, nearest[number], left_out = _likely(part, chosen, rates, ends, own)
             begins, goals, shares = steps_on(chosen, likely[0])
             steps = read_only(begins), read_only(goals), read_only(shares), chosen.clusters, read_only(chosen.weights)
-            size = float(np.dot((members == number).any(axis=0), SIZES))
+            size = float(np.dot((members == number).any(axis=0), BODY_PART_WEIGHTS))
             found = _marginals(*steps, likely, len(times), size, trees is not None)
             return _PartWalk(chosen, here, *found, left_out)
 
@@ -291,7 +295,7 @@ def _members(parts: tuple[Ints, ...], joints: int) -> tuple[Ints, dict[tuple[int
     inside = np.zeros((joints, len(parts)), dtype=np.bool_)
     for number, part in enumerate(parts):
         inside[part, number] = True
-    members = np.nonzero(inside)[1].reshape(joints, len(SIZES))
+    members = np.nonzero(inside)[1].reshape(joints, len(BODY_PART_WEIGHTS))
     groups: dict[tuple[int, ...], list[int]] = {}
     for joint, numbers in enumerate(members.tolist()):
         groups.setdefault(tuple(numbers), []).append(joint)
@@ -369,7 +373,7 @@ def _way(part: Ints, ends: tuple[Stop, Stop], seconds: float, lasts: float) -> f
     rates = [stop.rates.joints[part] for stop in ends if stop.rates is not None]
     speed = float(np.mean([np.sum(rate**2, axis=-1).mean() for rate in rates])) if rates else 0.0
     travel = float(np.sum((ends[1].place - ends[0].place) ** 2))
-    return float(np.sqrt(turn + (min(seconds, lasts) / 3.0) ** 2 * speed + STRIDE**2 * travel))
+    return float(np.sqrt(turn + (min(seconds, lasts) / 3.0) ** 2 * speed + RAD_PER_BODY_HEIGHT**2 * travel))
 
 
 def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
@@ -380,10 +384,10 @@ def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
     if rates is None or stop.rates is None:
         return []
     joints = squared_differences(np.ascontiguousarray(rates.joints[:, part]), stop.rates.joints[part])
-    terms = [joints / LEAVES_WITHIN**2]
+    terms = [joints / END_VELOCITY_SD_RADPS**2]
     if part[0] == 0:
-        terms.append((rates.turn - stop.rates.turn) ** 2 / TURNS_WITHIN**2)
-        terms.append(np.sum((rates.travel - stop.rates.travel) ** 2, axis=1) / TRAVELS_WITHIN**2)
+        terms.append((rates.turn - stop.rates.turn) ** 2 / END_TURN_SD_RADPS**2)
+        terms.append(np.sum((rates.travel - stop.rates.travel) ** 2, axis=1) / END_TRAVEL_SD_MPS**2)
     return terms
 
 
@@ -400,5 +404,7 @@ def _mixed(whole: Floats, half: Floats, limb: Floats) -> Floats:
     out = np.empty_like(limb)
     for t in range(len(out)):
         for i in range(out.shape[1]):
-            out[t, i] = SIZES[2] * limb[t, i] + (SIZES[0] * whole[t, i] + SIZES[1] * half[t, i])
+            out[t, i] = BODY_PART_WEIGHTS[2] * limb[t, i] + (
+                BODY_PART_WEIGHTS[0] * whole[t, i] + BODY_PART_WEIGHTS[1] * half[t, i]
+            )
     return out

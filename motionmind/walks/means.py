@@ -9,7 +9,7 @@ from motionmind.jit import jit
 
 # A mean ignores orientations of less weight; from here to twice as much, the effective weight rises from 0 to its own.
 # At a sudden threshold, rounding would decide whether an orientation is in the mean.
-COUNTS = 1e-6
+NEGLIGIBLE_WEIGHT_RATIO = 1e-6
 
 
 @jit
@@ -61,7 +61,7 @@ def that_count(weights: Floats) -> Ints:
     for t in range(1, len(weights)):
         for i in range(len(most)):
             most[i] = max(most[i], weights[t, i])
-    return np.flatnonzero(most > COUNTS)
+    return np.flatnonzero(most > NEGLIGIBLE_WEIGHT_RATIO)
 
 
 @jit
@@ -80,7 +80,7 @@ def counted(size: float, weights: Floats, counts: Ints) -> Floats:
     for i in range(len(counts)):
         for t in range(len(weights)):
             weight = size * weights[t, counts[i]]
-            out[i, t] = max(min(weight, 2.0 * (weight - COUNTS)), 0.0)
+            out[i, t] = max(min(weight, 2.0 * (weight - NEGLIGIBLE_WEIGHT_RATIO)), 0.0)
     return out
 
 

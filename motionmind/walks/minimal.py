@@ -11,7 +11,9 @@ import numpy as np
 from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
 
-LASTS = 0.45  # seconds for which a velocity at an end has effect, at most, unless a corpus shows otherwise
+END_VELOCITY_DECAY_S = (
+    0.45  # seconds for which a velocity at an end has effect, at most, unless a corpus shows otherwise
+)
 
 
 def departure(
@@ -19,7 +21,7 @@ def departure(
     leaving: Floats | None,
     arriving: Floats | None,
     until: tuple[float, float] | None = None,
-    lasts: float = LASTS,
+    lasts: float = END_VELOCITY_DECAY_S,
 ) -> Floats:
     """Return the cubic that is 0 at both ends and has the given rates there: [S + 1, ...].
 
@@ -43,7 +45,7 @@ def departure(
 
 
 def minimal_movement(
-    ends: Floats, times: Floats, leaving: Floats | None, arriving: Floats | None, lasts: float = LASTS
+    ends: Floats, times: Floats, leaving: Floats | None, arriving: Floats | None, lasts: float = END_VELOCITY_DECAY_S
 ) -> Floats:
     """Return orientations [S + 1, m, 4] from ends[0] to ends[1].
 

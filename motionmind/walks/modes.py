@@ -18,10 +18,10 @@ from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import Carriage
 from motionmind.walks.frames import Frames, frames_near
-from motionmind.walks.passages import SLOWEST, STRIDE, WARP_COST, WARPS, Place, distances
+from motionmind.walks.passages import MAX_TEMPO_RATIO, NODE_FRAMES, WARP_COST_RAD2, WARP_FRAMES, Place, distances
 from motionmind.walks.stops import Stop
 
-LIKELIEST = 16  # passages to choose from
+N_CANDIDATE_PASSAGES = 16  # passages to choose from
 
 
 def find_modes(
@@ -37,9 +37,11 @@ def find_modes(
         known: orientations of the joints [K, J, 4] in each known movement, at even times from its first posture to its
             last; the caller appends each yielded one.
     """
-    steps, joints = max(1, round(seconds * RATE / STRIDE)), known[0].shape[1]
+    steps, joints = max(1, round(seconds * RATE / NODE_FRAMES)), known[0].shape[1]
     poses = np.stack([stop.chains[:joints] for stop in ends])
-    beside = int(np.ceil(SLOWEST * seconds / float(np.median(corpus.moves.seconds)))) if len(corpus.moves) else 0
+    beside = (
+        int(np.ceil(MAX_TEMPO_RATIO * seconds / float(np.median(corpus.moves.seconds)))) if len(corpus.moves) else 0
+    )
     recorded = frames_near(corpus, carriage, poses, beside)
     passages = _likeliest(recorded, ends, poses, steps)
     shown = [_held_to_ends(recorded, passage, poses, len(known[0])) for passage in passages]
@@ -62,7 +64,7 @@ def _likeliest(recorded: Frames, ends: tuple[Stop, Stop], poses: Floats, steps: 
     total = total + last
     found: list[tuple[int, int]] = []
     for end in np.argsort(total, kind="stable").tolist():
-        if len(found) == LIKELIEST or not np.isfinite(total[end]):
+        if len(found) == N_CANDIDATE_PASSAGES or not np.isfinite(total[end]):
             break
         begin = int(begins[end])
         if all(min(end, other) - max(begin, one) <= 0.5 * min(end - begin, other - one) for one, other in found):
@@ -79,11 +81,11 @@ def _from_start_to_end(stretches: Ints, costs: Floats, steps: int) -> tuple[Floa
         steps: number of steps, each 0.1 s of the recording, up to a third more or less.
     """
     total, begins = costs, np.arange(len(costs))
-    goes_on = {warp: np.flatnonzero(stretches[warp:] == stretches[:-warp]) for warp in WARPS}
+    goes_on = {warp: np.flatnonzero(stretches[warp:] == stretches[:-warp]) for warp in WARP_FRAMES}
     for _ in range(steps):
         best, before = np.full(len(total), np.inf), np.zeros(len(total), dtype=np.int64)
         for warp, starts in goes_on.items():
-            on = total[starts] + WARP_COST * abs(warp - STRIDE) / steps
+            on = total[starts] + WARP_COST_RAD2 * abs(warp - NODE_FRAMES) / steps
             better = on < best[starts + warp]
             best[starts[better] + warp], before[starts[better] + warp] = on[better], begins[starts[better]]
         total, begins = best, before

@@ -28,19 +28,21 @@ from motionmind.walks.expectation import Expectation
 from motionmind.walks.frames import Frames, distances_of, frames_near, frames_of
 from motionmind.walks.stops import Stop
 
-STRIDE = 3  # recorded frames between nodes of a passage at its own tempo: 0.1 s
-WARPS = 2, 3, 4  # recorded frames allowed between nodes: up to a third faster or slower
-SLOWEST = WARPS[-1] / STRIDE  # recorded seconds per second of movement, at most
-WARP_COST = 0.3  # radians^2 per frame more or less than STRIDE
-CHANGE_COST = 0.72  # radians^2 for a change to another passage: 0.6 radians a joint off, before and after
-ENDS_WEIGHT = 20.0  # weight of the distance at a given posture
+NODE_FRAMES = 3  # recorded frames between nodes of a passage at its own tempo: 0.1 s
+WARP_FRAMES = 2, 3, 4  # recorded frames allowed between nodes: up to a third faster or slower
+MAX_TEMPO_RATIO = WARP_FRAMES[-1] / NODE_FRAMES  # recorded seconds per second of movement, at most
+WARP_COST_RAD2 = 0.3  # radians^2 per frame more or less than NODE_FRAMES
+CHANGE_COST_RAD2 = 0.72  # radians^2 for a change to another passage: 0.6 radians a joint off, before and after
+GIVEN_POSTURE_WEIGHT = 20.0  # weight of the distance at a given posture
 # Weight of the distance at other nodes. It is low because a mean is quiet, and so are the frames nearest to it. Chosen
 # on cmu-05: with 1, passages are a tenth slower and easier to tell from the dancer (AUC 0.77, not 0.74) at equal error.
-WAY_WEIGHT = 0.05
-RATES_S = 0.2  # seconds: converts a difference of velocity at an end to a distance
-BLEND_S = 0.2  # seconds in which the velocities of one passage blend into those of the next
-HALF_HZ = 0.6  # cut-off at a liveliness of a half; chosen on cmu-05: lower ones cost more error for each point of AUC
-HALF_CYCLES = 0.9  # least number of cut-off periods in a short movement, at a liveliness of a half
+DISPLACEMENT_WEIGHT = 0.05
+END_VELOCITY_HORIZON_S = 0.2  # seconds: converts a difference of velocity at an end to a distance
+PASSAGE_BLEND_S = 0.2  # seconds in which the velocities of one passage blend into those of the next
+HALF_LIVELINESS_HZ = (
+    0.6  # cut-off at a liveliness of a half; chosen on cmu-05: lower ones cost more error for each point of AUC
+)
+N_HALF_LIVELINESS_PERIODS = 0.9  # least number of cut-off periods in a short movement, at a liveliness of a half
 
 
 class Place(NamedTuple):
@@ -105,17 +107,17 @@ def find_passage(recorded: Frames, poses: Floats, times: Floats, ends: tuple[Sto
         ends: the first and the last posture, with velocities if given.
         given: nodes whose postures are given, first and last included.
     """
-    weights = np.full(len(poses), WAY_WEIGHT)
-    weights[given] = ENDS_WEIGHT
+    weights = np.full(len(poses), DISPLACEMENT_WEIGHT)
+    weights[given] = GIVEN_POSTURE_WEIGHT
     costs = weights[:, None] * distances(recorded, poses, ends)
     stretches, count = recorded.stretches, len(recorded.stretches)
-    goes_on = {warp: np.flatnonzero(stretches[warp:] == stretches[:-warp]) for warp in WARPS}
+    goes_on = {warp: np.flatnonzero(stretches[warp:] == stretches[:-warp]) for warp in WARP_FRAMES}
     total, came_from = costs[0], []
     for own in costs[1:]:
         least = int(total.argmin())
-        best, before = np.full(count, total[least] + CHANGE_COST), np.full(count, least)
+        best, before = np.full(count, total[least] + CHANGE_COST_RAD2), np.full(count, least)
         for warp, starts in goes_on.items():
-            on = total[starts] + WARP_COST * abs(warp - STRIDE)
+            on = total[starts] + WARP_COST_RAD2 * abs(warp - NODE_FRAMES)
             better = on < best[starts + warp]
             best[starts[better] + warp], before[starts[better] + warp] = on[better], starts[better]
         came_from.append(before)
@@ -139,7 +141,7 @@ def distances(recorded: Frames, poses: Floats, ends: tuple[Stop, Stop]) -> Float
     for row, stop in zip((0, -1), ends, strict=True):
         if stop.rates is not None:
             off = recorded.rates[:, : poses.shape[1]] - stop.rates.joints
-            out[row] += RATES_S**2 * np.mean(np.sum(off**2, axis=-1), axis=-1)
+            out[row] += END_VELOCITY_HORIZON_S**2 * np.mean(np.sum(off**2, axis=-1), axis=-1)
     return out
 
 
@@ -160,10 +162,10 @@ def velocities(passage: Passage, times: Floats) -> Floats:
         weight = np.ones(len(middles))
         if begin > 0:
             change = 0.5 * (passage.times[begin - 1] + passage.times[begin])
-            weight *= np.clip(0.5 + (middles - change) / BLEND_S, 0.0, 1.0)
+            weight *= np.clip(0.5 + (middles - change) / PASSAGE_BLEND_S, 0.0, 1.0)
         if end < len(passage.frames):
             change = 0.5 * (passage.times[end - 1] + passage.times[end])
-            weight *= np.clip(0.5 - (middles - change) / BLEND_S, 0.0, 1.0)
+            weight *= np.clip(0.5 - (middles - change) / PASSAGE_BLEND_S, 0.0, 1.0)
         here = np.flatnonzero(weight > 0.0)
         if len(here) == 0:
             continue
@@ -265,13 +267,13 @@ def dance(
     is_still = way < NO_WAY and len(stops) == 2 and first.rates is None and last.rates is None
     if liveliness == 0.0 or (is_still and place is None):
         return None
-    nodes = np.linspace(0.0, length, max(1, round(length * RATE / STRIDE)) + 1)
+    nodes = np.linspace(0.0, length, max(1, round(length * RATE / NODE_FRAMES)) + 1)
     poses = walk.chains(corpus, nodes)[:, :joints]
     given = np.unique(np.abs(nodes[:, None] - passed).argmin(axis=0))
     if place is None:
         recorded = frames_near(corpus, carriage, poses[::4])
     else:
-        recorded = frames_of(corpus, place.clip, place.seconds, place.seconds + SLOWEST * length)
+        recorded = frames_of(corpus, place.clip, place.seconds, place.seconds + MAX_TEMPO_RATIO * length)
     passage = find_passage(recorded, poses, nodes, (first, last), given)
     times, rows = _grid(passed)
     rates, base = velocities(passage, times)[:, :joints], walk.chains(corpus, times)[:, :joints]
@@ -314,11 +316,11 @@ def cutoff_of(liveliness: float, seconds: float) -> float:
 
     It is 0 at a liveliness of 1. At a half it is HALF_HZ or, in a movement too short for that, HALF_CYCLES periods.
     """
-    return max(HALF_HZ, HALF_CYCLES / seconds) * (1.0 - liveliness) / liveliness
+    return max(HALF_LIVELINESS_HZ, N_HALF_LIVELINESS_PERIODS / seconds) * (1.0 - liveliness) / liveliness
 
 
 def _starts(frames: Ints, stretches: Ints) -> Ints:
     """Return the nodes at which a passage begins or changes to another stretch [C]."""
     steps, apart = np.diff(frames), np.diff(stretches[frames]) != 0
-    changes = apart | (steps < min(WARPS)) | (steps > max(WARPS))
+    changes = apart | (steps < min(WARP_FRAMES)) | (steps > max(WARP_FRAMES))
     return np.concatenate([[0], np.flatnonzero(changes) + 1])

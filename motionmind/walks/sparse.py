@@ -30,13 +30,13 @@ from motionmind.learned.neighbours import Neighbours
 from motionmind.walks.likelihood import distances_of, show
 from motionmind.walks.steps import follow, steps_at
 
-SPLITS = 384  # times that a ball is cut in two
-ENDS = 64  # samples chosen near each end, and then followed along their clips
-NEAREST = 8  # the nearest of these; the others are evenly spaced ranks among
-AMONG = 1024  # neighbours: in a large corpus hundreds are about as near, and their continuations differ
-ALONG = 12  # steps for which to follow them, at most: 1.2 s in a corpus of five postures per second
-KEPT = 32  # cached look-ups: for a body of 16 parts, two pairs of stops
-HARDLY = 1e-200  # likelihood relative to the likeliest sample: sums of smaller ones might be 0
+N_BALL_SPLITS = 384  # times that a ball is cut in two
+N_END_SAMPLES = 64  # samples chosen near each end, and then followed along their clips
+N_NEAREST_END_SAMPLES = 8  # the nearest of these; the others are evenly spaced ranks among
+N_END_NEIGHBORS = 1024  # neighbours: in a large corpus hundreds are about as near, and their continuations differ
+MAX_STEPS_ALONG_CLIP = 12  # steps for which to follow them, at most: 1.2 s in a corpus of five postures per second
+N_CACHED_LOOKUPS = 32  # cached look-ups: for a body of 16 parts, two pairs of stops
+NEGLIGIBLE_LIKELIHOOD_RATIO = 1e-200  # likelihood relative to the likeliest sample: sums of smaller ones might be 0
 
 
 class Chosen(NamedTuple):
@@ -117,7 +117,7 @@ def steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
         chosen: the samples, and the corpus's steps between them.
         near: likelihood that a walk begins in each sample [n].
     """
-    if near[chosen.begins].max(initial=0.0) > HARDLY:
+    if near[chosen.begins].max(initial=0.0) > NEGLIGIBLE_LIKELIHOOD_RATIO:
         return chosen.begins, chosen.ends, chosen.shares
     leads = np.zeros(len(near), dtype=np.bool_)
     leads[chosen.begins] = True
@@ -156,7 +156,7 @@ class _Kept(Generic[_Owner, _Asked, _Found]):
             assert here is not None
             return self._function(here, *asked, **named)
 
-        kept: Callable[_Asked, _Found] = lru_cache(maxsize=KEPT)(look)  # type: ignore[assignment]
+        kept: Callable[_Asked, _Found] = lru_cache(maxsize=N_CACHED_LOOKUPS)(look)  # type: ignore[assignment]
         return kept
 
     def cache_clear(self) -> None:
@@ -172,7 +172,7 @@ def choose(carriage: Carriage, number: int, ends: Floats, steps: int) -> Found:
         ends: orientations of the joints in both given postures [2, J, 4].
         steps: number of steps in a walk.
     """
-    return _found(carriage, number, ends.tobytes(), min(steps, ALONG))
+    return _found(carriage, number, ends.tobytes(), min(steps, MAX_STEPS_ALONG_CLIP))
 
 
 @_Kept  # for all parts: the guide of a search and its motion need the same
@@ -181,10 +181,16 @@ def _found(carriage: Carriage, number: int, ends: bytes, steps: int) -> Found:
     trees = carriage.trees
     assert trees is not None
     postures, part = np.frombuffer(ends).reshape(2, -1, 4), trees.parts[number]
-    ranked = find_near(trees, number, carriage.orientations, postures, AMONG)
-    apart = np.linspace(NEAREST, ranked.shape[1] - 1, max(ENDS - NEAREST, 0))
-    ranks = np.unique(np.concatenate([np.arange(NEAREST), apart]).astype(int).clip(max=ranked.shape[1] - 1))
-    near, nearest, balls = ranked[:, ranks], np.ascontiguousarray(ranked[:, :NEAREST]), _balls(trees, number)
+    ranked = find_near(trees, number, carriage.orientations, postures, N_END_NEIGHBORS)
+    apart = np.linspace(N_NEAREST_END_SAMPLES, ranked.shape[1] - 1, max(N_END_SAMPLES - N_NEAREST_END_SAMPLES, 0))
+    ranks = np.unique(
+        np.concatenate([np.arange(N_NEAREST_END_SAMPLES), apart]).astype(int).clip(max=ranked.shape[1] - 1)
+    )
+    near, nearest, balls = (
+        ranked[:, ranks],
+        np.ascontiguousarray(ranked[:, :N_NEAREST_END_SAMPLES]),
+        _balls(trees, number),
+    )
     chosen = _chosen(carriage, number, near, nearest, balls, steps)
     assert isinstance(chosen.moments, np.ndarray)
     shown = show(carriage.orientations, chosen.moments, part)
@@ -257,7 +263,7 @@ def _cut(bounds: Int32s, radii: Floats, weights: Floats) -> Ints:
         bounds, radii, weights: of the nodes.
     """
     heap, nodes, keys = [(-1.0, 0)], [], (-weights * radii**2).tolist()
-    for _ in range(SPLITS):
+    for _ in range(N_BALL_SPLITS):
         if not heap:
             break
         _, node = heapq.heappop(heap)

@@ -15,8 +15,10 @@ from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import Carriage
 from motionmind.walks.steps import steps_at
 
-_ALL = slice(None)
-_SOON = 1e-3  # finite-difference step that splits the body's velocity into those of its joint chains, seconds
+_EVERY = slice(None)
+_VELOCITY_STEP_S = (
+    1e-3  # finite-difference step that splits the body's velocity into those of its joint chains, seconds
+)
 
 
 class Rates(NamedTuple):
@@ -59,13 +61,13 @@ def stop_at(corpus: Corpus, posture: Posture, velocity: Velocity | None = None) 
     chains, place = corpus.to_chains(posture.rotations), posture.root / (posture.skeleton.height or 1.0)
     if velocity is None:
         return Stop(chains, place)
-    soon = corpus.to_chains(rot.mul(posture.rotations, rot.exp(_SOON * velocity.rotations)))
+    soon = corpus.to_chains(rot.mul(posture.rotations, rot.exp(_VELOCITY_STEP_S * velocity.rotations)))
     ahead = rot.about_vertical(-rot.heading(posture.rotations[0]))
-    turned = rot.log(rot.inv_mul(chains, soon)) / _SOON
+    turned = rot.log(rot.inv_mul(chains, soon)) / _VELOCITY_STEP_S
     return Stop(chains, place, Rates.of_chains(turned, rot.mul_vec(ahead, velocity.root), len(posture.skeleton)))
 
 
-def moments_rates(corpus: Corpus, carriage: Carriage, moments: Ints | slice = _ALL) -> Rates:
+def moments_rates(corpus: Corpus, carriage: Carriage, moments: Ints | slice = _EVERY) -> Rates:
     """Return the velocities in samples of the corpus: means over the steps that arrive and leave.
 
     Args:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from motionmind.footing.balance import WALKS, falls_without, is_beyond, nearest_in_support, walks
+from motionmind.footing.balance import WALKING_MPS, falls_without, is_beyond, nearest_in_support, walks
 
 
 def test_the_nearest_point_of_a_support_is_in_it_and_none_is_nearer() -> None:
@@ -37,5 +37,5 @@ def test_a_body_falls_without_the_foot_that_it_is_over_and_not_without_the_other
 def test_it_walks_by_its_speed_and_not_by_how_far_it_goes() -> None:
     for frames in (30, 300):
         way = np.linspace(0.0, 1.0, frames)[:, None] * np.array([1.0, 5.0, 0.0]) * (frames - 1) / 30.0
-        assert walks(1.05 * WALKS * way, 30.0)
-        assert not walks(0.95 * WALKS * way, 30.0)
+        assert walks(1.05 * WALKING_MPS * way, 30.0)
+        assert not walks(0.95 * WALKING_MPS * way, 30.0)

@@ -6,7 +6,7 @@ import numpy as np
 
 from motionmind.body.contact import pose
 from motionmind.body.human import human23
-from motionmind.footing.bearing import MOSTLY, TOUCHES, Bearing, lowest, shape_of
+from motionmind.footing.bearing import HOLDS_UP_SHARE, LIMB_TOUCHES_M, Bearing, lowest, shape_of
 from motionmind.footing.feet import find_free_feet
 from motionmind.geometry import rotations as rot
 
@@ -31,10 +31,10 @@ def test_points_touch_the_floor_with_what_bears() -> None:
     shape = shape_of(BODY, pose(BODY, MOVEMENT), FEET)
     stands = np.ones((FRAMES, 2), dtype=np.bool_)
     stands[10:20, 0] = False
-    others = np.where(np.arange(len(shape.others)) == 0, MOSTLY + 0.1, 0.0) * np.ones((FRAMES, 1))
+    others = np.where(np.arange(len(shape.others)) == 0, HOLDS_UP_SHARE + 0.1, 0.0) * np.ones((FRAMES, 1))
     touches = Bearing([[], []], stands * 1.0, stands, np.zeros((FRAMES, 2, 2)), others).touching(shape)
     heights = shape.places[..., 1]
-    near = [heights < low[:, None] + TOUCHES for low in (*shape.low.T, shape.low_others[:, 0])]
+    near = [heights < low[:, None] + LIMB_TOUCHES_M for low in (*shape.low.T, shape.low_others[:, 0])]
     bears = stands[:, 0].copy()
     bears[[9, 20]] = False  # as it lifts, or comes down
     expected = (near[0] & shape.feet[0] & bears[:, None]) | (near[1] & shape.feet[1]) | (near[2] & shape.others[0])

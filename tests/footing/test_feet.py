@@ -20,7 +20,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, find_support
 from motionmind.footing.root import stand
 from motionmind.geometry import rotations as rot
-from motionmind.synth.plan import LIFT_M
+from motionmind.synth.plan import STEP_HEIGHT_M
 
 LEGS = list(range(1, 9))
 
@@ -196,7 +196,7 @@ def test_the_farther_a_body_has_to_go_the_more_steps_it_takes_one_foot_after_the
         counts.append(sum(int(np.sum(np.diff(foot.astype(int)) > 0)) for foot in swings))
         assert np.sum(swings[0] & swings[1]) <= 2  # as one lands the other may leave
         lifted = human23().positions_and_tips(found, went)[:, [[4, 27], [8, 31]], 1].min(axis=-1)
-        assert lifted.max() > 0.4 * LIFT_M
+        assert lifted.max() > 0.4 * STEP_HEIGHT_M
     assert counts[0] < counts[1] < counts[2]
     assert counts[0] >= 2
 

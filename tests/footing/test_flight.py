@@ -11,7 +11,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.contact import pose
 from motionmind.body.human import human23
 from motionmind.body.plausibility import GRAVITY
-from motionmind.footing.flight import PUSHES, Flight, find_falls, find_flights, flying_frames
+from motionmind.footing.flight import SHORTEST_PUSH_OFF_S, Flight, find_falls, find_flights, flying_frames
 from motionmind.footing.root import stand
 from motionmind.geometry import rotations as rot
 
@@ -74,7 +74,7 @@ def test_jumps_one_after_another_leave_time_to_land_and_push() -> None:
         np.ones(121), np.full(121, 0.05), np.ones(121), np.ones(2), (False, False), (None, None), GRAVITY, 30.0
     )
     assert len(flights) > 3
-    assert all(after.start - before.end >= PUSHES * 30.0 - 1.0 for before, after in pairwise(flights))
+    assert all(after.start - before.end >= SHORTEST_PUSH_OFF_S * 30.0 - 1.0 for before, after in pairwise(flights))
 
 
 def test_between_the_last_frame_on_the_floor_and_the_first_nothing_bears_the_body() -> None:

@@ -19,17 +19,17 @@ from motionmind.corpus.corpus import Corpus, Facing
 from motionmind.corpus.gather import gather
 from motionmind.footing.bearing import lowest, points_of_feet
 from motionmind.footing.feet import find_free_feet
-from motionmind.footing.root import LEAST, root_trajectory, stand, steps_easily
+from motionmind.footing.root import LEAST_TRAVEL_SHARE, root_trajectory, stand, steps_easily
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.learned.carriage import SLIDES, Carriage, learn_carriage
-from motionmind.realise.bending import FIRMLY
+from motionmind.realise.bending import FIRM_PULL_RATIO
 from motionmind.realise.realise import Style, Wishes, realise
-from motionmind.realise.retime import HEADROOM, keep_pace
+from motionmind.realise.retime import SPEED_HEADROOM_RATIO, keep_pace
 from motionmind.realise.timeline import durations
 from motionmind.walks.expectation import Expectation
-from motionmind.walks.likelihood import ANYWHERE, STRAIGHT_ON, squared_distances
+from motionmind.walks.likelihood import P_CONTINUE, P_TELEPORT, squared_distances
 from motionmind.walks.marginals import posterior_marginals
 from motionmind.walks.means import mean_rotations
 
@@ -152,7 +152,7 @@ def test_a_far_way_is_gone_where_both_feet_are_low() -> None:
     easily = steps_easily(heights, 30.0)
     assert easily.shape == (90,)
     np.testing.assert_allclose(easily[[0, 15, 75, 89]], 1.0)
-    np.testing.assert_allclose(easily[35:55], LEAST)
+    np.testing.assert_allclose(easily[35:55], LEAST_TRAVEL_SHARE)
     np.testing.assert_allclose(steps_easily(heights[:, ::-1] + 1.0, 30.0), easily)
     np.testing.assert_array_equal(steps_easily(heights[:, :1], 30.0), np.ones(90))
     far = np.array([0.0, 0.0, 6.0])
@@ -173,7 +173,7 @@ def test_each_half_step_is_slowed_as_much_as_its_fastest_joint_needs() -> None:
     turned = still.chains(corpus, frames)[:, elbow]
     speeds = rot.angle(turned[:-1], turned[1:]) * 60.0
     assert speeds.max() > 6.0
-    needed = speeds.reshape(20, 6).max(axis=1) / (HEADROOM * 3.0)
+    needed = speeds.reshape(20, 6).max(axis=1) / (SPEED_HEADROOM_RATIO * 3.0)
     assert np.all(slower >= np.maximum(needed, 1.0) - 1e-9)
     np.testing.assert_array_equal(slower[[0, 1, 2, -3, -2, -1]], 1.0)
 
@@ -194,7 +194,7 @@ def test_posterior_marginals_are_sums_over_all_walks(seed: int) -> None:
     alike = weights * (clusters[:, None] == clusters)
     alike /= alike.sum(axis=1, keepdims=True)
     anywhere = np.tile(weights / weights.sum(), (count, 1))
-    move = go @ (STRAIGHT_ON * np.eye(count) + (1.0 - STRAIGHT_ON - ANYWHERE) * alike + ANYWHERE * anywhere)
+    move = go @ (P_CONTINUE * np.eye(count) + (1.0 - P_CONTINUE - P_TELEPORT) * alike + P_TELEPORT * anywhere)
     expected = np.zeros((steps + 1, count))
     for walked in product(range(count), repeat=steps + 1):
         weight = weights[walked[0]] * np.prod(near[np.arange(steps + 1), walked])
@@ -349,7 +349,7 @@ def test_a_motion_is_within_what_is_asked_of_its_states_at_each_move(walking: Le
         chains = [walking.corpus.to_chains(q)[:, carried] for q in (at.rotations, motion.rotations[rows])]
         off = rot.angle(*chains)
         assert off.max() < within + 1e-6
-        assert off.max() > 0.99 * FIRMLY * within
+        assert off.max() > 0.99 * FIRM_PULL_RATIO * within
 
 
 def test_given_postures_are_not_bent_to_their_states_nor_does_the_movement_leap_from_them(walking: Learned) -> None:

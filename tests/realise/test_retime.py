@@ -15,7 +15,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.learned.pace import moved_in, steps_of
 from motionmind.learned.peaks import accelerations
-from motionmind.realise.retime import AROUND, SETTLES, SLIGHT, slower_steps
+from motionmind.realise.retime import MIN_CLOCK_CHANGE_RATIO, SLOWDOWN_AROUND_S, SLOWDOWN_FROM_END_S, slower_steps
 from motionmind.realise.timeline import Timeline, stretch
 
 FPS, BODY = 30.0, human23()
@@ -58,7 +58,7 @@ def slow_down(
     """The movement on a clock that slows down up to three times, and that clock."""
     for _ in range(3):
         slower = slower_steps(motion, most, moving, slides, lasts)
-        if slower.max() < 1.0 + SLIGHT:
+        if slower.max() < 1.0 + MIN_CLOCK_CHANGE_RATIO:
             break
         times = motion.times
         clock, at = stretch(clock, times, slower, 1.0 / float(times[1] - times[0]))
@@ -89,7 +89,7 @@ def test_what_is_too_fast_is_slowed_as_much_as_it_needs(top: float) -> None:
         for c, m in ((clock, motion), (later, slower))
     )
     np.testing.assert_allclose(now, was, atol=0.02)
-    far = np.abs(motion.times[:-1] - 1.5) > 0.5 + 2.0 * AROUND
+    far = np.abs(motion.times[:-1] - 1.5) > 0.5 + 2.0 * SLOWDOWN_AROUND_S
     assert slower.times[-1] - motion.times[-1] < (top / 2.0 - 0.5) * (~far).sum() / FPS
 
 
@@ -181,7 +181,7 @@ def test_an_end_that_is_passed_at_a_velocity_keeps_it(end: int) -> None:
     first, last = ((0, -1), (-1, 0))[end]
     slower, _ = slow_down(motion, clock, most(2.0), (end == 0, end == 1))
     assert speeds(slower)[first] == pytest.approx(speeds(motion)[first], rel=0.1)
-    assert slower.times[-1] > motion.times[-1] + SETTLES
+    assert slower.times[-1] > motion.times[-1] + SLOWDOWN_FROM_END_S
     assert speeds(slower)[last] == pytest.approx(speeds(motion)[last], rel=0.1)
 
 

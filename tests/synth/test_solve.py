@@ -18,7 +18,7 @@ from motionmind.geometry.splines import rotation_spline
 from motionmind.synth.collision import Collision
 from motionmind.synth.kinematics import Freedom, State, body_of
 from motionmind.synth.one_sided import Balance, Floor, Limits, Speed, Travel
-from motionmind.synth.solve import LOOKS, Problem, solve
+from motionmind.synth.solve import MAX_ITERATIONS_PER_PLAN, Problem, solve
 from motionmind.synth.system import Normal
 from motionmind.synth.terms import Ballistic, Contacts, Run, Term, Track
 
@@ -144,8 +144,8 @@ def test_terms_are_planned_again_every_few_iterations() -> None:
         looked.append(len(falling.seen) - 1)
         return False
 
-    solve(standing(), [falling], rest(standing()), replan, 3 * LOOKS)
-    assert looked == [LOOKS, 2 * LOOKS, 3 * LOOKS]
+    solve(standing(), [falling], rest(standing()), replan, 3 * MAX_ITERATIONS_PER_PLAN)
+    assert looked == [MAX_ITERATIONS_PER_PLAN, 2 * MAX_ITERATIONS_PER_PLAN, 3 * MAX_ITERATIONS_PER_PLAN]
 
 
 def test_terms_are_planned_again_where_the_solve_has_settled_until_nothing_changes() -> None:
@@ -169,7 +169,7 @@ def test_the_best_movement_since_terms_were_planned_again_is_returned() -> None:
         return len(planned) == 1
 
     term = Scripted([*first, *then])
-    made = solve(standing(), [term], rest(standing()), replan, 2 * LOOKS)
+    made = solve(standing(), [term], rest(standing()), replan, 2 * MAX_ITERATIONS_PER_PLAN)
     assert len(term.seen) == 10
     np.testing.assert_array_equal(planned[0], term.seen[1])
     np.testing.assert_array_equal(term.seen[5], term.seen[1])  # the solve goes on from there

@@ -14,7 +14,7 @@ from motionmind.body.limbs import parts_of
 from motionmind.body.motion import Posture
 from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
-from motionmind.realise.bending import FREELY
+from motionmind.realise.bending import FREE_PULL_RATIO
 from motionmind.realise.realise import Style, Wishes, realise
 from motionmind.tween.engine import SAME_ANGLE, Engine
 from motionmind.tween.result import Tween
@@ -139,8 +139,8 @@ def test_the_motion_is_seldom_far_from_the_path_even_where_nothing_is_asked(ball
     for a, b in pairs(ballet, 8, seed=6):
         off = ballet.tween(a, b).path_degrees[1:-1, carried] / ballet.space.tolerances[carried]
         shares.extend(off.ravel().tolist())
-    assert np.mean(np.array(shares) <= FREELY + 0.01) > 0.97
-    assert np.max(shares) < 3.0 * FREELY
+    assert np.mean(np.array(shares) <= FREE_PULL_RATIO + 0.01) > 0.97
+    assert np.max(shares) < 3.0 * FREE_PULL_RATIO
     assert np.mean(np.array(shares) > 1.02) > 0.05
 
 

@@ -13,9 +13,9 @@ from motionmind.body.contact import lowest_height, pose
 from motionmind.body.human import human23
 from motionmind.body.plausibility import GRAVITY
 from motionmind.body.support import centre_of_mass
-from motionmind.footing.flight import PUSHES, find_falls
+from motionmind.footing.flight import SHORTEST_PUSH_OFF_S, find_falls
 from motionmind.geometry import rotations as rot
-from motionmind.realise.retime import HURRIES, jump_in_time, land_between, slower_steps
+from motionmind.realise.retime import LEAP_JOINT_SPEED_RATIO, jump_in_time, land_between, slower_steps
 
 BODY, FPS = human23(), 30.0
 CROUCH = 0.5  # metres: no leap begins or ends deeper, by the pelvis; in a split it is at 0.3
@@ -120,7 +120,7 @@ def test_who_is_in_the_air_twice_has_the_time_to_come_down(moving: tuple[bool, b
     seconds = np.full(12, 0.05)
     longer = land_between(seconds, np.array([0.25, 0.5]), 1.0, moving)
     falls = np.sqrt(2.0 * 0.25 / GRAVITY) + np.sqrt(2.0 * 0.5 / GRAVITY)
-    assert float(longer @ seconds) > falls + 2.0 * PUSHES
+    assert float(longer @ seconds) > falls + 2.0 * SHORTEST_PUSH_OFF_S
     assert longer.min() >= 1.0
     assert (longer[0] < 1.2 * longer.min()) == moving[0] or not any(moving)
     # One leap leads from the one to the other, or there is time enough.
@@ -217,7 +217,7 @@ def test_a_walk_into_the_air_takes_as_long_as_the_fall_from_there(fastest: float
     assert 0.2 * float(slow[jumps].sum()) == pytest.approx(fall)
     # Legs hurry, and no faster than they may.
     turn = np.abs(np.diff(np.linspace(0.0, 1.0, SPLIT)))[jumps].sum() * 0.45 * np.pi
-    assert turn / fall < HURRIES * fastest
+    assert turn / fall < LEAP_JOINT_SPEED_RATIO * fastest
     assert np.array_equal(timed(0.2, 1.0, in_air=(True, False), fastest=fastest), slow[::-1])
 
 

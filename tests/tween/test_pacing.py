@@ -19,7 +19,7 @@ from motionmind.formats import read_posture
 from motionmind.geometry import rotations as rot
 from motionmind.learned.pace import way_between, way_of
 from motionmind.realise.detour import detour
-from motionmind.realise.retime import JOINTS_AT
+from motionmind.realise.retime import JOINT_SPEED_RATIO
 from motionmind.tween.engine import Engine
 from motionmind.tween.pacing import usual_times
 from motionmind.tween.report import read_report
@@ -271,7 +271,7 @@ def test_no_joint_is_much_faster_than_nearly_all_of_the_corpus(ballet: Engine) -
         a, b = (Posture(corpus.skeleton, corpus.rotations[start + k], corpus.root[start + k]) for k in pair)
         motion = ballet.tween(a, b).motion
         speeds = way_of(motion).parts / np.diff(motion.times)[:, None]
-        assert (speeds / ballet.pace.fastest)[:, : len(corpus.skeleton)].max() < 1.02 * JOINTS_AT
+        assert (speeds / ballet.pace.fastest)[:, : len(corpus.skeleton)].max() < 1.02 * JOINT_SPEED_RATIO
 
 
 def test_who_has_too_much_time_fills_it_as_the_corpus_does(engine: Engine) -> None:

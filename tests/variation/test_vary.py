@@ -31,7 +31,7 @@ from motionmind.variation.review import Smooth
 from motionmind.variation.seams import BODY, Transition, judge_transitions
 from motionmind.variation.variation import Variation, vary
 from motionmind.variation.variation_json import read_variation, write_variation
-from motionmind.walks.headings import SPINS
+from motionmind.walks.headings import SPIN_RADPS
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "variations.md"
 
@@ -404,7 +404,7 @@ def test_an_insertion_turns_the_body_the_near_way_round(
             way = np.unwrap(headings[frames[seam.at] : frames[seam.at + 1] + 1], period=360.0)
             near = (way[-1] - way[0] + 180.0) % 360.0 - 180.0
             steps = np.radians(np.diff(way)) / np.diff(motion.times[frames[seam.at] : frames[seam.at + 1] + 1])
-            if abs(near) < 150.0 and np.abs(steps[[0, -1]]).max() < 0.8 * SPINS:
+            if abs(near) < 150.0 and np.abs(steps[[0, -1]]).max() < 0.8 * SPIN_RADPS:
                 assert way[-1] - way[0] == pytest.approx(near, abs=1e-6)
                 assert np.ptp(way) < abs(near) + 90.0
                 turns.append(abs(near) > 1.0)

@@ -17,7 +17,14 @@ from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import learn_carriage
 from motionmind.learned.trust import PRIOR, Squares, fit_table
 from motionmind.walks import evidence
-from motionmind.walks.evidence import LASTS, errors_of_lasting, gather_evidence, learn_trust, of_pieces, spread_of
+from motionmind.walks.evidence import (
+    DECAY_CANDIDATES_S,
+    errors_of_lasting,
+    gather_evidence,
+    learn_trust,
+    of_pieces,
+    spread_of,
+)
 
 FRAMES = 16  # a clip, 0.2 s apart
 
@@ -103,8 +110,8 @@ def test_the_rest_of_a_corpus_is_as_if_it_had_been_gathered_alone(reverse: float
 
 def test_of_a_large_corpus_some_pieces_are_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     corpus = straight()
-    monkeypatch.setattr(evidence, "MOST", 64)
-    monkeypatch.setattr(evidence, "PIECES", 4)
+    monkeypatch.setattr(evidence, "N_POSTURES_TO_LEARN_FROM", 64)
+    monkeypatch.setattr(evidence, "MIN_CLIPS", 4)
     pieces = evidence._pieces(corpus)
     assert 4 <= len(pieces) < len(corpus.clips)
     assert sum(piece.stop - piece.start for piece in pieces) <= 64
@@ -127,7 +134,7 @@ def test_velocities_last_as_long_as_in_the_clips(slows: float) -> None:
         motion = clip(rot.exp(moved), name)
         clips.append(replace(motion, times=times))
     errors = errors_of_lasting(gather("pushed", clips, rate=10.0), 60)
-    best = LASTS[int(errors.argmin())]
+    best = DECAY_CANDIDATES_S[int(errors.argmin())]
     assert abs(np.log(best / slows)) <= np.log(1.6)
 
 

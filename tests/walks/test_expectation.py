@@ -15,7 +15,7 @@ from motionmind.tween.engine import Engine
 from motionmind.walks.expectation import Expectation, expect
 from motionmind.walks.headings import turn_with_walks
 from motionmind.walks.mean_walk import _without_ends
-from motionmind.walks.minimal import LASTS, minimal_movement
+from motionmind.walks.minimal import END_VELOCITY_DECAY_S, minimal_movement
 from motionmind.walks.stops import Rates, Stop, moments_rates, stop_at
 
 CORPORA = ["ballet", "karate", "walk-hexapod"]  # stage and free, people and insects
@@ -249,7 +249,7 @@ def test_departures_end_in_nothing_and_where_velocities_are_given_without_one(mo
     rng = np.random.default_rng(7)
     times = np.linspace(0.0, 2.0, 2001)
     waves = np.sin(times[:, None, None] * rng.uniform(0.5, 3.0, (4, 3)) + rng.uniform(0.0, 6.0, (4, 3)))
-    out = _without_ends(waves, times, *moving, lasts=LASTS)
+    out = _without_ends(waves, times, *moving, lasts=END_VELOCITY_DECAY_S)
     np.testing.assert_allclose(out[[0, -1]], 0.0, atol=1e-12)
     rates = np.abs(np.diff(out, axis=0)[[0, -1]] / 0.001).max(axis=(1, 2))
     for rate, still in zip(rates, moving, strict=True):

@@ -19,9 +19,9 @@ from motionmind.learned.nearest import postures_near
 from motionmind.learned.neighbours import build_neighbours
 from motionmind.tween.engine import Engine
 from motionmind.walks.frames import (
-    BESIDE,
-    LEAVES,
-    NEAREST,
+    N_FRAME_NEIGHBORS,
+    N_LEAVES_SEARCHED,
+    N_POSTURES_BESIDE,
     Frames,
     all_frames,
     distances_of,
@@ -161,12 +161,15 @@ def test_frames_near_postures_are_whole_runs_with_these_in_them(ballet: Engine) 
     check_order(corpus, found)
     check_rates(found)
     assert len(found.chains) < 0.7 * len(all_frames(corpus).chains)
-    near = [postures_near(trees, carriage.orientations, pose, NEAREST, len(corpus), LEAVES) for pose in poses]
+    near = [
+        postures_near(trees, carriage.orientations, pose, N_FRAME_NEIGHBORS, len(corpus), N_LEAVES_SEARCHED)
+        for pose in poses
+    ]
     for posture in np.unique(near).tolist():
         number = int(np.searchsorted(corpus.columns.starts, posture, side="right")) - 1
         start, stop = (int(at) for at in corpus.columns.starts[number : number + 2])
         # The last posture of a run may lie between two frames.
-        run = set(range(max(posture - BESIDE, start), min(posture + BESIDE, stop - 1)))
+        run = set(range(max(posture - N_POSTURES_BESIDE, start), min(posture + N_POSTURES_BESIDE, stop - 1)))
         stretch = found.stretches[found.postures == min(posture, stop - 2)][0]
         assert run <= set(found.postures[found.stretches == stretch].tolist())
     for stretch in range(0, int(found.stretches[-1]) + 1, 7):
@@ -176,7 +179,7 @@ def test_frames_near_postures_are_whole_runs_with_these_in_them(ballet: Engine) 
         shown = rotation_spline(corpus.times[knots], corpus.rotations[knots], found.times[own])
         assert rot.angle(shown, found.chains[own]).max() < 5e-3
     assert distances_of(found, poses).min(axis=1).max() < 1e-3  # the last posture is that of many clips' ends
-    more = frames_near(corpus, replace(carriage, trees=trees), poses, 2 * BESIDE)
+    more = frames_near(corpus, replace(carriage, trees=trees), poses, 2 * N_POSTURES_BESIDE)
     inside = np.diff(found.stretches, append=-1) == 0
     assert set(found.postures[inside].tolist()) < set(more.postures.tolist())
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
-from motionmind.walks.minimal import LASTS, departure, minimal_movement
+from motionmind.walks.minimal import END_VELOCITY_DECAY_S, departure, minimal_movement
 
 SOON = 1e-6  # seconds
 
@@ -26,7 +26,7 @@ def velocities(rotations: Floats) -> Floats:
     return np.asarray(rot.log(rot.inv_mul(begins, ends)) / np.array([SOON, -SOON])[:, None, None])
 
 
-@pytest.mark.parametrize("length", [0.05, LASTS, 0.7, 5.0])
+@pytest.mark.parametrize("length", [0.05, END_VELOCITY_DECAY_S, 0.7, 5.0])
 @pytest.mark.parametrize("given_rates", [(True, True), (True, False), (False, True)])
 def test_a_departure_is_0_at_both_ends_and_has_the_given_rates_there(
     length: float, given_rates: tuple[bool, bool]
@@ -43,15 +43,15 @@ def test_a_departure_is_0_at_both_ends_and_has_the_given_rates_there(
 def test_a_departure_is_small_and_is_over_after_a_while() -> None:
     times = np.linspace(0.0, 3.0, 301)
     out = departure(times, np.array(1.0), np.array(-2.0))
-    np.testing.assert_array_equal(out[(times >= LASTS) & (times <= 3.0 - LASTS)], 0.0)
-    assert np.abs(out).max() < 2.0 * LASTS * 4.0 / 27.0 + 1e-9  # the cubic's own maximum
-    assert np.abs(np.diff(out, 2)).max() < 2.0 * 6.0 / LASTS * 0.01**2 * 1.1  # nowhere a leap or a kink
+    np.testing.assert_array_equal(out[(times >= END_VELOCITY_DECAY_S) & (times <= 3.0 - END_VELOCITY_DECAY_S)], 0.0)
+    assert np.abs(out).max() < 2.0 * END_VELOCITY_DECAY_S * 4.0 / 27.0 + 1e-9  # the cubic's own maximum
+    assert np.abs(np.diff(out, 2)).max() < 2.0 * 6.0 / END_VELOCITY_DECAY_S * 0.01**2 * 1.1  # nowhere a leap or a kink
     np.testing.assert_array_equal(departure(times, None, None), 0.0)
 
 
-@pytest.mark.parametrize("length", [0.2, LASTS, 3.0])
+@pytest.mark.parametrize("length", [0.2, END_VELOCITY_DECAY_S, 3.0])
 def test_a_departure_lasts_for_all_of_a_short_time(length: float) -> None:
-    t, lasts = np.linspace(0.0, length, 31), min(length, LASTS)
+    t, lasts = np.linspace(0.0, length, 31), min(length, END_VELOCITY_DECAY_S)
     cubic = t * np.maximum(1.0 - t / lasts, 0.0) ** 2
     np.testing.assert_allclose(departure(1.0 + t, np.array(3.0), None), 3.0 * cubic, atol=1e-12)
     np.testing.assert_allclose(departure(1.0 + t, None, np.array(3.0)), -3.0 * cubic[::-1], atol=1e-12)

@@ -13,8 +13,8 @@ from motionmind.body.motion import Posture
 from motionmind.geometry import rotations as rot
 from motionmind.tween.engine import Engine
 from motionmind.walks.frames import Frames, all_frames
-from motionmind.walks.modes import LIKELIEST, _from_start_to_end, _held_to_ends, _likeliest, find_modes
-from motionmind.walks.passages import STRIDE, WARP_COST, WARPS, Place, distances
+from motionmind.walks.modes import N_CANDIDATE_PASSAGES, _from_start_to_end, _held_to_ends, _likeliest, find_modes
+from motionmind.walks.passages import NODE_FRAMES, WARP_COST_RAD2, WARP_FRAMES, Place, distances
 from motionmind.walks.stops import Stop, stop_at
 
 COUNT = 11
@@ -43,11 +43,11 @@ def test_no_passage_from_start_to_end_costs_less(steps: int) -> None:
     stretches, costs = np.repeat([0, 1], [9, 6]), rng.uniform(0.0, 1.0, 15)
     total, begins = _from_start_to_end(stretches, costs, steps)
     least, reached = np.full(15, np.inf), [set[int]() for _ in range(15)]
-    for begin, *warps in product(range(15), *[WARPS] * steps):
+    for begin, *warps in product(range(15), *[WARP_FRAMES] * steps):
         end = begin + sum(warps)
         if end >= 15 or stretches[end] != stretches[begin]:
             continue
-        cost = costs[begin] + sum(WARP_COST / steps * abs(warp - STRIDE) for warp in warps)
+        cost = costs[begin] + sum(WARP_COST_RAD2 / steps * abs(warp - NODE_FRAMES) for warp in warps)
         if cost < least[end] - 1e-12:
             least[end], reached[end] = cost, {begin}
         elif cost < least[end] + 1e-12:
@@ -66,7 +66,7 @@ def test_no_more_than_half_of_a_likely_passage_lies_in_another(seed: int) -> Non
     poses, none = rot.exp(rng.normal(0.0, 1.0, (2, 1, 3))), np.zeros(3)
     stops = Stop(poses[0], none), Stop(poses[1], none)
     found = _likeliest(recorded, stops, poses, 5)
-    assert 2 <= len(found) <= LIKELIEST
+    assert 2 <= len(found) <= N_CANDIDATE_PASSAGES
     for (begin, end), (one, other) in combinations(found, 2):
         overlap = min(end, other) - max(begin, one)
         assert overlap <= 0.5 * min(end - begin, other - one)
@@ -75,7 +75,7 @@ def test_no_more_than_half_of_a_likely_passage_lies_in_another(seed: int) -> Non
     begin, end = found[0]
     assert _from_start_to_end(recorded.stretches, first, 5)[0][end] + last[end] == best
     assert all(recorded.stretches[begin] == recorded.stretches[end] for begin, end in found)
-    assert all(5 * WARPS[0] <= end - begin <= 5 * WARPS[-1] for begin, end in found)
+    assert all(5 * WARP_FRAMES[0] <= end - begin <= 5 * WARP_FRAMES[-1] for begin, end in found)
 
 
 def test_held_to_the_ends_a_passage_keeps_its_way_between() -> None:
@@ -95,7 +95,7 @@ def test_each_mode_is_the_farthest_from_what_is_known_by_then(name: str, request
     stops, joints = ends(engine, 40, 300), len(corpus.skeleton)
     known = [straight(stops, joints)]
     recorded, poses = all_frames(corpus), known[0][[0, -1]]
-    left = _likeliest(recorded, stops, poses, round(seconds * RATE / STRIDE))
+    left = _likeliest(recorded, stops, poses, round(seconds * RATE / NODE_FRAMES))
     shown = {passage: _held_to_ends(recorded, passage, poses, COUNT) for passage in left}
     found = []
 
@@ -120,4 +120,4 @@ def test_there_are_no_modes_where_no_recording_lasts_so_long(ballet: Engine) -> 
     stops = ends(ballet, 3, 9)
     known = [straight(stops, 23)]
     assert list(find_modes(ballet.corpus, ballet.carriage, stops, 100.0, known)) == []
-    assert len(list(find_modes(ballet.corpus, ballet.carriage, stops, 0.01, known))) == LIKELIEST
+    assert len(list(find_modes(ballet.corpus, ballet.carriage, stops, 0.01, known))) == N_CANDIDATE_PASSAGES

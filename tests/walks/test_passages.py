@@ -16,16 +16,16 @@ from motionmind.tween.engine import Engine
 from motionmind.walks.expectation import Expectation, expect
 from motionmind.walks.frames import Frames, all_frames
 from motionmind.walks.passages import (
-    BLEND_S,
-    CHANGE_COST,
-    ENDS_WEIGHT,
-    HALF_CYCLES,
-    HALF_HZ,
-    RATES_S,
-    STRIDE,
-    WARP_COST,
-    WARPS,
-    WAY_WEIGHT,
+    CHANGE_COST_RAD2,
+    DISPLACEMENT_WEIGHT,
+    END_VELOCITY_HORIZON_S,
+    GIVEN_POSTURE_WEIGHT,
+    HALF_LIVELINESS_HZ,
+    N_HALF_LIVELINESS_PERIODS,
+    NODE_FRAMES,
+    PASSAGE_BLEND_S,
+    WARP_COST_RAD2,
+    WARP_FRAMES,
     Passage,
     Place,
     cutoff_of,
@@ -70,11 +70,11 @@ def at_rest(poses: Floats) -> tuple[Stop, Stop]:
 def costs_of(recorded: Frames, shown: Ints, apart: Floats, given: Ints) -> Floats:
     """What passages [N, K] cost, by the definition [N]."""
     count, nodes = len(recorded.chains), np.arange(shown.shape[1])
-    leads = np.full((count, count), CHANGE_COST)
+    leads = np.full((count, count), CHANGE_COST_RAD2)
     for one, other in product(range(count), repeat=2):
-        if recorded.stretches[one] == recorded.stretches[other] and other - one in WARPS:
-            leads[one, other] = min(WARP_COST * abs(other - one - STRIDE), CHANGE_COST)
-    weights = np.where(np.isin(nodes, given), ENDS_WEIGHT, WAY_WEIGHT)
+        if recorded.stretches[one] == recorded.stretches[other] and other - one in WARP_FRAMES:
+            leads[one, other] = min(WARP_COST_RAD2 * abs(other - one - NODE_FRAMES), CHANGE_COST_RAD2)
+    weights = np.where(np.isin(nodes, given), GIVEN_POSTURE_WEIGHT, DISPLACEMENT_WEIGHT)
     costs: Floats = (weights * apart[nodes, shown]).sum(axis=1) + leads[shown[:, :-1], shown[:, 1:]].sum(axis=1)
     return costs
 
@@ -95,7 +95,7 @@ def test_no_passage_costs_less(seed: int) -> None:
     assert costs_of(recorded, found.frames[None], apart, given)[0] == pytest.approx(of_all.min())
     begins = [0]
     for node, (one, other) in enumerate(pairwise(found.frames.tolist()), start=1):
-        if recorded.stretches[one] != recorded.stretches[other] or other - one not in WARPS:
+        if recorded.stretches[one] != recorded.stretches[other] or other - one not in WARP_FRAMES:
             begins.append(node)
     assert found.starts.tolist() == begins
 
@@ -108,14 +108,14 @@ def test_velocities_at_the_ends_count_as_where_they_lead_to() -> None:
     moving = distances(recorded, poses, (stop(poses[0]), stop(poses[-1], rates)))
     np.testing.assert_array_equal(moving[:-1], plain[:-1])
     off = ((recorded.rates[:, :2] - rates) ** 2).sum(axis=(1, 2)) / 2
-    np.testing.assert_allclose(moving[-1] - plain[-1], RATES_S**2 * off)
+    np.testing.assert_allclose(moving[-1] - plain[-1], END_VELOCITY_HORIZON_S**2 * off)
 
 
 @pytest.mark.parametrize("number", [3, 9, 17])
 def test_a_piece_of_a_recording_is_found_again(cmu05: Engine, number: int) -> None:
     recorded = all_frames(cmu05.corpus)
     own = np.flatnonzero(recorded.stretches == number)
-    nodes = own[7:52:STRIDE]
+    nodes = own[7:52:NODE_FRAMES]
     poses = recorded.chains[nodes, :-1]
     found = find_passage(
         recorded, poses, 0.1 * np.arange(float(len(nodes))), at_rest(poses), np.array([0, len(nodes) - 1])
@@ -130,16 +130,16 @@ def test_what_is_danced_faster_or_slower_is_found_too(cmu05: Engine, faster: flo
     recorded = all_frames(cmu05.corpus)
     for number in (3, 9, 17):
         own = np.flatnonzero(recorded.stretches == number)
-        nodes = own[0] + np.round(10 + STRIDE * faster * np.arange(11)).astype(np.int64)
+        nodes = own[0] + np.round(10 + NODE_FRAMES * faster * np.arange(11)).astype(np.int64)
         poses = recorded.chains[nodes, :-1]
         found = find_passage(recorded, poses, 0.1 * np.arange(11.0), at_rest(poses), np.array([0, 10]))
         assert np.all(recorded.stretches[found.frames] == number)
         assert np.abs(found.frames - nodes).max() <= 8
         apart = distances(recorded, poses, at_rest(poses))[[0, -1], found.frames[[0, -1]]]
-        assert ENDS_WEIGHT * apart.max() < CHANGE_COST
+        assert GIVEN_POSTURE_WEIGHT * apart.max() < CHANGE_COST_RAD2
 
 
-@pytest.mark.parametrize("warp", WARPS)
+@pytest.mark.parametrize("warp", WARP_FRAMES)
 def test_a_tempo_up_to_a_third_off_is_followed_through_what_is_given(warp: int) -> None:
     recorded, nodes = random_recording((60, 60)), 65 + warp * np.arange(8)
     poses = recorded.chains[nodes]
@@ -152,7 +152,9 @@ def test_a_tempo_up_to_a_third_off_is_followed_through_what_is_given(warp: int) 
 @pytest.mark.parametrize(("share", "changes"), [(0.98, False), (1.02, True)])
 def test_another_stretch_is_taken_where_it_saves_more_than_a_change(share: float, changes: bool) -> None:
     """The first stretch is at the poses but for the last one, the second at the last alone."""
-    turned = rot.exp(np.array([2.0 * np.arcsin(0.5 * np.sqrt(share * CHANGE_COST / ENDS_WEIGHT)), 0.0, 0.0]))
+    turned = rot.exp(
+        np.array([2.0 * np.arcsin(0.5 * np.sqrt(share * CHANGE_COST_RAD2 / GIVEN_POSTURE_WEIGHT)), 0.0, 0.0])
+    )
     chains = np.tile(rot.IDENTITY, (60, 2, 1))
     chains[30:] = turned
     poses = np.tile(rot.IDENTITY, (6, 2, 1))
@@ -167,31 +169,31 @@ def test_another_stretch_is_taken_where_it_saves_more_than_a_change(share: float
 
 
 def test_a_passage_at_its_own_tempo_has_the_velocities_of_the_recording() -> None:
-    recorded, nodes = random_recording((60,)), 5 + STRIDE * np.arange(11)
+    recorded, nodes = random_recording((60,)), 5 + NODE_FRAMES * np.arange(11)
     passage = Passage(0.1 * np.arange(11.0), nodes, recorded, np.array([0]))
     found = velocities(passage, np.arange(31) / RATE)
     np.testing.assert_allclose(found, recorded.rates[5:35], atol=1e-9)
 
 
-@pytest.mark.parametrize("warp", WARPS)
+@pytest.mark.parametrize("warp", WARP_FRAMES)
 def test_a_passage_at_another_tempo_has_them_in_proportion(warp: int) -> None:
     recorded, nodes = random_recording((90,)), 5 + warp * np.arange(11)
     passage = Passage(0.1 * np.arange(11.0), nodes, recorded, np.array([0]))
     times = np.arange(warp * 10 + 1) / (10.0 * warp)
     found = velocities(passage, times)
-    np.testing.assert_allclose(found, warp / STRIDE * recorded.rates[5 : 5 + 10 * warp], atol=1e-9)
+    np.testing.assert_allclose(found, warp / NODE_FRAMES * recorded.rates[5 : 5 + 10 * warp], atol=1e-9)
 
 
 def test_where_stretches_change_velocities_are_blended() -> None:
     recorded = random_recording((90, 90))
-    nodes = np.concatenate([10 + STRIDE * np.arange(6), 110 + STRIDE * np.arange(5)])
+    nodes = np.concatenate([10 + NODE_FRAMES * np.arange(6), 110 + NODE_FRAMES * np.arange(5)])
     passage = Passage(0.1 * np.arange(11.0), nodes, recorded, np.array([0, 6]))
     times = np.arange(31) / RATE
     found, middles, change = velocities(passage, times), times[:-1] + 0.5 / RATE, 0.55
     before, after = recorded.rates[10:40], recorded.rates[110 - 18 : 110 + 12]
-    share = np.clip(0.5 + (middles - change) / BLEND_S, 0.0, 1.0)[:, None, None]
+    share = np.clip(0.5 + (middles - change) / PASSAGE_BLEND_S, 0.0, 1.0)[:, None, None]
     np.testing.assert_allclose(found, (1.0 - share) * before + share * after, atol=1e-9)
-    is_before, is_after = middles < change - 0.5 * BLEND_S, middles > change + 0.5 * BLEND_S
+    is_before, is_after = middles < change - 0.5 * PASSAGE_BLEND_S, middles > change + 0.5 * PASSAGE_BLEND_S
     np.testing.assert_allclose(found[is_before], before[is_before], atol=1e-9)
     np.testing.assert_allclose(found[is_after], after[is_after], atol=1e-9)
 
@@ -259,8 +261,8 @@ def test_each_joint_is_displaced_on_its_own() -> None:
 
 def test_the_cutoff_falls_from_infinity_to_none() -> None:
     assert cutoff_of(1.0, 3.0) == 0.0
-    assert cutoff_of(0.5, 100.0) == HALF_HZ
-    assert cutoff_of(0.5, 0.5) == HALF_CYCLES / 0.5
+    assert cutoff_of(0.5, 100.0) == HALF_LIVELINESS_HZ
+    assert cutoff_of(0.5, 0.5) == N_HALF_LIVELINESS_PERIODS / 0.5
     found = [cutoff_of(liveliness, 2.0) for liveliness in (1e-6, 0.1, 0.5, 0.9, 1.0)]
     assert all(more > less for more, less in pairwise(found))
     assert found[0] > 1e5

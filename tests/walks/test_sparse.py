@@ -65,7 +65,7 @@ def _nothing_kept() -> Iterator[None]:
 def test_over_all_moments_one_by_one_the_sums_are_the_same(
     engine: Engine, carriage: Carriage, path: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in ("ENDS", "NEAREST", "AMONG"):
+    for name in ("N_END_SAMPLES", "N_NEAREST_END_SAMPLES", "N_END_NEIGHBORS"):
         monkeypatch.setattr(sparse, name, 10**6)
     for start in (0, 11):
         whole, few = (walk(engine, one, start, path) for one in (engine.carriage, carriage))
@@ -82,7 +82,7 @@ def test_over_all_moments_one_by_one_the_sums_are_the_same(
 def test_over_few_moments_the_mean_is_near_that_over_all(
     engine: Engine, carriage: Carriage, path: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sparse, "ENDS", 24)
+    monkeypatch.setattr(sparse, "N_END_SAMPLES", 24)
     for start in (0, 11, 23):
         whole, few = (walk(engine, one, start, path) for one in (engine.carriage, carriage))
         straight = rot.slerp(whole.poses[:1], whole.poses[-1:], np.linspace(0.0, 1.0, 2 * MOVES + 1)[:, None])
@@ -97,7 +97,7 @@ def test_over_few_moments_the_mean_is_near_that_over_all(
 def test_walks_begin_and_end_in_moments_that_stand_for_others(
     engine: Engine, carriage: Carriage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sparse, "ENDS", 12)
+    monkeypatch.setattr(sparse, "N_END_SAMPLES", 12)
     trees = carriage.trees
     assert trees is not None
     balls = sparse._balls(trees, 0)
@@ -120,14 +120,16 @@ def test_what_is_chosen_near_an_end_is_spread_from_near_to_far(carriage: Carriag
     assert trees is not None
     for number, part in enumerate(trees.parts):
         ends = np.ascontiguousarray(carriage.orientations[[3, 40], : part.max() + 1])
-        found = find_near(trees, number, carriage.orientations, ends, sparse.AMONG)
+        found = find_near(trees, number, carriage.orientations, ends, sparse.N_END_NEIGHBORS)
         chosen = sparse.choose(carriage, number, ends, 12).chosen
         assert chosen.near is not None
         for ranked, near in zip(found, chosen.near, strict=True):
-            np.testing.assert_array_equal(np.asarray(chosen.moments)[near], np.sort(ranked[: sparse.NEAREST]))
+            np.testing.assert_array_equal(
+                np.asarray(chosen.moments)[near], np.sort(ranked[: sparse.N_NEAREST_END_SAMPLES])
+            )
             ranks = np.flatnonzero(np.isin(ranked, chosen.moments))
-            assert set(range(sparse.NEAREST)) <= set(ranks)
-            assert np.diff(ranks).max() <= len(ranked) / (sparse.ENDS - sparse.NEAREST) + 1
+            assert set(range(sparse.N_NEAREST_END_SAMPLES)) <= set(ranks)
+            assert np.diff(ranks).max() <= len(ranked) / (sparse.N_END_SAMPLES - sparse.N_NEAREST_END_SAMPLES) + 1
 
 
 def test_what_is_chosen_stands_for_the_whole_corpus(engine: Engine, carriage: Carriage) -> None:
@@ -164,7 +166,7 @@ def test_each_moment_is_in_the_ball_of_its_place(carriage: Carriage) -> None:
 def test_walks_lead_on_from_where_all_performances_of_a_dance_end(
     engine: Engine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sparse, "ENDS", 12)
+    monkeypatch.setattr(sparse, "N_END_SAMPLES", 12)
     motion = engine.corpus.motion(engine.corpus.clips[0]).slice(0, 2 * MOVES + 1)
     corpus = gather("many", [replace(motion, name=f"{number}") for number in range(14)])
     carriage = grown(corpus.skeleton, learn_carriage(corpus))
@@ -178,8 +180,8 @@ def test_walks_lead_on_from_where_all_performances_of_a_dance_end(
 def test_threads_change_no_byte(engine: Engine, carriage: Carriage, monkeypatch: pytest.MonkeyPatch) -> None:
     found = []
     for threads in (1, 3):
-        monkeypatch.setattr(mean_walk, "THREADS", threads)
-        monkeypatch.setattr(mean_walk, "BUSY", 1)
+        monkeypatch.setattr(mean_walk, "N_THREADS", threads)
+        monkeypatch.setattr(mean_walk, "MIN_SAMPLES_PER_THREAD", 1)
         found.append(walk(engine, carriage, 4, True))
     for one, other in zip(*found, strict=True):
         assert np.array_equal(one, other)
