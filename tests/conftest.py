@@ -24,7 +24,7 @@ from pages import Chromium, Tabs
 
 import motionmind
 from motionmind.cli import main
-from motionmind.cli.warming import FIRST
+from motionmind.cli.warming import FIRST_RUN_NOTE
 from motionmind.codecache import is_all_compiled
 from motionmind.discretize.codebook import Codebook
 from motionmind.formats import read_motion
@@ -156,7 +156,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
             main([str(argument) for argument in arguments])
         captured = capsys.readouterr()
         assert isinstance(end.value.code, int)
-        return Ran(end.value.code, captured.out, captured.err.replace(f"{FIRST}\n", ""))
+        return Ran(end.value.code, captured.out, captured.err.replace(f"{FIRST_RUN_NOTE}\n", ""))
 
     return call
 

@@ -27,8 +27,8 @@ from experiments.material import families
 from motionmind import Motion
 from motionmind._typing import Floats, Ints
 from motionmind.geometry import rotations as rot
-from motionmind.learned.pace import SMOOTHED, way_of, ways
-from motionmind.learned.sampled import FPS
+from motionmind.learned.pace import SPEED_SMOOTHING_S, way_of, ways
+from motionmind.learned.sampled import SAMPLED_FPS
 
 MOST = 12  # windows of a family that are asked
 LEARNED = 20_000  # windows that are learned from at most
@@ -80,9 +80,9 @@ def _shown_by(data: str, by: str, family: int) -> Iterator[Shown]:
 
 def _smoothed_speeds(clip: Motion) -> Floats:
     """Return the speed of the mean joint from each frame to the next, by which still moments are found."""
-    steps, window = way_of(clip).joints.mean(axis=1), np.hanning(round(SMOOTHED * FPS) + 2)[1:-1]
+    steps, window = way_of(clip).joints.mean(axis=1), np.hanning(round(SPEED_SMOOTHING_S * SAMPLED_FPS) + 2)[1:-1]
     around = np.pad(steps, len(window) // 2, mode="edge")
-    return FPS * np.convolve(around, window / window.sum(), "same")[len(window) // 2 :][: len(steps)]
+    return SAMPLED_FPS * np.convolve(around, window / window.sum(), "same")[len(window) // 2 :][: len(steps)]
 
 
 def _shown(clip: Motion, speeds: Floats, i: int, k: int, family: int) -> Shown:

@@ -12,8 +12,8 @@ from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
 from experiments.material import engine, families, movement, pairs, posture, recorded, without
 from motionmind import Engine, Motion, NoPathError, Posture
-from motionmind.learned.pace import LONGEST, SHORTEST, find_still, way_between, way_of
-from motionmind.learned.sampled import FPS
+from motionmind.learned.pace import LONGEST_WINDOW_S, SHORTEST_WINDOW_S, find_still, way_between, way_of
+from motionmind.learned.sampled import SAMPLED_FPS
 
 RECORDINGS = ("cmu-05", "indian", "cmu-16", "cmu-135", "bandai")
 BUDGET = 20_000
@@ -74,7 +74,7 @@ def _danced(
     """Return an engine without a family of recordings, and pairs of its still moments with the seconds between."""
     windows = windows_of(data, by, family)
     chosen = np.random.default_rng([seed, family]).permutation(len(windows))[:most]
-    ends = [(clip.posture(i), clip.posture(k), (k - i) / FPS) for clip, i, k in (windows[n] for n in chosen)]
+    ends = [(clip.posture(i), clip.posture(k), (k - i) / SAMPLED_FPS) for clip, i, k in (windows[n] for n in chosen)]
     return without(data, by, families(data, by)[family][0]), ends
 
 
@@ -83,9 +83,13 @@ def windows_of(data: str | None, by: str, family: int) -> list[tuple[Motion, int
     out = []
     for take in families(data, by)[family]:
         for piece in movement(data, by, 1).get(take, []):
-            clip = piece.resample(FPS)
+            clip = piece.resample(SAMPLED_FPS)
             still = find_still(way_of(clip).joints.mean(axis=1)) if len(clip) > 1 else []
-            out += [(clip, i, k) for i, k in combinations(still, 2) if SHORTEST <= (k - i) / FPS <= LONGEST]
+            out += [
+                (clip, i, k)
+                for i, k in combinations(still, 2)
+                if SHORTEST_WINDOW_S <= (k - i) / SAMPLED_FPS <= LONGEST_WINDOW_S
+            ]
     return out
 
 

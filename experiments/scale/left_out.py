@@ -17,7 +17,7 @@ from motionmind import Engine
 from motionmind._typing import Bools, Floats
 from motionmind.geometry.distances import squared_distance
 from motionmind.learned.carriage import Carriage
-from motionmind.learned.nearest import LEAVES
+from motionmind.learned.nearest import N_LEAVES_VISITED
 from motionmind.learned.neighbours import build_neighbours
 from motionmind.walks.likelihood import squared_distances, variance_at_ends
 from motionmind.walks.marginals import posterior_marginals
@@ -117,7 +117,7 @@ def _by_leaves(
         moments = trees.order[number, slice(*bounds[leaf])]
         moments = moments[~seen[moments]]
         weights = carriage.weights[moments]
-        total += float(weights @ near[moments]) if rank < LEAVES else float(weights.sum() * most[leaf])
+        total += float(weights @ near[moments]) if rank < N_LEAVES_VISITED else float(weights.sum() * most[leaf])
     return total
 
 

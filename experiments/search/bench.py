@@ -167,15 +167,15 @@ def spend(
 ) -> tuple[list[float], list[float]]:
     """Seconds and gaps with so many sweeps of messages and of pair chains, and nodes of A*."""
     seconds, gaps = [], []
-    most = bounding.PAIR_CHAIN_SWEEPS, bounding.MOST_PAIRS
-    bounding.PAIR_CHAIN_SWEEPS, bounding.MOST_PAIRS = pair_chain_sweeps, most[1] if pair_chain_sweeps else 0
+    most = bounding.MAX_PAIR_CHAIN_SWEEPS, bounding.MAX_STATE_PAIRS
+    bounding.MAX_PAIR_CHAIN_SWEEPS, bounding.MAX_STATE_PAIRS = pair_chain_sweeps, most[1] if pair_chain_sweeps else 0
     rules = Rules(RULES.wait, RULES.per_move, RULES.shortest, RULES.longest, node_budget, sweeps)
     for start, goal in few:
         began = perf_counter()
         answer = solve.solve(Problem(model, start, goal, rules))
         seconds.append(perf_counter() - began)
         gaps.append(gap(answer))
-    bounding.PAIR_CHAIN_SWEEPS, bounding.MOST_PAIRS = most
+    bounding.MAX_PAIR_CHAIN_SWEEPS, bounding.MAX_STATE_PAIRS = most
     return seconds, gaps
 
 

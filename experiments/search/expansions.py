@@ -21,7 +21,7 @@ from heuristics import learn
 from motionmind import Engine, Posture, TweenRequest
 from motionmind.search import astar, bounding
 from motionmind.search.apart import solve_apart
-from motionmind.search.bounding import PROVEN
+from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.search.problem import Problem
 from motionmind.search.solve import Certificate, feasible, solve
 from motionmind.tween.formulate import formulate
@@ -156,13 +156,13 @@ def posed(case: Case, engine: Engine, pairs: int, seed: int) -> Iterator[Posed]:
 @contextmanager
 def bounded(case: Case, problem: Problem) -> Iterator[Problem]:
     """The problem with no more sweeps than the case allows."""
-    most = bounding.MOST_PAIRS
+    most = bounding.MAX_STATE_PAIRS
     if case.sweeps is not None:
-        problem, bounding.MOST_PAIRS = replace(problem, rules=replace(problem.rules, sweeps=case.sweeps)), 0
+        problem, bounding.MAX_STATE_PAIRS = replace(problem, rules=replace(problem.rules, sweeps=case.sweeps)), 0
     try:
         yield problem
     finally:
-        bounding.MOST_PAIRS = most
+        bounding.MAX_STATE_PAIRS = most
 
 
 class Walk(NamedTuple):
@@ -222,7 +222,8 @@ def effort(case: Case, one: Posed, expansions: int) -> Effort:
         proven=answer.status == "optimal",
         gap=gap(answer.cost, answer.lower_bound),
         proven_by_bounds=alone.status == "optimal",
-        same=abs(alone.cost - answer.cost) <= PROVEN and abs(alone.lower_bound - answer.lower_bound) <= PROVEN,
+        same=abs(alone.cost - answer.cost) <= OPTIMAL_WITHIN_NATS
+        and abs(alone.lower_bound - answer.lower_bound) <= OPTIMAL_WITHIN_NATS,
     )
 
 
@@ -277,11 +278,11 @@ def remembered(case: Case, one: Posed, expansions: int, nodes: int) -> Remembere
 
 def optimum(one: Posed, answers: list[Remembered], expansions: int) -> float:
     """The least cost, proven by one of the answers or with all bounds; NaN if it is not known."""
-    proven = [answer.cost for answer in answers if answer.cost - answer.lower_bound <= PROVEN]
+    proven = [answer.cost for answer in answers if answer.cost - answer.lower_bound <= OPTIMAL_WITHIN_NATS]
     best = one.solve(expansions)
     if best.status == "optimal":
         proven.append(best.cost)
-    assert not proven or max(proven) - min(proven) <= 2 * PROVEN, "two optima"
+    assert not proven or max(proven) - min(proven) <= 2 * OPTIMAL_WITHIN_NATS, "two optima"
     return min(proven, default=np.nan)
 
 
@@ -304,10 +305,12 @@ def tell_memory(
         for k, nodes in enumerate(budgets):
             column = [row[k] for row in table]
             forgotten = [answer.forgotten for answer in column]
-            open_gaps = [answer.cost - answer.lower_bound > PROVEN for answer in column]
+            open_gaps = [answer.cost - answer.lower_bound > OPTIMAL_WITHIN_NATS for answer in column]
             gaps = [gap(*answer[:2]) for answer, is_open in zip(column, open_gaps, strict=True) if is_open]
-            above = sum(answer.lower_bound > least + PROVEN for answer, least in zip(column, best, strict=True))
-            less = sum(row[k].lower_bound < row[k - 1].lower_bound - PROVEN for row in table) if k else 0
+            above = sum(
+                answer.lower_bound > least + OPTIMAL_WITHIN_NATS for answer, least in zip(column, best, strict=True)
+            )
+            less = sum(row[k].lower_bound < row[k - 1].lower_bound - OPTIMAL_WITHIN_NATS for row in table) if k else 0
             print(f"| {case.corpus}: {case.name} | {nodes:,} | {sum(map(bool, forgotten))} of {pairs}", end=" | ")
             print(f"{np.median(forgotten):,.0f}, {max(forgotten):,} | {len(column) - len(gaps)}", end=" | ")
             print(f"{spread(gaps)} | {above} of {int(np.isfinite(best).sum())} | {less} |", flush=True)

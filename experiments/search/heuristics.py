@@ -89,10 +89,14 @@ def weaken(model: Model, pairs: list[Ends], expansions: int) -> None:
         optimum = answer.cost - RULES.per_move * moves
         for name, estimate in heuristics(trellis):
             path = np.zeros(len(trellis.dom_ptr) - 1, np.int64)
-            found = astar.search(trellis, estimate, np.inf, astar.SAME, path, expansions, expansions, ON)
-            assert found.lower_bound <= optimum + bounding.PROVEN <= found.cost + 2 * bounding.PROVEN
+            found = astar.search(trellis, estimate, np.inf, astar.SAME_COST_RATIO, path, expansions, expansions, ON)
+            assert (
+                found.lower_bound
+                <= optimum + bounding.OPTIMAL_WITHIN_NATS
+                <= found.cost + 2 * bounding.OPTIMAL_WITHIN_NATS
+            )
             short = max(1.0 - heuristic.from_start(estimate) / optimum, 0.0) if optimum else 0.0
-            proved = found.lower_bound > found.cost - bounding.PROVEN
+            proved = found.lower_bound > found.cost - bounding.OPTIMAL_WITHIN_NATS
             rows.setdefault(name, []).append((short, found.expansions, proved))
     for name, row in rows.items():
         short, expanded, proved = zip(*row, strict=True)

@@ -41,7 +41,7 @@ def grown(folder: Path, budget: int) -> tuple[int, int, int]:
 
     def search(nodes: int) -> int:
         path, on = np.zeros(len(trellis.dom_ptr) - 1, dtype=np.int64), np.zeros(1, dtype=bool)
-        return astar.search(trellis, heuristic, np.inf, astar.SAME, path, nodes, nodes // 2, on).peak_nodes
+        return astar.search(trellis, heuristic, np.inf, astar.SAME_COST_RATIO, path, nodes, nodes // 2, on).peak_nodes
 
     search(100)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -14,7 +14,7 @@ import numpy as np
 from experiments.material import corpus, families, part, take_of
 from motionmind._typing import Floats
 from motionmind.learned.carriage import learn_carriage
-from motionmind.learned.trust import RATIOS, Squares
+from motionmind.learned.trust import DISTANCE_RATIOS, Squares
 from motionmind.walks.evidence import DECAY_CANDIDATES_S, errors_of_lasting, gather_evidence
 
 DANCERS = ("cmu-05", "cmu-16", "cmu-29", "cmu-135")  # dance, runs and leaps, slow gestures, karate
@@ -37,7 +37,7 @@ def main(data: str) -> None:
 
 
 def _tell(name: str, found: Squares, lasting: Floats) -> None:
-    table = found.fitted(np.zeros(len(RATIOS)), STRENGTH)
+    table = found.fitted(np.zeros(len(DISTANCE_RATIOS)), STRENGTH)
     print(f"{name}: shares {table.round(2).tolist()}, velocities last {DECAY_CANDIDATES_S[int(lasting.argmin())]} s")
 
 

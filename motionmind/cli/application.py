@@ -34,8 +34,8 @@ from motionmind.display import printable
 from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
 from motionmind.files import pipes_kept
 
-BAD_INPUT = 2  # exit code for everything that the user can put right
-NO_PATH = 3  # exit code when nothing joins A and B
+BAD_INPUT_EXIT = 2  # exit code for everything that the user can put right
+NO_PATH_EXIT = 3  # exit code when nothing joins A and B
 
 atexit.register(gc.freeze)  # at the end Python would look for garbage among all that was imported: a fifth of a second
 
@@ -86,7 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _run(arguments: Sequence[str] | None, warned: Warned) -> int:
     """Run a command, print its error if any, and return the exit code."""
-    code = BAD_INPUT
+    code = BAD_INPUT_EXIT
     try:
         try:
             return int(app.main(arguments, prog_name="motionmind", standalone_mode=False) or 0)
@@ -97,7 +97,7 @@ def _run(arguments: Sequence[str] | None, warned: Warned) -> int:
     except click.UsageError as error:
         message = error.format_message() + (f" ({error.ctx.command_path} --help shows how)" if error.ctx else "")
     except NoPathError as error:
-        message, code = str(error), NO_PATH
+        message, code = str(error), NO_PATH_EXIT
     except MotionMindError as error:
         message = str(error)
     except OSError as error:  # of standard output: those who write files catch theirs

@@ -19,7 +19,7 @@ from motionmind.names.spelling import parse_source
 if TYPE_CHECKING:
     from motionmind.names.finding import Collection
 
-_ABOUT = 300  # characters: a sentence rather than a name
+_DESCRIPTION_CHARS = 300  # characters: a sentence rather than a name
 
 
 @command("motionmind postures ballet -o postures.png")
@@ -83,11 +83,13 @@ def _print(word: str, postures: list[str], clips: list[dict[str, Any]]) -> None:
     width = max((len(_shown(clip["name"])) for clip in clips), default=0)
     for clip in clips:
         length = f"{clip['postures']:5} postures  {clip['seconds']:6.1f} s"
-        click.echo(f"  {_shown(clip['name']):{width}}  {length}  {displayed(clip['about'], _ABOUT)}".rstrip())
+        click.echo(
+            f"  {_shown(clip['name']):{width}}  {length}  {displayed(clip['about'], _DESCRIPTION_CHARS)}".rstrip()
+        )
 
 
 def _shown(name: str) -> str:
-    return displayed(name, _ABOUT)
+    return displayed(name, _DESCRIPTION_CHARS)
 
 
 def _draw(found: Collection, output: Path) -> None:

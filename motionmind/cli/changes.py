@@ -43,8 +43,8 @@ PERFORMER = option(
     show_default=False,
     help="Name who performs the movement, if not the author: credits name them.",
 )
-_NOTEWORTHY = 1e8  # bytes on disk that are said beforehand
-_FEW = 0.001  # share of orientations outside of all states of which nothing is said
+_ANNOUNCED_BYTES = 1e8  # bytes on disk that are said beforehand
+_NEGLIGIBLE_SHARE = 0.001  # share of orientations outside of all states of which nothing is said
 
 
 @command("motionmind corpus add mine new/*.bvh")
@@ -139,7 +139,7 @@ def take_files(
     faults: list[str] = []
 
     def on_need(size: float) -> None:
-        if size >= _NOTEWORTHY:
+        if size >= _ANNOUNCED_BYTES:
             note(f"about {size / 1e9:.1f} GB of disk are needed, more than half of it until the corpus is built")
 
     def on_taken(taken: Taken) -> None:
@@ -180,7 +180,7 @@ def _learn_again(learned: Learned, corpus: Corpus, workshop: Workshop) -> Learne
     kept = Kept.find(corpus, learned.corpus, workshop)
     if kept.new:
         share, joint, degrees = outside(kept.new, learned.space)
-        if share > _FEW:
+        if share > _NEGLIGIBLE_SHARE:
             note(
                 f"{100.0 * share:.1f}% of all joints' orientations in what is new are in no state ({joint} by "
                 f"{degrees:.0f} degrees): to learn states anew, build the corpus from all files"

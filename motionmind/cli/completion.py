@@ -19,8 +19,8 @@ from click.shell_completion import CompletionItem
 from motionmind.errors import MotionMindError
 
 FLOWS = ("chua", "duffing", "halvorsen", "lorenz", "rossler", "thomas")  # as `motionmind.chaos.flows.FLOWS`
-_NAMED = re.compile(r"(posture|clip|include)[ \t]+([^\s:=]+)")
-_MOST_SCORES = 100
+_NAMING_LINE = re.compile(r"(posture|clip|include)[ \t]+([^\s:=]+)")
+_MAX_SCORES = 100
 
 
 class _Names(NamedTuple):
@@ -169,9 +169,9 @@ def _scanned(folder: Path, scores: list[str]) -> Iterator[tuple[str, str]]:
         with suppress(OSError, ValueError):
             lines = path.read_text("utf-8").splitlines()
         for line in lines:
-            found = _NAMED.match(line)
+            found = _NAMING_LINE.match(line)
             if found and found[1] != "include":
                 yield found[1], found[2]
-            elif found and " as " not in line and len(waiting) < _MOST_SCORES:
+            elif found and " as " not in line and len(waiting) < _MAX_SCORES:
                 included = path.parent / found[2]
                 waiting += [] if included in waiting else [included]

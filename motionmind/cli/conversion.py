@@ -9,7 +9,7 @@ import click
 
 from motionmind.cli import completion
 from motionmind.cli.files import (
-    MOVEMENT,
+    MOTION_SUFFIXES,
     check_outputs,
     evened,
     note_licences,
@@ -18,7 +18,7 @@ from motionmind.cli.files import (
     read_mapping,
     write_all,
 )
-from motionmind.cli.options import HOME, OUTPUTS, Section, command, option, outputs, reading
+from motionmind.cli.options import HOME, OUTPUT_KINDS, Section, command, option, outputs, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_movement, read_part
 from motionmind.cli.types import FILE, FRAME, RATE
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @command("motionmind posture ballet/adagio --frame 23 -o A.json")
 @click.argument("source", shell_complete=completion.movement)
-@outputs(f"Write {OUTPUTS}; or .txt.")
+@outputs(f"Write {OUTPUT_KINDS}; or .txt.")
 @option(
     "--clip",
     "name",
@@ -65,7 +65,7 @@ def posture(
     from motionmind.names.spelling import Moment
 
     named = parse_movement(source, home)
-    check_outputs([(path, (*MOVEMENT, ".txt", *PICTURES)) for path in outputs], named.source.paths)
+    check_outputs([(path, (*MOTION_SUFFIXES, ".txt", *PICTURES)) for path in outputs], named.source.paths)
     if frame is not None and named.moment is not None:
         raise MotionMindError(f"{source}: names a frame, and so does --frame; give one of them")
     motion = read_movement(named.source, name, home, **options)

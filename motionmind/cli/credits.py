@@ -13,7 +13,7 @@ from motionmind.cli.options import HOME, JSON, command
 from motionmind.cli.printing import note
 from motionmind.cli.sources import parse_movement, read_movement
 
-_KEEPS = (".json", ".glb")  # formats in which movement keeps its credits
+_FORMATS_WITH_CREDITS = (".json", ".glb")  # formats in which movement keeps its credits
 
 if TYPE_CHECKING:
     from motionmind.credits.ledger import Ledger
@@ -52,6 +52,6 @@ def _ledger(source: str, home: Path | None) -> Ledger:
     reading = {"unit": None, "asf": None, "source_fps": None, "up": None}
     credited = read_movement(named.source, None, home, raw=True, **reading).credits
     suffix = Path(named.source.place).suffix.lower()
-    if suffix not in _KEEPS and all(credit.is_given for credit in credited):
+    if suffix not in _FORMATS_WITH_CREDITS and all(credit.is_given for credit in credited):
         note(f"{source}: {suffix} holds no credits; if the engine made it, name its .json, its .glb or its report")
     return ledger_of(credited)

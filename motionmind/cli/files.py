@@ -17,9 +17,9 @@ from motionmind.render import PICTURES
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion, Posture
 
-MOVEMENT = (".json", ".bvh", ".glb", ".npz", ".vrma")
-EVEN = (".bvh", ".npz")  # formats whose frames are even in time
-_RATE = 30.0  # frames a second of movement that has to be made even
+MOTION_SUFFIXES = (".json", ".bvh", ".glb", ".npz", ".vrma")
+EVEN_SUFFIXES = (".bvh", ".npz")  # formats whose frames are even in time
+_EVEN_FPS = 30.0  # frames a second of movement that has to be made even
 
 
 def read(path: Path, unit: str | None, asf: Path | None, source_fps: float | None, up: str | None) -> Motion:
@@ -95,12 +95,12 @@ def note_licences(path: Path, motion: Motion) -> None:
 
 def evened(path: Path, motion: Motion) -> Motion:
     """Return a motion as its file can hold it: resampled, which a note says, if the frames have to be even in time."""
-    if path.suffix.lower() not in EVEN or motion.is_even:
+    if path.suffix.lower() not in EVEN_SUFFIXES or motion.is_even:
         return motion
-    even = motion.resample(_RATE)
+    even = motion.resample(_EVEN_FPS)
     note(
-        f"{path}: its frames must be even in time, so {len(motion)} are made {len(even)}, {_RATE:g} a second (--fps "
-        "for another rate)"
+        f"{path}: this format needs evenly spaced frames: resampled {len(motion)} frames to {len(even)}, "
+        f"{_EVEN_FPS:g} per second (--fps sets another rate)"
     )
     return even
 

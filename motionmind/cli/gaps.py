@@ -20,8 +20,8 @@ from motionmind.display import displayed
 if TYPE_CHECKING:
     from motionmind.gaps.gaps import Gaps, Place
 
-_WORST = 5  # joint graphs that are printed
-_NAMED = 1.0  # degrees a joint: nearer, and a posture has a name
+_N_GRAPHS_PRINTED = 5  # joint graphs that are printed
+_SAME_POSTURE_DEG = 1.0  # degrees a joint: nearer, and a posture has a name
 
 
 @command("motionmind corpus gaps ballet --pairs 20 --count 1")
@@ -85,7 +85,7 @@ def _lines(found: Gaps) -> Iterator[str]:
         f"least {energy.lower_bound:.2f}, with {energy.bridges:.2f} bridges"
     )
     yield "worst joint graphs  states  pairs apart  bridges a tween"
-    for joint in found.joints[:_WORST]:
+    for joint in found.joints[:_N_GRAPHS_PRINTED]:
         yield f"  {displayed(joint.joint):16}  {joint.states:6}  {joint.apart:11.0%}  {joint.bridges:15.2f}"
     if not found.transitions:
         yield "no single move from posture to posture would lower that"
@@ -110,5 +110,5 @@ def _place(place: Place) -> str:
     where = f"{displayed(place.corpus)}: {displayed(place.clip)} at {place.seconds:.2f} s, posture {place.posture}"
     if not place.near:
         return f"{where}{mirrored}"
-    off = "" if place.degrees < _NAMED else f", {place.degrees:.0f} degrees a joint off"
+    off = "" if place.degrees < _SAME_POSTURE_DEG else f", {place.degrees:.0f} degrees a joint off"
     return f"{'about ' * bool(off)}{displayed(place.near)}{off} ({where}{mirrored})"

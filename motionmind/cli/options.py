@@ -15,8 +15,10 @@ from motionmind.cli.types import EXISTING_FILE, FILE, FOLDER, RATE
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
-OUTPUTS = "movement (.json, .bvh, .glb, .npz, .vrma), a picture or film (.png, .gif, .mp4, .svg), or a page (.html)"
-_SHOW_ALL = "motionmind.cli.options.show_all"  # key of a context's `meta`
+OUTPUT_KINDS = (
+    "movement (.json, .bvh, .glb, .npz, .vrma), a picture or film (.png, .gif, .mp4, .svg), or a page (.html)"
+)
+_SHOW_ALL_KEY = "motionmind.cli.options.show_all"  # key of a context's `meta`
 
 
 class Section(StrEnum):
@@ -70,7 +72,7 @@ def option(
 
 def _show_all(context: click.Context, _: click.Parameter, is_given: bool) -> None:
     if is_given and not context.resilient_parsing:
-        context.meta[_SHOW_ALL] = True
+        context.meta[_SHOW_ALL_KEY] = True
         click.echo(context.get_help(), color=context.color)
         context.exit()
 
@@ -99,14 +101,14 @@ class Command(click.Command):
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the sections, without the rare options unless --help-all asks for them."""
         for section, options in self.sections(ctx).items():
-            if section != Section.ADVANCED or ctx.meta.get(_SHOW_ALL):
+            if section != Section.ADVANCED or ctx.meta.get(_SHOW_ALL_KEY):
                 with formatter.section(section):
                     formatter.write_dl([record for one in options if (record := one.get_help_record(ctx))])
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the example, and where to find the rare options if they are left out."""
         super().format_epilog(ctx, formatter)
-        if self._has_advanced() and not ctx.meta.get(_SHOW_ALL):
+        if self._has_advanced() and not ctx.meta.get(_SHOW_ALL_KEY):
             formatter.write_paragraph()
             formatter.write_text(f"{ctx.command_path} --help-all lists the rarely needed options, too.")
 

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from motionmind.tween.what_if import WhatIf
 
 
-_GOES_ON_S = 3.0  # seconds from one place of a passage to the next, at most: a score's postures lie so far apart
-_FEW = 3  # warnings that are printed without --details
+_SAME_PASSAGE_S = 3.0  # seconds from one place of a passage to the next, at most: a score's postures lie so far apart
+_N_WARNINGS_PRINTED = 3  # warnings that are printed without --details
 
 
 class Notes(logging.Handler):
@@ -143,7 +143,7 @@ def _passages(places: Sequence[Source]) -> str:
 def _parts(before: Source, after: Source) -> bool:
     """Return whether a passage breaks off between two places in a corpus."""
     return (before.clip, before.corpus, before.mirrored) != (after.clip, after.corpus, after.mirrored) or not (
-        before.seconds <= after.seconds <= before.seconds + _GOES_ON_S
+        before.seconds <= after.seconds <= before.seconds + _SAME_PASSAGE_S
     )
 
 
@@ -358,7 +358,7 @@ class Warned:
             return
         context = click.get_current_context(silent=True)
         self._shown += 1
-        if context and context.params.get("details") is False and self._shown > _FEW:
+        if context and context.params.get("details") is False and self._shown > _N_WARNINGS_PRINTED:
             self._left += 1
         else:
             note(str(message))

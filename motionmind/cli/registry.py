@@ -30,8 +30,8 @@ INDEX = option(
     metavar="PLACE",
     help="Look in this index first, by file or address  [default: only the one that comes with MotionMind]",
 )
-_LINE = 300  # characters of a title or a licence
-_WIDTH = 100  # characters to which sentences are wrapped
+_LICENCE_CHARS = 300  # characters of a title or a licence
+_LINE_CHARS = 100  # characters to which sentences are wrapped
 
 
 @command("motionmind corpus fetch hands --index public/index.json --as fingers")
@@ -71,7 +71,8 @@ def _print_terms(entry: Entry) -> None:
 
     size = f"{entry.archive.size / 10**6:,.1f} MB"
     click.echo(
-        f"{displayed(entry.title, _LINE)} ({count(entry.clips, 'clip')}, {count(entry.postures, 'posture')}, {size})"
+        f"{displayed(entry.title, _LICENCE_CHARS)} "
+        f"({count(entry.clips, 'clip')}, {count(entry.postures, 'posture')}, {size})"
     )
     rows = [
         ("performed by", ", ".join(entry.performers)),
@@ -82,7 +83,7 @@ def _print_terms(entry: Entry) -> None:
     ]
     for label, text in rows:
         if text:
-            click.echo(f"{label:12} {displayed(text, _LINE)}")
+            click.echo(f"{label:12} {displayed(text, _LICENCE_CHARS)}")
 
 
 def _print_recipe(recipe: Recipe) -> None:
@@ -101,7 +102,7 @@ def _print_recipe(recipe: Recipe) -> None:
     ]
     for label, text in rows:
         is_command = text.startswith("motionmind ")  # to be copied, in one line
-        lines = [text] if is_command else wrap(text, _WIDTH, break_on_hyphens=False, break_long_words=False)
+        lines = [text] if is_command else wrap(text, _LINE_CHARS, break_on_hyphens=False, break_long_words=False)
         for first, line in zip([label, *[""] * len(lines)], lines, strict=False):
             click.echo(f"{first:12} {printable(line)}")
 
@@ -129,7 +130,7 @@ def print_index(place: str | None, *, as_json: bool) -> None:
     rows += [(recipe.name, "recipe", f"{recipe.title}; {recipe.licence}") for recipe in recipes]
     width = max((len(displayed(name)) for name, *_ in rows), default=0)
     for name, size, text in rows:
-        click.echo(f"{displayed(name):{width}}  {size:>10}  {displayed(text, _LINE)}")
+        click.echo(f"{displayed(name):{width}}  {size:>10}  {displayed(text, _LICENCE_CHARS)}")
 
 
 @command(

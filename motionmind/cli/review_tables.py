@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from motionmind.tween.engine import Engine
     from motionmind.variation.variation import Variation
 
-_MUCH = 0.3  # share of the time beyond which insertions are much
-_STILL = 0.25  # share of steps that stay, beyond which a variation seems to stand still
-_NAME = 24  # characters of a posture's name in a table
+_MANY_INSERTIONS_SHARE = 0.3  # share of the time beyond which insertions are much
+_STANDS_STILL_SHARE = 0.25  # share of steps that stay, beyond which a variation seems to stand still
+_NAME_CHARS = 24  # characters of a posture's name in a table
 
 
 def print_review(report: dict[str, Any], names: Sequence[str]) -> None:
@@ -103,7 +103,7 @@ def _format_stretch(first: int, last: int) -> str:
 
 def _format_names(first: str, last: str) -> str:
     """Format the names of the first and the last posture of a stretch: "adagio@3..17", "adagio@3 to tendu"."""
-    one, other = (displayed(name, _NAME) for name in (first, last))
+    one, other = (displayed(name, _NAME_CHARS) for name in (first, last))
     clip, at, frame = other.rpartition("@")
     if first == last:
         return one
@@ -158,9 +158,9 @@ def print_advice(variation: Variation, engine: Engine | None, depart: float | No
     elif engine is None:
         note("no corpus says which transitions are abrupt, so none is smoothed: name one by --corpus")
     share = counts["inserted_share"]
-    if limits is None and share > _MUCH and "inserted" not in refused:
-        note(f"insertions take {share:.0%} of the time: --inserted {_MUCH:g} keeps more of the piece")
+    if limits is None and share > _MANY_INSERTIONS_SHARE and "inserted" not in refused:
+        note(f"insertions take {share:.0%} of the time: --inserted {_MANY_INSERTIONS_SHARE:g} keeps more of the piece")
     if limits and limits.inserted is not None and share > limits.inserted:
         note(f"no order was found with {limits.inserted:.0%} of the time inserted at most; this one has {share:.0%}")
-    if counts["stays"] > _STILL * (counts["postures"] - 1):
+    if counts["stays"] > _STANDS_STILL_SHARE * (counts["postures"] - 1):
         note(f"{_format_stillness(counts)}: try another --start, or a larger --skip or --step")

@@ -6,20 +6,20 @@ from pathlib import Path
 
 import click
 
-from motionmind.cli.files import MOVEMENT, check_outputs, write_all
-from motionmind.cli.options import OUTPUTS, Section, command, option, output, outputs
+from motionmind.cli.files import MOTION_SUFFIXES, check_outputs, write_all
+from motionmind.cli.options import OUTPUT_KINDS, Section, command, option, output, outputs
 from motionmind.cli.printing import count
 from motionmind.cli.types import FILE, RATE
 from motionmind.cli.words import parse_tolerances
 from motionmind.display import displayed, displayed_path
 from motionmind.render import PICTURES
 
-_TOLERANCE = 12.0  # degrees, for joints that --tolerance does not name
+_DEFAULT_TOLERANCE_DEG = 12.0  # degrees, for joints that --tolerance does not name
 
 
 @command("motionmind compose ballet/barre.score --clip tendus -o tendus.bvh")
 @click.argument("score", type=FILE)
-@outputs(f"Write {OUTPUTS}.")
+@outputs(f"Write {OUTPUT_KINDS}.")
 @option(
     "--fps", section=Section.OUTPUT, type=RATE, help="Resample to N frames per second  [default: a frame a posture]"
 )
@@ -41,7 +41,7 @@ def compose(score: Path, outputs: tuple[Path, ...], clip: str | None, posture: s
         raise click.UsageError("give --clip or --posture, not both")
     if fps and posture:
         raise click.UsageError("--fps is for clips, not for a posture")
-    check_outputs([(path, MOVEMENT + PICTURES) for path in outputs], [score])
+    check_outputs([(path, MOTION_SUFFIXES + PICTURES) for path in outputs], [score])
     names = ", ".join(map(displayed_path, outputs))
     if posture:
         found = notation.posture(read_score(score), posture)
@@ -88,7 +88,7 @@ def library(scores: tuple[Path, ...], output: Path, tolerance: tuple[str, ...], 
 
     places = [locate_score(str(score)) for score in scores]
     check_outputs([(output, (".toml",))], places)
-    degrees, per_joint = parse_tolerances(tolerance, _TOLERANCE)
+    degrees, per_joint = parse_tolerances(tolerance, _DEFAULT_TOLERANCE_DEG)
     found = name_states([read_score(place) for place in places], degrees, per_joint, stage=stage)
     write_library(output, found)
     click.echo(

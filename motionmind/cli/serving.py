@@ -14,8 +14,8 @@ from motionmind.cli.warming import prepare
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 
-_AT_ONCE = 16  # connections
-_IDLE = 5  # seconds that a connection without a request stays open
+_MAX_CONNECTIONS = 16  # connections
+_IDLE_S = 5  # seconds that a connection without a request stays open
 
 
 @command("motionmind serve --mmcp --corpus ballet")
@@ -66,8 +66,8 @@ def serve(mmcp: bool, corpus: str, host: str, port: int, home: Path | None) -> N
             access_log=False,
             ws="none",
             server_header=False,
-            limit_concurrency=_AT_ONCE,
-            timeout_keep_alive=_IDLE,
-            timeout_graceful_shutdown=_IDLE,
+            limit_concurrency=_MAX_CONNECTIONS,
+            timeout_keep_alive=_IDLE_S,
+            timeout_graceful_shutdown=_IDLE_S,
         )
         uvicorn.Server(config).run(sockets=[listening])

@@ -8,9 +8,9 @@ from click.shell_completion import get_completion_class
 from motionmind.cli.options import command
 from motionmind.errors import MotionMindError
 
-_VARIABLE = "_MOTIONMIND_COMPLETE"
+_COMPLETION_VARIABLE = "_MOTIONMIND_COMPLETE"
 # Else bash takes ballet/adagio@23 for three words, and completes the last as another argument.
-_BASH = "COMP_WORDBREAKS=${COMP_WORDBREAKS//@/}\n"
+_BASH_PREFIX = "COMP_WORDBREAKS=${COMP_WORDBREAKS//@/}\n"
 
 
 @command("motionmind completion bash")
@@ -25,5 +25,5 @@ def completion(context: click.Context, shell: str) -> None:
     found = get_completion_class(shell)
     if found is None:
         raise MotionMindError(f"there is no completion for {shell}")
-    source = found(context.find_root().command, {}, "motionmind", _VARIABLE).source()
-    click.echo((_BASH if shell == "bash" else "") + source)
+    source = found(context.find_root().command, {}, "motionmind", _COMPLETION_VARIABLE).source()
+    click.echo((_BASH_PREFIX if shell == "bash" else "") + source)

@@ -20,9 +20,9 @@ from motionmind.errors import MotionMindError
 if TYPE_CHECKING:
     from motionmind.studio.project import Project
 
-_LISTED = 5  # projects that are named at the start
-_TERMINAL = "terminal"  # the window of edits that the command makes
-_COLD = (
+_N_PROJECTS_LISTED = 5  # projects that are named at the start
+_TERMINAL_WINDOW = "terminal"  # the window of edits that the command makes
+_COMPILING_NOTE = (
     "first run: preparing in the background; searches wait for it, up to a minute (`motionmind warm --stop` ends it)"
 )
 
@@ -83,7 +83,7 @@ def studio(
             if given_option(context, ["corpus"]) and project.state.corpus != corpus:
                 from motionmind.studio.edits import SetCorpus
 
-                project.edit(_TERMINAL, SetCorpus(corpus))
+                project.edit(_TERMINAL_WINDOW, SetCorpus(corpus))
             project.tell(url)
             for words in (*project.words, *project.missing):
                 note(words)
@@ -93,7 +93,7 @@ def studio(
                     "and whoever is on the way can read along: nothing is encrypted"
                 )
             if is_cold := not is_all_compiled():
-                note(_COLD)
+                note(_COMPILING_NOTE)
             work, keys = Studio(project, home, first=prepare_in_steps() if is_cold else None), Keys()
             with suppress(MotionMindError):  # which is missing, and said to be
                 work.engine(project.state.corpus)
@@ -137,7 +137,7 @@ def _project(file: Path | None, corpus: str, home: Path | None) -> Project:
             )
         judge = corpus_of(variation)
         project = Project.create(place, judge if judge and _is_here(judge, home) else corpus, home)
-        take_in(project, variation, _TERMINAL)
+        take_in(project, variation, _TERMINAL_WINDOW)
         return project
     source = parse_movement(str(file), home).source
     motions = read_movements(source, (), home, joints=None, unit=None, asf=None, source_fps=None, up=None)
@@ -147,7 +147,7 @@ def _project(file: Path | None, corpus: str, home: Path | None) -> Project:
         Insert(f"b{number}", key, 0, len(motion) - 1)
         for number, (key, motion) in enumerate(zip(keys, motions, strict=True), start=1)
     ]
-    project.edit(_TERMINAL, Several(tuple(blocks), f"begin with {displayed(file.name)}"))
+    project.edit(_TERMINAL_WINDOW, Several(tuple(blocks), f"begin with {displayed(file.name)}"))
     return project
 
 
@@ -173,7 +173,7 @@ def _new(home: Path | None) -> Path:
         known = sorted(folder.glob(f"*{SUFFIX}"), key=lambda path: path.stat().st_mtime, reverse=True)
     except OSError as error:
         raise MotionMindError(f"{folder}: cannot be made: {error.strerror or error}") from error
-    for path in known[:_LISTED]:
+    for path in known[:_N_PROJECTS_LISTED]:
         note(f"an earlier project: {displayed_path(path)}")
     taken = {path.stem for path in known}
     number = next(number for number in range(1, len(taken) + 2) if f"piece-{number}" not in taken)

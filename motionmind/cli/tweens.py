@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli import completion
-from motionmind.cli.files import MOVEMENT, check_outputs, numbered, write
-from motionmind.cli.options import HOME, OUTPUTS, Section, command, option, outputs, reading
+from motionmind.cli.files import MOTION_SUFFIXES, check_outputs, numbered, write
+from motionmind.cli.options import HOME, OUTPUT_KINDS, Section, command, option, outputs, reading
 from motionmind.cli.printing import Interruption, note, print_alternatives, print_tween
 from motionmind.cli.search_options import request_options, searching, via_sources
 from motionmind.cli.sources import ends_reader
@@ -47,7 +47,7 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
     shell_complete=completion.corpora,
     help="Take this corpus, by name or folder  [default: that of A and B, if they are named postures of one]",
 )
-@outputs(f"Write {OUTPUTS}.", required=False)
+@outputs(f"Write {OUTPUT_KINDS}.", required=False)
 @option("--report", section=Section.OUTPUT, type=FILE, help="Write the report as JSON; - prints it.")
 @option(
     "--details", section=Section.OUTPUT, is_flag=True, help="Print costs, states and distances from the corpus, too."
@@ -220,7 +220,7 @@ class _Files:
         outputs: list[tuple[Path, tuple[str, ...]]] = []
         for number in range(1, self.count + 1):
             motions, report, problem = self._files_of(number)
-            outputs += [(path, MOVEMENT + PICTURES) for path in motions]
+            outputs += [(path, MOTION_SUFFIXES + PICTURES) for path in motions]
             outputs += [(report, ())] if report else []
             outputs += [(problem, (".cfn",))] if problem else []
         check_outputs(outputs, sources)

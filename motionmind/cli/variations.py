@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli import completion
-from motionmind.cli.files import EVEN, MOVEMENT, check_outputs, note_licences, write
-from motionmind.cli.options import HOME, OUTPUTS, Section, command, given_option, option, output, outputs, reading
+from motionmind.cli.files import EVEN_SUFFIXES, MOTION_SUFFIXES, check_outputs, note_licences, write
+from motionmind.cli.options import HOME, OUTPUT_KINDS, Section, command, given_option, option, output, outputs, reading
 from motionmind.cli.printing import Interruption, note, print_written
 from motionmind.cli.review_tables import print_advice, print_review
 from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searching, via_sources
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 @command("motionmind vary macarena --attractor rossler --inserted 0.3 -o variation.json")
 @click.argument("source", metavar="PIECE", shell_complete=completion.movement)
-@outputs(f"Write {OUTPUTS}; review takes .json.")
+@outputs(f"Write {OUTPUT_KINDS}; review takes .json.")
 @option("--report", section=Section.OUTPUT, type=FILE, help="Write the report as JSON; - prints it.")
 @option("--json", "as_json", section=Section.OUTPUT, is_flag=True, help="Print the report as JSON, like --report -.")
 @option(
@@ -212,7 +212,7 @@ def vary(
 
     if report == Path("-"):
         report, as_json = None, True
-    files: list[tuple[Path, tuple[str, ...]]] = [(path, MOVEMENT + PICTURES) for path in outputs]
+    files: list[tuple[Path, tuple[str, ...]]] = [(path, MOTION_SUFFIXES + PICTURES) for path in outputs]
     files += [(report, ())] if report else []
     named = parse_movement(source, home)
     sources = (named.source, *via_sources(options, home))
@@ -404,7 +404,7 @@ def _write(outputs: Sequence[Path], report: Path | None, variation: Variation, f
                 write_variation(path, variation)
             else:
                 motion = variation.motion()
-                write(path, motion.resample(fps) if suffix in EVEN else motion)
+                write(path, motion.resample(fps) if suffix in EVEN_SUFFIXES else motion)
         motion_sha256 = sha256_of(written, next(iter(outputs), None))
         if report:
             told = variation.report() | {"motion_sha256": motion_sha256}

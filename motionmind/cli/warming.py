@@ -33,14 +33,20 @@ if TYPE_CHECKING:
     from motionmind.search.problem import Problem
     from motionmind.tween.engine import Engine
 
-FIRST = "first run: preparing in the background, this one may take a minute (`motionmind warm --stop` ends it)"
-STILL = "still preparing in the background ({done} of {total} functions are compiled): this run is slower"
-_LAST = "search/astar.search"  # calls most of what is compiled for a search, and is there only once all of that is
-_LOOK = 0.2  # seconds between two looks at what is compiled
-_STARTS = 5.0  # seconds that the background process may take to begin
-_AT_ONCE = 3  # processes at most that share the work
-_NICER = 10  # by which processes in the background are nicer than others
-_ROOM = 200e6  # bytes free on the disk, below which nothing is compiled in the background; all code takes 15 MB
+FIRST_RUN_NOTE = "first run: preparing in the background, this one may take a minute (`motionmind warm --stop` ends it)"
+STILL_COMPILING_NOTE = (
+    "still preparing in the background ({done} of {total} functions are compiled): this run is slower"
+)
+_LAST_COMPILED = (
+    "search/astar.search"  # calls most of what is compiled for a search, and is there only once all of that is
+)
+_CHECK_INTERVAL_S = 0.2  # seconds between two looks at what is compiled
+_START_TIMEOUT_S = 5.0  # seconds that the background process may take to begin
+_MAX_PROCESSES = 3  # processes at most that share the work
+_NICENESS = 10  # by which processes in the background are nicer than others
+_MIN_FREE_BYTES = (
+    200e6  # bytes free on the disk, below which nothing is compiled in the background; all code takes 15 MB
+)
 
 
 @command("motionmind warm")
@@ -82,9 +88,9 @@ def prepare() -> None:
     if is_all_compiled() or (place := place_of_code()) is None:
         return
     if _is_running(place):
-        click.echo(STILL.format(done=len(compiled_names()), total=len(decorated_names())), err=True)
-    elif shutil.disk_usage(place).free > _ROOM:
-        click.echo(FIRST, err=True)
+        click.echo(STILL_COMPILING_NOTE.format(done=len(compiled_names()), total=len(decorated_names())), err=True)
+    elif shutil.disk_usage(place).free > _MIN_FREE_BYTES:
+        click.echo(FIRST_RUN_NOTE, err=True)
         _start([[compile_beside_search]], in_background=True)
 
 
@@ -115,14 +121,14 @@ def prepare_in_steps() -> Generator[tuple[int, int, bool]]:
     """
     from motionmind.codecache import compiled_names, decorated_names, place_of_code
 
-    if (place := place_of_code()) is None or shutil.disk_usage(place).free < _ROOM:
+    if (place := place_of_code()) is None or shutil.disk_usage(place).free < _MIN_FREE_BYTES:
         return
     if not _is_running(place):
         _start([[compile_before_searches]], in_background=True)
     began = monotonic()
-    while _is_running(place) or monotonic() < began + _STARTS:
+    while _is_running(place) or monotonic() < began + _START_TIMEOUT_S:
         names = compiled_names()
-        yield len(names), len(decorated_names()), _LAST in names
+        yield len(names), len(decorated_names()), _LAST_COMPILED in names
 
 
 def compile_beside_search() -> None:
@@ -172,7 +178,7 @@ def _compile(works: Sequence[Callable[[], None]], processes: int, *, hidden: boo
     """
     from motionmind.codecache import note_all_compiled
 
-    side_by_side = min(processes, _AT_ONCE)
+    side_by_side = min(processes, _MAX_PROCESSES)
     programs = [works[first::side_by_side] for first in range(side_by_side)]
     workers = _start(programs)
     try:
@@ -195,7 +201,7 @@ def _show_progress(is_going_on: Callable[[], bool], *, hidden: bool) -> None:
             now = len(compiled_names())
             bar.update(now - known)
             known = now
-            sleep(_LOOK)
+            sleep(_CHECK_INTERVAL_S)
 
 
 def _start(
@@ -210,7 +216,7 @@ def _start(
     root = str(Path(__file__).parents[2])
     # Compiling makes many objects that stay: with rarer collections it takes a tenth less time and a sixth more memory.
     begin = f"import gc, sys; gc.set_threshold(100_000); sys.path.insert(0, {root!r}); import os"
-    begin += f"; os.nice({_NICER})" * (in_background and hasattr(os, "nice"))
+    begin += f"; os.nice({_NICENESS})" * (in_background and hasattr(os, "nice"))
     begin += "; from motionmind.cli import warming"
     begin += f"; warming.end_with({os.getpid()})" * (not in_background)
     calls = ["; ".join(f"warming.{work.__name__}()" for work in works) for works in programs]
@@ -331,7 +337,7 @@ def seek() -> None:
     trellis = Pieces(problem).trellis(Piece(0, 0, problem.rules.longest), np.inf)
     chosen = np.zeros(len(trellis.dom_ptr) - 1, dtype=np.int64)
     bound = Heuristic.of_messages(trws.no_messages(trellis))
-    astar.search(trellis, bound, np.inf, astar.SAME, chosen, 1000, 1, np.zeros(1, dtype=np.bool_))
+    astar.search(trellis, bound, np.inf, astar.SAME_COST_RATIO, chosen, 1000, 1, np.zeros(1, dtype=np.bool_))
     moves = problem.rules.longest
     solve(replace(problem, rules=replace(problem.rules, shortest=moves, sweeps=0), tolls=None))
 

@@ -15,8 +15,8 @@ from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 
 # With a step above 1 a quaternion can round to zero; cells wider than a third of a turn overlap more than they divide.
-_WIDEST_STEP = 0.9
-_WIDEST_CELL = 120.0
+_MAX_STEP_RATIO = 0.9
+_MAX_CELL_DEG = 120.0
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,12 @@ class QuaternionGrid:
     kind: ClassVar[str] = "quaternion"
 
     def __post_init__(self) -> None:
-        check_range("quaternion step", {"": self.step, **self.per_joint}, 1e-5, _WIDEST_STEP)
+        check_range("quaternion step", {"": self.step, **self.per_joint}, 1e-5, _MAX_STEP_RATIO)
 
     @staticmethod
     def step_for(tolerance: float) -> float:
         """Return the widest step that keeps every orientation within `tolerance` degrees of its state."""
-        return min(_WIDEST_STEP, float(np.sin(0.5 * np.radians(tolerance))))
+        return min(_MAX_STEP_RATIO, float(np.sin(0.5 * np.radians(tolerance))))
 
     def fit(self, names: Sequence[str], rotations: Floats) -> StateSpace:
         """Return the cells of `rotations` [N, J, 4] that occur, for `names` [J]; see `Discretization.fit`."""
@@ -90,14 +90,14 @@ class EulerGrid:
     kind: ClassVar[str] = "euler"
 
     def __post_init__(self) -> None:
-        check_range("width of Euler cells in degrees", {"": self.degrees, **self.per_joint}, 0.001, _WIDEST_CELL)
+        check_range("width of Euler cells in degrees", {"": self.degrees, **self.per_joint}, 0.001, _MAX_CELL_DEG)
         if not isinstance(self.order, str) or sorted(self.order.lower()) != ["x", "y", "z"]:
             raise MotionMindError(f"the rotation order must name x, y and z once each, not {self.order!r}")
 
     @staticmethod
     def degrees_for(tolerance: float) -> float:
         """Return the greatest width, degrees, that keeps every orientation within `tolerance` degrees of its state."""
-        return min(_WIDEST_CELL, float(tolerance * 2.0 / np.sqrt(5.0)))
+        return min(_MAX_CELL_DEG, float(tolerance * 2.0 / np.sqrt(5.0)))
 
     def fit(self, names: Sequence[str], rotations: Floats) -> StateSpace:
         """Return the cells of `rotations` [N, J, 4] that occur, for `names` [J]; see `Discretization.fit`."""

@@ -36,12 +36,12 @@ from motionmind.errors import FormatError, did_you_mean, suggestion
 from motionmind.files import FilePath, parse_toml, read_bytes, write_atomically
 from motionmind.geometry import rotations as rot
 
-FORMAT = "motionmind-library"
-VERSION = 1
+LIBRARY_FORMAT = "motionmind-library"
+LIBRARY_VERSION = 1
 # Two states of a joint that are closer than this many degrees are one state with two names.
-SAME_DEGREES = 0.01
+SAME_STATE_DEG = 0.01
 
-_TEXTS = ("title", "author", "licence", "skeleton")
+_TEXT_KEYS = ("title", "author", "licence", "skeleton")
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Library:
         """Check everything; FormatError names the table and the entry at fault."""
         if not self.tables:
             raise FormatError("no joint has a table of states", path=self.path)
-        for text in (*(getattr(self, key) for key in _TEXTS), *self.tables):
+        for text in (*(getattr(self, key) for key in _TEXT_KEYS), *self.tables):
             self._check_text(text)
         rotations = {table: self._read_table(table) for table in self.tables}
         object.__setattr__(self, "_rotations", rotations)
@@ -123,11 +123,11 @@ class Library:
         names = list(entries)
         for n in range(1, len(states)):
             apart = np.degrees(rot.angle(states[:n], states[n]))
-            if apart.min() < SAME_DEGREES:
+            if apart.min() < SAME_STATE_DEG:
                 twin = names[int(np.argmin(apart))]
                 raise FormatError(
                     f'[{table}] "{names[n]}": the same orientation as "{twin}"; states must differ by '
-                    f"{SAME_DEGREES} degrees at least",
+                    f"{SAME_STATE_DEG} degrees at least",
                     path=self.path,
                 )
         return states
@@ -178,23 +178,23 @@ def parse_library(text: str, *, path: str = "library") -> Library:
 
 def library_from_mapping(data: Mapping[str, object], *, path: str = "library") -> Library:
     """Make a library of `data`, the mapping that the TOML or JSON of a library gives; FormatError if it is not one."""
-    if data.get("format") != FORMAT:
-        raise FormatError(f'not a library of states: it must say format = "{FORMAT}"', path=path)
+    if data.get("format") != LIBRARY_FORMAT:
+        raise FormatError(f'not a library of states: it must say format = "{LIBRARY_FORMAT}"', path=path)
     version = data.get("version")
-    if type(version) is not int or version != VERSION:
-        raise FormatError(f"version must be {VERSION}, the one known here, not {version!r:.40}", path=path)
+    if type(version) is not int or version != LIBRARY_VERSION:
+        raise FormatError(f"version must be {LIBRARY_VERSION}, the one known here, not {version!r:.40}", path=path)
     texts = {}
-    for key in _TEXTS:
+    for key in _TEXT_KEYS:
         value = data.get(key, "human23" if key == "skeleton" else "")
         if not isinstance(value, str):
             raise FormatError(f"{key} must be text, not {value!r:.40}", path=path)
         texts[key] = value
     tables: dict[str, Mapping[str, str | tuple[float, ...]]] = {}
     for key, table in data.items():
-        if key in (*_TEXTS, "format", "version"):
+        if key in (*_TEXT_KEYS, "format", "version"):
             continue
         if not isinstance(table, Mapping):
-            known = ", ".join(("format", "version", *_TEXTS))
+            known = ", ".join(("format", "version", *_TEXT_KEYS))
             raise FormatError(f"{key!r} is neither a joint's table nor one of {known}", path=path)
         tables[key] = {name: tuple(v) if isinstance(v, list) else v for name, v in table.items()}
     return Library(tables, **texts, path=path)
@@ -202,8 +202,8 @@ def library_from_mapping(data: Mapping[str, object], *, path: str = "library") -
 
 def library_to_mapping(library: Library) -> dict[str, object]:
     """Return the library as plain JSON values; the inverse of `library_from_mapping`."""
-    head: dict[str, object] = {"format": FORMAT, "version": VERSION}
-    head.update({key: getattr(library, key) for key in _TEXTS})
+    head: dict[str, object] = {"format": LIBRARY_FORMAT, "version": LIBRARY_VERSION}
+    head.update({key: getattr(library, key) for key in _TEXT_KEYS})
     for table, entries in library.tables.items():
         head[table] = {name: value if isinstance(value, str) else list(value) for name, value in entries.items()}
     return head
@@ -277,8 +277,8 @@ def write_library(path: FilePath, library: Library) -> None:
 
 def format_library(library: Library) -> str:
     """Return the text of a library file; the inverse of `parse_library`."""
-    lines = [f'format = "{FORMAT}"', f"version = {VERSION}"]
-    lines += [f"{key} = {_quoted(getattr(library, key))}" for key in _TEXTS]
+    lines = [f'format = "{LIBRARY_FORMAT}"', f"version = {LIBRARY_VERSION}"]
+    lines += [f"{key} = {_quoted(getattr(library, key))}" for key in _TEXT_KEYS]
     for table, entries in library.tables.items():
         lines += ["", f"[{table if _bare(table) else _quoted(table)}]"]
         for (name, value), q in zip(entries.items(), library.rotations(table), strict=True):

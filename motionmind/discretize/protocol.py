@@ -13,7 +13,7 @@ from motionmind.body.everyday import suggest_joint
 from motionmind.discretize.states import StateSpace, checked_rotations
 from motionmind.errors import MotionMindError, SkeletonError
 
-SIDES = ("left_", "right_")
+SIDE_PREFIXES = ("left_", "right_")
 
 
 @runtime_checkable
@@ -94,7 +94,7 @@ def samples(names: Sequence[str], rotations: Floats) -> Floats:
 def joints_meant(name: str, names: Sequence[str]) -> list[int]:
     """Return the indices of the joints that `name` means: that joint, or both sides for a name without side ("hip")."""
     exact = [j for j, joint in enumerate(names) if joint == name]
-    return exact or [j for j, joint in enumerate(names) if joint in {side + name for side in SIDES}]
+    return exact or [j for j, joint in enumerate(names) if joint in {side + name for side in SIDE_PREFIXES}]
 
 
 def per_joint_values(names: Sequence[str], value: float, per_joint: Mapping[str, float]) -> Floats:

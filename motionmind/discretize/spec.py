@@ -21,7 +21,7 @@ _GROUP: plugins.Group = "motionmind.discretizations"
 KINDS = ("codebook", "quaternion", "euler")
 
 # The keys of each kind of specification besides "kind".
-_KEYS = {
+_KEYS_OF_KIND = {
     "codebook": ("tolerance", "per_joint"),
     "quaternion": ("step", "per_joint"),
     "euler": ("degrees", "order", "per_joint"),
@@ -102,14 +102,14 @@ def from_spec(spec: str | Mapping[str, object]) -> Discretization:
     if not isinstance(spec, Mapping):
         raise FormatError(f"discretization: must be an object with a kind, not {spec!r:.60}")
     kind = spec.get("kind")
-    if isinstance(kind, str) and kind not in _KEYS and kind in plugins.added(_GROUP):
+    if isinstance(kind, str) and kind not in _KEYS_OF_KIND and kind in plugins.added(_GROUP):
         return _make_added(kind, {str(key): value for key, value in spec.items() if key != "kind"})
-    if not isinstance(kind, str) or kind not in _KEYS:
-        raise FormatError(f"discretization: the kind must be one of {', '.join(_KEYS)}, not {kind!r:.60}")
+    if not isinstance(kind, str) or kind not in _KEYS_OF_KIND:
+        raise FormatError(f"discretization: the kind must be one of {', '.join(_KEYS_OF_KIND)}, not {kind!r:.60}")
     options = {str(key): value for key, value in spec.items() if key != "kind"}
     for key in options:
-        if key not in _KEYS[kind]:
-            raise FormatError(f"discretization: {kind} has {', '.join(_KEYS[kind])}, no {key!r:.60}")
+        if key not in _KEYS_OF_KIND[kind]:
+            raise FormatError(f"discretization: {kind} has {', '.join(_KEYS_OF_KIND[kind])}, no {key!r:.60}")
     if not isinstance(options.get("per_joint", {}), Mapping):
         raise FormatError("discretization: per_joint must be an object of joints and numbers")
     try:

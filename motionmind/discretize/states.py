@@ -16,14 +16,14 @@ from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.geometry import rotations as rot
 
 # Orientations less than this many radians apart are one state.
-SAME = 1e-5
+SAME_ROTATION_DEG = 1e-5
 # Cosines of half angles that differ by less than this are a tie. BLAS adds in an order of its own, and a score's
 # angles often lie exactly midway between two states: without a margin the last bit would decide. The margin is far
-# above rounding (1e-16) and below the difference between distinct states (1 - cos(SAME / 2) = 1.25e-11).
-_TIE = 1e-12
+# above rounding (1e-16) and below the difference between distinct states (1 - cos(SAME_ROTATION_DEG / 2) = 1.25e-11).
+_TIE_RATIO = 1e-12
 # Doubles in the largest block of cosines: 1 MB, which stays in the processor's cache. It is the fastest of 1/8 to 8 MB,
 # and 4 to 6 times as fast as 2 MB and more.
-_BLOCK = 1 << 17
+_N_PER_BLOCK = 1 << 17
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +197,7 @@ class StateSpace:
         return np.degrees(rot.angle(rotations, centres))
 
 
-def nearest(rotations: Floats, centres: Floats, *, block: int = _BLOCK) -> tuple[States, Floats]:
+def nearest(rotations: Floats, centres: Floats, *, block: int = _N_PER_BLOCK) -> tuple[States, Floats]:
     """Find the nearest state of each orientation of one joint; ties go to the lowest index.
 
     The angle between unit quaternions a and b is 2 acos |a . b|, so the nearest centre has the largest |a . b|, which
@@ -221,16 +221,16 @@ def nearest(rotations: Floats, centres: Floats, *, block: int = _BLOCK) -> tuple
         np.abs(dots, out=dots)
         best = dots.max(axis=1)
         # argmax of booleans is the first true entry.
-        states[part] = np.argmax(dots >= (best - _TIE)[:, None], axis=1)
+        states[part] = np.argmax(dots >= (best - _TIE_RATIO)[:, None], axis=1)
         cosines[part] = best
     return states, cosines
 
 
 def distinct(centres: Floats) -> Floats:
-    """Return `centres` [S, 4] without duplicates of an earlier one, up to sign and `SAME` radians."""
+    """Return `centres` [S, 4] without duplicates of an earlier one, up to sign and `SAME_ROTATION_DEG` radians."""
     keep = np.ones(len(centres), dtype=bool)
-    limit = np.cos(0.5 * SAME)
-    rows = max(1, _BLOCK // max(1, len(centres)))
+    limit = np.cos(0.5 * SAME_ROTATION_DEG)
+    rows = max(1, _N_PER_BLOCK // max(1, len(centres)))
     for start in range(0, len(centres), rows):
         same = np.abs(centres[start : start + rows] @ centres.T) >= limit
         for n, row in enumerate(same, start):

@@ -11,9 +11,9 @@ from motionmind.executors.here import this_process
 from motionmind.executors.team import Team
 from motionmind.grammar.transitions import Transitions
 
-NEAREST = 3  # nearest states to which bridges lead from each state
-WITHIN = 45.0  # degrees that such a bridge spans at most
-MOST_COMPARED = 1024  # states of a chain that are all compared in pairs: 8 MB a table
+N_BRIDGES_PER_STATE = 3  # nearest states to which bridges lead from each state
+MAX_BRIDGE_DEG = 45.0  # degrees that such a bridge spans at most
+MAX_STATES_COMPARED = 1024  # states of a chain that are all compared in pairs: 8 MB a table
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ def find_bridges(centres: Floats, transitions: Transitions, team: Team | None = 
     def find(chain: int) -> tuple[Ints, Int32s, Floats]:
         first, size = transitions.starts[chain], sizes[chain]
         own = centres[first : first + size]
-        keys, angles = _of_all_pairs(own) if size <= MOST_COMPARED else _of_near_pairs(own)
+        keys, angles = _of_all_pairs(own) if size <= MAX_STATES_COMPARED else _of_near_pairs(own)
         rows = transitions.indptr[first : first + size + 1]
         attested = np.repeat(np.arange(size), np.diff(rows)) * size + transitions.targets[rows[0] : rows[-1]]
         new = ~np.isin(keys, attested)
@@ -76,11 +76,11 @@ def _of_all_pairs(centres: Floats) -> tuple[Ints, Floats]:
 def _of_near_pairs(centres: Floats) -> tuple[Ints, Floats]:
     """Return the same as `_of_all_pairs` but for the order of equal angles, from pairs that a k-d tree finds near."""
     size, tree = len(centres), _Neighbours(centres)
-    source, target, angle = tree.of(np.arange(size), 0, 2 * (NEAREST + 1))
+    source, target, angle = tree.of(np.arange(size), 0, 2 * (N_BRIDGES_PER_STATE + 1))
     order = np.lexsort((target, angle, source))
     source, target, angle = source[order], target[order], angle[order]
     rank = np.arange(len(source)) - np.searchsorted(source, source)
-    near = (rank < NEAREST) & (angle <= WITHIN)
+    near = (rank < N_BRIDGES_PER_STATE) & (angle <= MAX_BRIDGE_DEG)
     one, other = _least_spanning_edges(tree, size)
     keys = np.unique(np.concatenate([source[near] * size + target[near], one * size + other, other * size + one]))
     return keys, tree.angles(keys // size, keys % size)
@@ -157,8 +157,8 @@ def _nearest(angles: Floats) -> Bools:
     """Return whether a state is among the nearest of another, given the angles between them in degrees [S, S]."""
     near = np.zeros(angles.shape, dtype=bool)
     others = angles + np.where(np.eye(len(angles), dtype=bool), np.inf, 0.0)
-    order = np.argsort(others, axis=1, kind="stable")[:, :NEAREST]
-    np.put_along_axis(near, order, np.take_along_axis(others, order, 1) <= WITHIN, axis=1)
+    order = np.argsort(others, axis=1, kind="stable")[:, :N_BRIDGES_PER_STATE]
+    np.put_along_axis(near, order, np.take_along_axis(others, order, 1) <= MAX_BRIDGE_DEG, axis=1)
     return near
 
 

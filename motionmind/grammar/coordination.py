@@ -1,7 +1,7 @@
 """Coordination of joints: a Bayesian network over the joint tree, P(state of a joint | state of its parent).
 
 Stuart and Bradley, "Learning the grammar of dance", ICML (1998), coordinate joints by such a network. A joint's
-conditional distribution is estimated from the corpus's postures with a Dirichlet prior of `PSEUDO_COUNT` virtual
+conditional distribution is estimated from the corpus's postures with a Dirichlet prior of `PRIOR_POSTURES` virtual
 postures that are distributed as the joint's marginal. So a pair that was never seen together is expensive, but
 possible. For states c of the joint and p of its parent, with N the corpus's counts (each posture by its weight), m the
 marginal and a the pseudo-count,
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from pgmpy.models import DiscreteBayesianNetwork
 
 
-PSEUDO_COUNT = 1.0  # virtual postures in the Dirichlet prior
-MOST_CELLS = 100_000_000  # in the dense tables of a network: 0.8 GB
+PRIOR_POSTURES = 1.0  # virtual postures in the Dirichlet prior
+MAX_NETWORK_CELLS = 100_000_000  # in the dense tables of a network: 0.8 GB
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ def learn_coordination(
     """
     coupled = np.where(np.arange(len(parents)) < len(names), parents, -1).astype(np.int64)
     counted = _count(parents[: len(names)], states, sizes, weights, team)
-    is_dense = _cells(parents[: len(names)], sizes) <= MOST_CELLS
+    is_dense = _cells(parents[: len(names)], sizes) <= MAX_NETWORK_CELLS
     network = _network(names, parents, sizes, counted) if is_dense else None
 
     starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
@@ -165,9 +165,9 @@ def fit_network(
         CorpusError: the network's tables would have more than MOST_CELLS cells.
     """
     cells = _cells(parents, sizes)
-    if cells > MOST_CELLS:
+    if cells > MAX_NETWORK_CELLS:
         raise CorpusError(
-            f"a network over these states has {cells:,} cells, and can have {MOST_CELLS:,}: learn with a coarser "
+            f"a network over these states needs {cells:,} cells, more than {MAX_NETWORK_CELLS:,}: learn with a coarser "
             "tolerance, or read the coordination's lists of pairs"
         )
     return _network(names, parents, sizes, _count(parents, states, sizes, weights, team))
@@ -193,7 +193,7 @@ class _Pairs(NamedTuple):
     @property
     def normaliser(self) -> Floats:
         """N(p) + a [P]."""
-        return self.visits + PSEUDO_COUNT
+        return self.visits + PRIOR_POSTURES
 
     def likely(self) -> Floats:
         """Return P(c | p) of each pair [Q]."""
@@ -216,7 +216,7 @@ def _count(parents: Ints, states: Int32s, sizes: Ints, weights: Floats | None, t
         visits = np.asarray(np.bincount(above, weights, most), dtype=np.float64)
         keys, which = np.unique(above * sizes[j] + states[:, j], return_inverse=True)
         together = np.asarray(np.bincount(which, weights, len(keys)), dtype=np.float64)
-        prior = PSEUDO_COUNT * np.bincount(states[:, j], weights, sizes[j]) / weights.sum()
+        prior = PRIOR_POSTURES * np.bincount(states[:, j], weights, sizes[j]) / weights.sum()
         return _Pairs(keys // sizes[j], keys % sizes[j], together, visits, prior)
 
     return tuple((team or this_process()).map(count, range(len(parents))))

@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
-from motionmind.grammar.coordination import PSEUDO_COUNT, Coordination
+from motionmind.grammar.coordination import PRIOR_POSTURES, Coordination
 
 
 def fit_progression(
@@ -97,8 +97,8 @@ def _own_probabilities(source: Ints, size: int, below: Ints, weights: Floats) ->
         weights: weight of each of the corpus's moves [M].
     """
     seen = np.bincount(below, weights, len(source))
-    alone = np.where(seen > 0.0, seen, PSEUDO_COUNT)
-    alone /= np.bincount(source, seen, size)[source] + PSEUDO_COUNT
+    alone = np.where(seen > 0.0, seen, PRIOR_POSTURES)
+    alone /= np.bincount(source, seen, size)[source] + PRIOR_POSTURES
     return alone
 
 
@@ -128,5 +128,5 @@ def _pairs(
     move = begin[context] + within
     together = np.zeros(len(context))
     np.add.at(together, (np.cumsum(count) - count)[which] + below - begin[which], weights)
-    costs = np.log(seen[context] + PSEUDO_COUNT) - np.log(together + PSEUDO_COUNT * alone[move])
+    costs = np.log(seen[context] + PRIOR_POSTURES) - np.log(together + PRIOR_POSTURES * alone[move])
     return move, (contexts // size)[context], costs

@@ -206,7 +206,7 @@ def flatten(graphs: Iterable[nx.DiGraph]) -> Transitions:
         visits.append(np.array([visited for _, visited in graph.nodes(data="visits")], dtype=np.float64))
         leaving.append(np.array([degree for _, degree in graph.out_degree()], dtype=np.int64))
         edges = graph.edges(data=True)
-        columns = zip(*((s, t, *(values[key] for key in _EDGE)) for s, t, values in edges), strict=True)
+        columns = zip(*((s, t, *(values[key] for key in _EDGE_ATTRIBUTES)) for s, t, values in edges), strict=True)
         counted.append(_Counted(*map(np.array, columns)) if edges else _Counted.none())
     _, targets, counts, seconds, attests, arrives = map(np.concatenate, zip(*counted, strict=True))
     return Transitions(
@@ -221,7 +221,7 @@ def flatten(graphs: Iterable[nx.DiGraph]) -> Transitions:
     )
 
 
-_EDGE = ("count", "seconds", "attests", "arrives")  # attributes of an edge that `_Counted` has
+_EDGE_ATTRIBUTES = ("count", "seconds", "attests", "arrives")  # attributes of an edge that `_Counted` has
 
 
 class _Counted(NamedTuple):
@@ -273,7 +273,7 @@ def _graph(visits: Floats, counted: _Counted) -> nx.DiGraph:
     graph = nx.DiGraph()
     graph.add_nodes_from((state, {"visits": visited}) for state, visited in enumerate(visits.tolist()))
     graph.add_edges_from(
-        (source, target, {"weight": weight, **dict(zip(_EDGE, values, strict=True))})
+        (source, target, {"weight": weight, **dict(zip(_EDGE_ATTRIBUTES, values, strict=True))})
         for weight, source, target, *values in zip(
             weights.tolist(), *(array.tolist() for array in counted), strict=True
         )

@@ -19,17 +19,17 @@ from motionmind.corpus.kept import Kept
 from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot
 from motionmind.learned.clusters import clusters_of
-from motionmind.learned.neighbours import MANY, Neighbours, build_neighbours
+from motionmind.learned.neighbours import MAX_FULL_SEARCH, Neighbours, build_neighbours
 from motionmind.learned.percentiles import Percentile
-from motionmind.learned.sampled import BLOCK
-from motionmind.learned.trust import PRIOR, Trust
+from motionmind.learned.sampled import BLOCK_FRAMES
+from motionmind.learned.trust import PRIOR_TRUST, Trust
 
-SLIDES = 0.3  # m/s: speed on the floor that halves a limb's firmness
-LEAVES = 0.06  # least clearance of a body in the air, metres; its lowest point must also move
-FIRM = 0.5  # least firmness of a supporting limb
-RARE = 0.01  # share of postures that may exceed the learned limb penetration or overhang
-USUAL = 0.08  # metres of overhang, for a corpus that shows none
-MOST = 0.15  # greatest overhang, metres: dancers who lean farther are moving
+FIRMNESS_HALVED_MPS = 0.3  # m/s: speed on the floor that halves a limb's firmness
+AIRBORNE_CLEARANCE_M = 0.06  # least clearance of a body in the air, metres; its lowest point must also move
+MIN_FIRMNESS = 0.5  # least firmness of a supporting limb
+RARE_POSTURE_SHARE = 0.01  # share of postures that may exceed the learned limb penetration or overhang
+DEFAULT_OVERHANG_M = 0.08  # metres of overhang, for a corpus that shows none
+MAX_OVERHANG_M = 0.15  # greatest overhang, metres: dancers who lean farther are moving
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class Carriage:
     loose: Bools
     touches: Floats
     trees: Neighbours | None = None
-    trust: Trust = PRIOR
+    trust: Trust = PRIOR_TRUST
 
 
 def learn_carriage(
@@ -110,11 +110,11 @@ def learn_carriage(
         _overhang(corpus, stands[: len(corpus)], aloft[: len(corpus)], workshop),
         find_loose(corpus.skeleton, corpus.rotations),
         _touching(corpus, workshop),
-        build_neighbours(corpus.skeleton, orientations, counts, workshop) if len(counts) > MANY else None,
+        build_neighbours(corpus.skeleton, orientations, counts, workshop) if len(counts) > MAX_FULL_SEARCH else None,
     )
 
 
-_OF_MOVES = "turn", "travel"  # fields with a row per move, and none per posture
+_MOVE_FIELDS = "turn", "travel"  # fields with a row per move, and none per posture
 
 
 class _Moments(NamedTuple):
@@ -159,7 +159,7 @@ def _join_moments(kept: Kept, before: Carriage, workshop: Workshop) -> _Moments:
 
     def join(name: str) -> Floats:
         old, fresh = getattr(before, name), getattr(new, name, None)
-        whole = 0 if name in _OF_MOVES else len(kept.corpus)
+        whole = 0 if name in _MOVE_FIELDS else len(kept.corpus)
         out = workshop.empty((whole + len(kept.corpus.moves), *old.shape[1:]))
         if whole:
             kept.join(old, fresh, kept.postures, out)
@@ -172,7 +172,7 @@ def _join_moments(kept: Kept, before: Carriage, workshop: Workshop) -> _Moments:
 
 def _blocks(count: int) -> Iterator[slice]:
     """Yield slices of BLOCK rows from 0 to a count: measuring all postures at once would exhaust memory."""
-    return (slice(start, start + BLOCK) for start in range(0, count, BLOCK))
+    return (slice(start, start + BLOCK_FRAMES) for start in range(0, count, BLOCK_FRAMES))
 
 
 def _orientations(corpus: Corpus, workshop: Workshop) -> Floats:
@@ -199,7 +199,7 @@ def _touching(corpus: Corpus, workshop: Workshop) -> Floats:
     def depths(here: slice) -> Floats:
         return np.stack([*penetration(corpus.skeleton, corpus.rotations[here]).values()], axis=-1)
 
-    most = Percentile(100.0 * (1.0 - RARE), len(corpus))
+    most = Percentile(100.0 * (1.0 - RARE_POSTURE_SHARE), len(corpus))
     for block in workshop.map(depths, _blocks(len(corpus))):
         most.add(block)
     return most.value()
@@ -225,7 +225,7 @@ def _standing(corpus: Corpus, workshop: Workshop) -> Floats:
         for number in np.unique(limb):  # where every joint belongs to a limb, none is the trunk's
             moved = _lowest_moved(before[:, limb == number], after[:, limb == number])
             speed = np.hypot(moved[:, 0], moved[:, 2]) / corpus.moves.seconds[here]
-            out[len(corpus) :, number][here] = 1.0 / (1.0 + (speed / SLIDES) ** 2)
+            out[len(corpus) :, number][here] = 1.0 / (1.0 + (speed / FIRMNESS_HALVED_MPS) ** 2)
 
     workshop.do(move, _blocks(len(begins)))
     for number in np.unique(limb):
@@ -265,7 +265,7 @@ def _aloft(corpus: Corpus, clearance: Floats, workshop: Workshop) -> Floats:
     both, twice = np.concatenate([begins, ends]), np.concatenate([speed, speed])
     counts = np.maximum(np.bincount(both, minlength=len(corpus)), 1)
     speeds = np.concatenate([np.bincount(both, twice, len(corpus)) / counts, speed])
-    return np.asarray((clearance > LEAVES * size) & (speeds > STILL * size), dtype=np.float64)
+    return np.asarray((clearance > AIRBORNE_CLEARANCE_M * size) & (speeds > STILL * size), dtype=np.float64)
 
 
 def _overhang(corpus: Corpus, stands: Floats, aloft: Floats, workshop: Workshop) -> Floats:
@@ -281,8 +281,8 @@ def _overhang(corpus: Corpus, stands: Floats, aloft: Floats, workshop: Workshop)
     found = workshop.map(lambda here: _overhangs(corpus, here, stands[here], aloft[here]), _blocks(len(corpus)))
     over = np.concatenate(list(found))
     if not len(over):
-        return np.array([USUAL * size])
-    return np.array([min(float(np.nanquantile(over, 1.0 - RARE)), MOST * size)])
+        return np.array([DEFAULT_OVERHANG_M * size])
+    return np.array([min(float(np.nanquantile(over, 1.0 - RARE_POSTURE_SHARE)), MAX_OVERHANG_M * size)])
 
 
 def _overhangs(corpus: Corpus, here: slice, stands: Floats, aloft: Floats) -> Floats:
@@ -297,7 +297,7 @@ def _overhangs(corpus: Corpus, here: slice, stands: Floats, aloft: Floats) -> Fl
     body, rotations, root = corpus.skeleton, corpus.rotations[here], corpus.root[here]
     mass, near = centre_of_mass(body, rotations, root), NEAR * size_of(body)
     low = limb_heights(body, rotations, root)
-    bears = (low <= low.min(axis=1, keepdims=True) + near) & (stands > FIRM) & (aloft == 0.0)[:, None]
+    bears = (low <= low.min(axis=1, keepdims=True) + near) & (stands > MIN_FIRMNESS) & (aloft == 0.0)[:, None]
     alone = bears.sum(axis=1) == 1
     if mass is None or not alone.any():
         return np.zeros(0)

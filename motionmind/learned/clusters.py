@@ -22,15 +22,15 @@ from motionmind.geometry.distances import squared_distance, squared_turn
 from motionmind.jit import jit
 from motionmind.learned.neighbours import node_bounds
 
-ALIKE = 0.2  # radius of a cluster, RMS radians per joint
-DIRECTIONS = 6  # dimensions of the tree; more gain little
-LOOKED_AT = 32  # most founders compared with a posture, nearest projections first
-BLOCK = 2048  # postures compared at a time
-SHOWN = 4096  # postures from which the directions are computed
-SLACK = 1e-6  # allowance for rounding in squared distances of projections
+CLUSTER_RADIUS_RAD = 0.2  # radius of a cluster, RMS radians per joint
+N_TREE_DIMENSIONS = 6  # dimensions of the tree; more gain little
+MAX_FOUNDERS_COMPARED = 32  # most founders compared with a posture, nearest projections first
+N_POSTURES_PER_BLOCK = 2048  # postures compared at a time
+N_POSTURES_FOR_DIRECTIONS = 4096  # postures from which the directions are computed
+SLACK_RAD2 = 1e-6  # allowance for rounding in squared distances of projections
 # Squared distances, radians^2, that differ by less are a tie. Rounding makes differences of 1e-15, by which two dozen
 # of the 13,932 memberships in recordings of one dancer (cmu-05) differed between two processors.
-TIE = 1e-12
+TIE_RAD2 = 1e-12
 
 
 def clusters_of(skeleton: Skeleton, orientations: Floats, workshop: Workshop | None = None) -> Int32s:
@@ -50,9 +50,9 @@ def clusters_of(skeleton: Skeleton, orientations: Floats, workshop: Workshop | N
     def of_part(part: int) -> None:
         joints = parts[part]
         own = workshop.empty((len(orientations), len(joints), 4))
-        for start in range(0, len(orientations), BLOCK):
-            own[start : start + BLOCK] = orientations[start : start + BLOCK, joints]
-        out[:, part] = clusters(own, len(joints) * ALIKE**2, workshop)
+        for start in range(0, len(orientations), N_POSTURES_PER_BLOCK):
+            own[start : start + N_POSTURES_PER_BLOCK] = orientations[start : start + N_POSTURES_PER_BLOCK, joints]
+        out[:, part] = clusters(own, len(joints) * CLUSTER_RADIUS_RAD**2, workshop)
 
     workshop.do(of_part, range(len(parts)))
     return out
@@ -63,17 +63,17 @@ def clusters(orientations: Floats, within: float, workshop: Workshop | None = No
     seen = _seen(orientations, workshop or Workshop())
     forest: list[_Tree] = []
     founders = np.zeros(0, dtype=np.int64)
-    for start in range(0, len(orientations), BLOCK):
-        far = np.arange(start, min(start + BLOCK, len(orientations)))
+    for start in range(0, len(orientations), N_POSTURES_PER_BLOCK):
+        far = np.arange(start, min(start + N_POSTURES_PER_BLOCK, len(orientations)))
         for tree in forest:
-            far = far[_nearest(tree, orientations, seen, far, within)[0] > within + TIE]
+            far = far[_nearest(tree, orientations, seen, far, within)[0] > within + TIE_RAD2]
         founding = _found(np.ascontiguousarray(orientations[far]), np.ascontiguousarray(seen[far]), within)
         _plant(forest, far[founding], seen)
         founders = np.concatenate([founders, far[founding]])
     tree = _grow(founders, seen)
     out = np.empty(len(orientations), dtype=np.int64)
-    for start in range(0, len(orientations), BLOCK):
-        here = np.arange(start, min(start + BLOCK, len(orientations)))
+    for start in range(0, len(orientations), N_POSTURES_PER_BLOCK):
+        here = np.arange(start, min(start + N_POSTURES_PER_BLOCK, len(orientations)))
         out[here] = _nearest(tree, orientations, seen, here)[1]
     return out
 
@@ -122,9 +122,9 @@ def _grow(founders: Ints, seen: Floats) -> _Tree:
 def _seen(orientations: Floats, workshop: Workshop) -> Floats:
     """Project the postures onto the directions of greatest variance [N, d]; distances are at most the root of
     `squared_distance`."""
-    shown = _points(orientations[:: max(len(orientations) // SHOWN, 1)])
+    shown = _points(orientations[:: max(len(orientations) // N_POSTURES_FOR_DIRECTIONS, 1)])
     middle = shown.mean(axis=0)
-    directions = np.linalg.eigh((shown - middle).T @ (shown - middle))[1][:, ::-1][:, :DIRECTIONS]
+    directions = np.linalg.eigh((shown - middle).T @ (shown - middle))[1][:, ::-1][:, :N_TREE_DIMENSIONS]
     seen: Floats = workshop.empty((len(orientations), directions.shape[1]))
     _look_along(orientations, middle, np.ascontiguousarray(directions), seen)
     return seen
@@ -149,7 +149,7 @@ def _nearest(
         enough: a squared distance that is near enough: a result above it is only known to be above it.
     """
     least, place = np.full(len(postures), np.inf), np.zeros(len(postures), dtype=np.int64)
-    _search(*tree, orientations, seen, postures, enough, LOOKED_AT, least, place)
+    _search(*tree, orientations, seen, postures, enough, MAX_FOUNDERS_COMPARED, least, place)
     return least, place
 
 
@@ -166,7 +166,7 @@ def _look_along(orientations: Floats, middle: Floats, directions: Floats, out: F
             row[6], row[7], row[8] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
             for k in range(9):
                 off = row[k] / root - middle[9 * joint + k]
-                for d in range(DIRECTIONS):
+                for d in range(N_TREE_DIMENSIONS):
                     out[n, d] += off * directions[9 * joint + k, d]
 
 
@@ -192,7 +192,7 @@ def _search(
     for i in range(len(postures)):
         here, own = seen[postures[i]], orientations[postures[i]]
         count, first, size = 0, -1, 1
-        limit = np.inf if enough < 0.0 else enough * (1.0 + SLACK) + SLACK
+        limit = np.inf if enough < 0.0 else enough * (1.0 + SLACK_RAD2) + SLACK_RAD2
         nodes[0], gaps[0] = 0, 0.0
         while size:
             size -= 1
@@ -208,7 +208,7 @@ def _search(
                 continue
             for k in range(bounds[node, 0], bounds[node, 1]):
                 off = 0.0
-                for d in range(DIRECTIONS):
+                for d in range(N_TREE_DIMENSIONS):
                     off += (here[d] - points[k, d]) ** 2
                 if off <= limit:
                     count = _insert(near, at, count, off, order[k])
@@ -217,16 +217,21 @@ def _search(
             if count and at[0] != first:
                 first = at[0]
                 compared += 1
-                limit = min(limit, squared_distance(own, orientations[founders[first]]) * (1.0 + SLACK) + SLACK)
+                limit = min(
+                    limit,
+                    squared_distance(own, orientations[founders[first]]) * (1.0 + SLACK_RAD2) + SLACK_RAD2,
+                )
         tried = 0
-        while tried < count and near[tried] <= least[i] * (1.0 + SLACK) + SLACK and least[i] > enough + TIE:
-            distances[tried] = _distance_within(own, orientations[founders[at[tried]]], least[i] + TIE)
+        while (
+            tried < count and near[tried] <= least[i] * (1.0 + SLACK_RAD2) + SLACK_RAD2 and least[i] > enough + TIE_RAD2
+        ):
+            distances[tried] = _distance_within(own, orientations[founders[at[tried]]], least[i] + TIE_RAD2)
             least[i] = min(least[i], distances[tried])
             tried += 1
         compared += tried
         place[i] = len(founders)
         for k in range(tried):
-            if distances[k] <= least[i] + TIE:
+            if distances[k] <= least[i] + TIE_RAD2:
                 place[i] = min(place[i], at[k])
     return compared
 
@@ -246,7 +251,7 @@ def _distance_within(a: Floats, b: Floats, most: float) -> float:
 def _gap(box: Floats, point: Floats) -> float:
     """Return the squared distance of a point [d] from a box [2, d]."""
     total = 0.0
-    for d in range(DIRECTIONS):
+    for d in range(N_TREE_DIMENSIONS):
         off = max(box[0, d] - point[d], point[d] - box[1, d], 0.0)
         total += off * off
     return total
@@ -276,8 +281,8 @@ def _found(orientations: Floats, seen: Floats, within: float) -> Ints:
             bound = 0.0
             for d in range(seen.shape[1]):
                 bound += (seen[i, d] - seen[founders[k], d]) ** 2
-            if bound <= within * (1.0 + SLACK) + SLACK and (
-                squared_distance(orientations[i], orientations[founders[k]]) <= within + TIE
+            if bound <= within * (1.0 + SLACK_RAD2) + SLACK_RAD2 and (
+                squared_distance(orientations[i], orientations[founders[k]]) <= within + TIE_RAD2
             ):
                 alone = False
                 break

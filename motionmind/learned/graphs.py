@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import networkx as nx
     from pgmpy.models import DiscreteBayesianNetwork
 
-LIKELIEST_PARENTS = 3  # parent states listed for each state of a joint graph
+N_LIKELIEST_PARENTS = 3  # parent states listed for each state of a joint graph
 
 
 def joint_graph(learned: LearnedCorpus, joint: str) -> nx.DiGraph:
@@ -62,5 +62,5 @@ def _likeliest_parents(learned: LearnedCorpus, chain: int, parent: int) -> list[
     likely = np.exp(-pairs.pair_costs[listed])
     order = np.lexsort((above, -likely, below))
     starts = np.searchsorted(below[order], np.arange(int(learned.space.sizes[chain]) + 1))
-    best = (order[first : min(first + LIKELIEST_PARENTS, last)] for first, last in pairwise(starts))
+    best = (order[first : min(first + N_LIKELIEST_PARENTS, last)] for first, last in pairwise(starts))
     return [tuple((learned.space.label(parent, int(above[k])), float(likely[k])) for k in some) for some in best]

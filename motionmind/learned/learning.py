@@ -25,8 +25,8 @@ from motionmind.learned.pace import Pace, measure_pace, refit_pace
 from motionmind.learned.plausibility import Plausibility, learn_plausibility
 from motionmind.walks.evidence import learn_trust
 
-MOST_STATES_LEARNED = 50_000  # per joint: a search among them takes about 6 GB
-MOST_FACINGS = 10_000  # every facing shares the transitions of all others
+MAX_STATES_LEARNED = 50_000  # per joint: a search among them takes about 6 GB
+MAX_FACINGS = 10_000  # every facing shares the transitions of all others
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,20 +209,20 @@ def _keep_visited(space: StateSpace, states: States) -> tuple[StateSpace, States
 def _check_size(corpus: Corpus, space: StateSpace) -> None:
     """Raise a CorpusError if a search among a joint's states would take too much memory."""
     largest = int(np.argmax(space.sizes))
-    if space.sizes[largest] > MOST_STATES_LEARNED:
+    if space.sizes[largest] > MAX_STATES_LEARNED:
         raise CorpusError(
             f"corpus {corpus.name!r}: {space.names[largest]} has {space.sizes[largest]} states within "
-            f"{space.tolerances[largest]:g} degrees, and a joint can have {MOST_STATES_LEARNED}; "
+            f"{space.tolerances[largest]:g} degrees, and a joint can have {MAX_STATES_LEARNED}; "
             "give it a coarser tolerance"
         )
 
 
 def _check_facing(corpus: Corpus, tolerance: float) -> None:
     """Raise a CorpusError if the circle has too many states for a root of this tolerance, degrees."""
-    if _facings(tolerance) > MOST_FACINGS:
+    if _facings(tolerance) > MAX_FACINGS:
         raise CorpusError(
             f"corpus {corpus.name!r}: the facing has {_facings(tolerance)} states within {tolerance:g} degrees, and "
-            f"can have {MOST_FACINGS}; give {corpus.skeleton.names[0]} a coarser tolerance"
+            f"can have {MAX_FACINGS}; give {corpus.skeleton.names[0]} a coarser tolerance"
         )
 
 

@@ -13,14 +13,14 @@ import numpy as np
 from motionmind._typing import Floats, Int8s, Int32s, Ints, Singles
 from motionmind.geometry.distances import squared_distance, squared_turn
 from motionmind.jit import jit, read_only
-from motionmind.learned.neighbours import LEAF, WHOLE, Neighbours
+from motionmind.learned.neighbours import CODE_OF_ONE, MAX_LEAF_SAMPLES, Neighbours
 
-LEAVES = 48  # leaves visited per search
-INSIDE = 0.6  # radii by which a ball's nearest sample is likely to be nearer than its centre
+N_LEAVES_VISITED = 48  # leaves visited per search
+NEARER_THAN_CENTRE_RATIO = 0.6  # radii by which a ball's nearest sample is likely to be nearer than its centre
 
 
 def find_near(
-    trees: Neighbours, number: int, orientations: Floats, postures: Floats, count: int, leaves: int = LEAVES
+    trees: Neighbours, number: int, orientations: Floats, postures: Floats, count: int, leaves: int = N_LEAVES_VISITED
 ) -> Ints:
     """Return samples near each of K postures in one body part [K, n], nearest first.
 
@@ -43,7 +43,7 @@ def find_near(
 
 
 def postures_near(
-    trees: Neighbours, orientations: Floats, posture: Floats, count: int, below: int, leaves: int = LEAVES
+    trees: Neighbours, orientations: Floats, posture: Floats, count: int, below: int, leaves: int = N_LEAVES_VISITED
 ) -> Ints:
     """Return the corpus's postures near a given one in the whole body, nearest first.
 
@@ -116,7 +116,7 @@ def _search(posture: Floats, bounds: Int32s, centres: Singles, radii: Floats, le
             continue
         for child in (2 * node + 1, 2 * node + 2):
             away = np.sqrt(squared_distance(centres[child], posture) / len(posture))
-            promise = away - INSIDE * radii[child]
+            promise = away - NEARER_THAN_CENTRE_RATIO * radii[child]
             if child % 2:
                 _sink(promises, nodes, waiting, promise, child)  # in the node's own place
             else:
@@ -160,8 +160,11 @@ def _leaves(orientations: Floats, tree: _Tree, posture: Floats, leaves: int) -> 
     """Return the samples in the `leaves` most promising leaves for a posture of the part [m, 4], and their squared
     distances from it, in arbitrary units."""
     best, many = _search(posture, tree.bounds, tree.centres, tree.radii, leaves), 0
-    found, squared = np.empty(len(best) * LEAF, np.int32), np.empty(len(best) * LEAF, np.float32)
-    sought, width = (WHOLE * posture).astype(np.float32), 4 * len(tree.part)
+    found, squared = (
+        np.empty(len(best) * MAX_LEAF_SAMPLES, np.int32),
+        np.empty(len(best) * MAX_LEAF_SAMPLES, np.float32),
+    )
+    sought, width = (CODE_OF_ONE * posture).astype(np.float32), 4 * len(tree.part)
     for node in best:
         start, stop = tree.bounds[node]
         off = squared[many : many + stop - start]
@@ -179,7 +182,7 @@ def _measure(codes: Int8s, posture: Singles, out: Singles) -> None:
     """Write squared differences between a leaf's codes [4 m, n] and a posture of the part [m, 4], both in 127ths:
     sums over joints [n], each with the nearer sign of the quaternion."""
     out[:] = 0.0
-    whole = np.float32(WHOLE * WHOLE)
+    whole = np.float32(CODE_OF_ONE * CODE_OF_ONE)
     for j in range(len(posture)):
         a, b, c, d = posture[j]
         for k in range(len(out)):  # contiguous, for vector instructions

@@ -28,13 +28,13 @@ from motionmind.executors.workshop import Workshop
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit, read_only
 
-MANY = 8000  # largest number of samples in a corpus without trees, searched in full
-BLOCK = 2048  # samples copied at a time
-LEAF = 32  # most samples in a leaf
-SAMPLE = 64  # samples of a node used to find its centre and to halve it
-COPIED = 1 << 26  # most bytes of centres to copy for searches
-_SLACK = 1e-6  # radians: allowance for rounded centres
-WHOLE = 127.0  # the code of 1
+MAX_FULL_SEARCH = 8000  # largest number of samples in a corpus without trees, searched in full
+BLOCK_SAMPLES = 2048  # samples copied at a time
+MAX_LEAF_SAMPLES = 32  # most samples in a leaf
+N_SAMPLES_FOR_CENTRE = 64  # samples of a node used to find its centre and to halve it
+MAX_COPIED_BYTES = 1 << 26  # most bytes of centres to copy for searches
+_CENTRE_SLACK_RAD = 1e-6  # radians: allowance for rounded centres
+CODE_OF_ONE = 127.0  # the code of 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ class Neighbours:
         Unless they are large, they are copied to make sibling nodes contiguous.
         """
         own = [self.centres_of(number) for number in range(len(self.parts))]
-        if self.centres.nbytes > COPIED:
+        if self.centres.nbytes > MAX_COPIED_BYTES:
             return tuple(own)
         # A spare joint makes the copies views, like uncopied centres, so that loops compile for a single array type.
         roomy = [np.empty((len(one), one.shape[1] + 1, 4), np.float32)[:, :-1] for one in own]
@@ -122,8 +122,8 @@ def build_neighbours(
 
     def grow(number: int) -> None:
         shown = workshop.empty((len(orientations), len(parts[number]), 4), np.float32)
-        for start in range(0, len(orientations), BLOCK):
-            shown[start : start + BLOCK] = orientations[start : start + BLOCK, parts[number]]
+        for start in range(0, len(orientations), BLOCK_SAMPLES):
+            shown[start : start + BLOCK_SAMPLES] = orientations[start : start + BLOCK_SAMPLES, parts[number]]
         _grow(shown, bounds, order[number], trees.centres_of(number), radii[number])
         _encode(shown, bounds, trees.codes_of(number))
         ranks[number, order[number]] = np.arange(len(orientations), dtype=np.int32)
@@ -139,7 +139,7 @@ def build_neighbours(
 def node_bounds(count: int) -> Int32s:
     """Return the range of each node of a tree over `count` samples [K, 2]."""
     levels = [np.array([[0, count]])]
-    while (np.diff(levels[-1]) > LEAF).any():
+    while (np.diff(levels[-1]) > MAX_LEAF_SAMPLES).any():
         start, stop = levels[-1].T
         middle = (start + stop) // 2
         levels.append(np.stack([start, middle, middle, stop], axis=1).reshape(-1, 2))
@@ -169,7 +169,7 @@ def _measure(own: Singles, centre: Singles, keys: Floats) -> float:
 
     A key is the squared distance from a sample far from the centre, less that from a sample far from the first [n].
     """
-    sample = own[:: max(1, len(own) // SAMPLE)]
+    sample = own[:: max(1, len(own) // N_SAMPLES_FOR_CENTRE)]
     _centre(sample, centre)
     one = sample[_farthest(sample, centre)]
     other = sample[_farthest(sample, one)]
@@ -177,7 +177,7 @@ def _measure(own: Singles, centre: Singles, keys: Floats) -> float:
     for k in range(len(own)):
         radius = max(radius, squared_distance(own[k], centre))
         keys[k] = squared_distance(own[k], one) - squared_distance(own[k], other)
-    return float(np.sqrt(radius / own.shape[1]) + _SLACK)
+    return float(np.sqrt(radius / own.shape[1]) + _CENTRE_SLACK_RAD)
 
 
 @jit
@@ -212,4 +212,4 @@ def _encode(shown: Singles, bounds: Int32s, codes: Int8s) -> None:
     width = 4 * shown.shape[1]
     for start, stop in bounds[len(bounds) // 2 :]:
         own = shown[start:stop].reshape(-1, width).astype(np.float64)
-        codes[width * start : width * stop] = np.round(WHOLE * own.T).ravel()
+        codes[width * start : width * stop] = np.round(CODE_OF_ONE * own.T).ravel()

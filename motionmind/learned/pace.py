@@ -44,24 +44,26 @@ from motionmind.corpus.kept import Kept
 from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot
 from motionmind.learned.gauge import Gauge, join_gauges
-from motionmind.learned.peaks import LENGTHS, RARE, Peaks, accelerations
+from motionmind.learned.peaks import PEAK_PERCENTILE, PEAK_WINDOWS_S, Peaks, accelerations
 from motionmind.learned.percentiles import Percentile
-from motionmind.learned.sampled import BLOCK, FPS, Sampled
+from motionmind.learned.sampled import BLOCK_FRAMES, SAMPLED_FPS, Sampled
 
-SHORTEST, LONGEST = 0.3, 5.0  # seconds between the resting frames of a window
-SMOOTHED = 0.5  # seconds over which speeds are averaged to find resting frames
-BEGINS = 0.3  # offset of a displacement, seconds at usual speeds: starting and stopping take time
-STILL = 0.05  # offset of a resting speed, in usual speeds: every recording has noise
+SHORTEST_WINDOW_S, LONGEST_WINDOW_S = 0.3, 5.0  # seconds between the resting frames of a window
+SPEED_SMOOTHING_S = 0.5  # seconds over which speeds are averaged to find resting frames
+DURATION_OFFSET_S = 0.3  # offset of a displacement, seconds at usual speeds: starting and stopping take time
+RESTING_OFFSET_RATIO = 0.05  # offset of a resting speed, in usual speeds: every recording has noise
 # Logarithms of seconds; fitted to cmu-05, indian, cmu-16 and cmu-135 together.
-LEVEL, SLOPE, PULL, SPREAD = 0.0, 0.5, -0.35, 0.6
-SLOPES = 0.15, 0.5  # bounds of the slope: a longer displacement takes longer, at a higher speed
-PULLS = -0.5, 0.0  # bounds of the pull: movement that is quick at its ends takes no longer
-ALIKE = 5  # similar postures of the corpus that give a posture's resting speed
-AS_MANY = 20.0  # weight of the prior, in windows
-SLOWEST_USUAL = 0.3, 0.2, 0.1  # least usual speeds: mean joint, rad/s; turn, rad/s; travel, heights/s
-OF_MEDIAN = 0.25  # a joint's least fastest speed, relative to the median joint's
-EVERYDAY = 3.0, 2.0, 0.5  # least fastest speeds: a joint where most rest, rad/s; turn, rad/s; travel, heights/s
-STARTS = 3.0  # least peak acceleration of the root, heights/s^2: recorded dancers exceed it in 3 of 4 seconds
+PRIOR_LEVEL, PRIOR_SLOPE, PRIOR_PULL, PRIOR_SPREAD = 0.0, 0.5, -0.35, 0.6
+SLOPE_RANGE = 0.15, 0.5  # bounds of the slope: a longer displacement takes longer, at a higher speed
+PULL_RANGE = -0.5, 0.0  # bounds of the pull: movement that is quick at its ends takes no longer
+N_NEIGHBORS = 5  # similar postures of the corpus that give a posture's resting speed
+PRIOR_COUNT = 20.0  # weight of the prior, in windows
+MIN_USUAL_SPEEDS = 0.3, 0.2, 0.1  # least usual speeds: mean joint, rad/s; turn, rad/s; travel, heights/s
+MIN_PEAK_MEDIAN_RATIO = 0.25  # a joint's least fastest speed, relative to the median joint's
+MIN_PEAK_SPEEDS = 3.0, 2.0, 0.5  # least fastest speeds: a joint where most rest, rad/s; turn, rad/s; travel, heights/s
+MIN_PEAK_ROOT_ACCELERATION = (
+    3.0  # least peak acceleration of the root, heights/s^2: recorded dancers exceed it in 3 of 4 seconds
+)
 
 
 class Way(NamedTuple):
@@ -154,7 +156,7 @@ class Pace:
 
     def peaks_in(self, seconds: float, pace: float = 1.0) -> Floats:
         """Return the peaks in windows of a duration [J + 4], for movement at a multiple of the corpus's pace."""
-        peaks = pace * np.array([np.interp(pace * seconds, LENGTHS, part) for part in self.peaks.T])
+        peaks = pace * np.array([np.interp(pace * seconds, PEAK_WINDOWS_S, part) for part in self.peaks.T])
         peaks[-1] *= pace  # accelerations scale with its square
         return peaks
 
@@ -168,11 +170,11 @@ class Pace:
         # Similarity is the sum of squared cosines of half the angles. Ties, up to rounding, go by index on any machine.
         alike = (np.sum(np.einsum("njc,jc->nj", shown, one) ** 2, axis=1) for one in postures)
         order = (np.argsort(-np.round(one, 9), kind="stable") for one in alike)
-        return np.array([self.lull_of(near[:ALIKE]) for near in order])
+        return np.array([self.lull_of(near[:N_NEIGHBORS]) for near in order])
 
     def lull_of(self, numbers: Ints) -> float:
         """Return the mean resting speed of some of the corpus's postures, given by index [n]."""
-        return float(np.exp(np.log(STILL + self.lulls[numbers]).mean()) - STILL)
+        return float(np.exp(np.log(RESTING_OFFSET_RATIO + self.lulls[numbers]).mean()) - RESTING_OFFSET_RATIO)
 
 
 def learn_pace(corpus: Corpus) -> Pace:
@@ -207,10 +209,12 @@ def _measure(corpus: Corpus, workshop: Workshop) -> Gauge:
 
 def _show(corpus: Corpus, clip: Clip) -> tuple[Singles, Floats, Floats]:
     """Return a clip's steps, resting frames and windows, as in Gauge; all empty for a single frame."""
-    recording = Sampled(corpus, clip, FPS)
+    recording = Sampled(corpus, clip, SAMPLED_FPS)
     if len(recording) < 2:
         return np.zeros((0, len(corpus.skeleton) + 6), np.float32), np.zeros((0, 2)), np.zeros((0, 6))
-    blocks = [np.column_stack([steps_of(block), moved_in(block)]) for block in recording.blocks(BLOCK, overlap=1)]
+    blocks = [
+        np.column_stack([steps_of(block), moved_in(block)]) for block in recording.blocks(BLOCK_FRAMES, overlap=1)
+    ]
     steps = np.concatenate(blocks)
     still, speeds = _lulls(steps[:, : len(corpus.skeleton)].mean(axis=1))
     stills = np.column_stack([recording.times[still], speeds])
@@ -222,39 +226,44 @@ def refit_pace(corpus: Corpus, gauge: Gauge) -> Pace:
     joints = len(corpus.skeleton)
     counts = np.diff(gauge.starts[:, 0])
     shown = [(number, clip) for number, clip in enumerate(corpus.clips) if counts[number]]
-    stretches = [_danced(Sampled(corpus, clip, FPS)) for _, clip in shown]
+    stretches = [_danced(Sampled(corpus, clip, SAMPLED_FPS)) for _, clip in shown]
     lengths = np.array([stop - start for some in stretches for start, stop in some], dtype=np.int64)
     moving = counts[counts > 0]
-    rare = Percentile(RARE, int(counts.sum()))
-    seconds = Percentile(100.0 - RARE, int((moving - np.minimum(moving, round(FPS)) + 1).sum()))
+    rare = Percentile(PEAK_PERCENTILE, int(counts.sum()))
+    seconds = Percentile(100.0 - PEAK_PERCENTILE, int((moving - np.minimum(moving, round(SAMPLED_FPS)) + 1).sum()))
     peaks = Peaks(lengths)
     total, most = np.zeros((0, 3)), np.zeros(joints + 4)
     for (number, _), some in zip(shown, stretches, strict=True):
         steps = gauge.steps[gauge.starts[number, 0] : gauge.starts[number + 1, 0]].astype(np.float64)
-        speeds, moved = FPS * steps[:, :-3], steps[:, -3:]
+        speeds, moved = SAMPLED_FPS * steps[:, :-3], steps[:, -3:]
         # Summed in row order, so that the split into clips does not affect rounding.
         total = np.concatenate([total, _usual_parts(speeds, joints)]).sum(axis=0, keepdims=True)
-        most = np.maximum(most, np.append(speeds.max(axis=0), accelerations(moved, FPS).max(initial=0.0)))
+        most = np.maximum(most, np.append(speeds.max(axis=0), accelerations(moved, SAMPLED_FPS).max(initial=0.0)))
         rare.add(speeds[:, :-1])
-        seconds.add(over_seconds(FPS * steps[:, :joints].mean(axis=1), FPS)[:, None])
+        seconds.add(over_seconds(SAMPLED_FPS * steps[:, :joints].mean(axis=1), SAMPLED_FPS)[:, None])
         for start, stop in some:
             peaks.add(speeds[start:stop], moved[start:stop])
-    usual, fastest = np.array(SLOWEST_USUAL), np.concatenate([np.full(joints, EVERYDAY[0]), EVERYDAY[1:]])
-    greatest, slowest = np.append(fastest, [EVERYDAY[2], STARTS]), np.zeros(1)
+    usual, fastest = (
+        np.array(MIN_USUAL_SPEEDS),
+        np.concatenate([np.full(joints, MIN_PEAK_SPEEDS[0]), MIN_PEAK_SPEEDS[1:]]),
+    )
+    greatest, slowest = np.append(fastest, [MIN_PEAK_SPEEDS[2], MIN_PEAK_ROOT_ACCELERATION]), np.zeros(1)
     if shown:
         usual = np.maximum(total[0] / counts.sum(), usual)
         of_joints = rare.value()
         median = float(np.median(of_joints[:joints]))
-        least = OF_MEDIAN * median if median > SLOWEST_USUAL[0] else EVERYDAY[0]  # speeds at rest are noise
-        fastest = np.maximum(of_joints, [*[least] * joints, *EVERYDAY[1:]])
-        greatest = np.maximum(most, np.append(fastest, [EVERYDAY[2], STARTS]))
+        least = (
+            MIN_PEAK_MEDIAN_RATIO * median if median > MIN_USUAL_SPEEDS[0] else MIN_PEAK_SPEEDS[0]
+        )  # speeds at rest are noise
+        fastest = np.maximum(of_joints, [*[least] * joints, *MIN_PEAK_SPEEDS[1:]])
+        greatest = np.maximum(most, np.append(fastest, [MIN_PEAK_SPEEDS[2], MIN_PEAK_ROOT_ACCELERATION]))
         slowest = seconds.value()
     lulls = np.ones(len(corpus))
     for number, clip in shown:
         here = slice(clip.start, clip.stop)
         times, speed = gauge.stills[gauge.starts[number, 1] : gauge.starts[number + 1, 1]].T
         lulls[here] = np.interp(corpus.times[here], times, speed / usual[0])
-    peak = peaks.values(greatest, np.append(fastest, [EVERYDAY[2], STARTS]))
+    peak = peaks.values(greatest, np.append(fastest, [MIN_PEAK_SPEEDS[2], MIN_PEAK_ROOT_ACCELERATION]))
     return Pace(usual, fastest, greatest[:-2], slowest, peak, lulls, _fit_windows(gauge.windows, usual))
 
 
@@ -290,12 +299,12 @@ def over_seconds(speeds: Floats, fps: float) -> Floats:
 def _effort(way: Way, usual: Floats) -> Floats:
     """Return the logarithm of displacements in seconds at usual speeds, plus BEGINS [...]."""
     joints, turn, travel = way.joints.mean(axis=-1) / usual[0], way.turn / usual[1], way.travel / usual[2]
-    return np.asarray(np.log(BEGINS + joints + np.hypot(travel, 0.5 * turn)))
+    return np.asarray(np.log(DURATION_OFFSET_S + joints + np.hypot(travel, 0.5 * turn)))
 
 
 def _quickness(first: Floats, last: Floats) -> Floats:
     """Return the mean logarithm of the resting speeds at both ends, each plus STILL [...]."""
-    return np.asarray(0.5 * (np.log(STILL + first) + np.log(STILL + last)))
+    return np.asarray(0.5 * (np.log(RESTING_OFFSET_RATIO + first) + np.log(RESTING_OFFSET_RATIO + last)))
 
 
 def _windows(clip: Sampled, still: Ints, speeds: Floats) -> Floats:
@@ -309,7 +318,7 @@ def _windows(clip: Sampled, still: Ints, speeds: Floats) -> Floats:
         speeds: mean joint speed in them [S], rad/s.
     """
     rotations, root = clip.take(still)
-    stops = np.searchsorted(still, still + LONGEST * FPS, side="right")
+    stops = np.searchsorted(still, still + LONGEST_WINDOW_S * SAMPLED_FPS, side="right")
     for repair in clip.clip.repairs:
         if not repair.exact:
             first, last = np.searchsorted(clip.times[still], repair.seconds)
@@ -318,15 +327,15 @@ def _windows(clip: Sampled, still: Ints, speeds: Floats) -> Floats:
         (i, k)
         for i, stop in enumerate(stops)
         for k in range(i + 1, stop)
-        if SHORTEST <= (still[k] - still[i]) / FPS <= LONGEST
+        if SHORTEST_WINDOW_S <= (still[k] - still[i]) / SAMPLED_FPS <= LONGEST_WINDOW_S
     ]
     begins, ends = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
     out = np.empty((len(pairs), 6))
-    for start in range(0, len(pairs), BLOCK):
-        part = slice(start, start + BLOCK)
+    for start in range(0, len(pairs), BLOCK_FRAMES):
+        part = slice(start, start + BLOCK_FRAMES)
         found = ways(clip.skeleton, *((of[begins[part]], of[ends[part]]) for of in (rotations, root)))
         out[part, :3] = np.column_stack([found.joints.mean(axis=-1), found.turn, found.travel])
-    out[:, 3], out[:, 4], out[:, 5] = speeds[begins], speeds[ends], (still[ends] - still[begins]) / FPS
+    out[:, 3], out[:, 4], out[:, 5] = speeds[begins], speeds[ends], (still[ends] - still[begins]) / SAMPLED_FPS
     return out
 
 
@@ -346,8 +355,8 @@ def _lulls(steps: Floats) -> tuple[Ints, Floats]:
     """
     still = find_still(steps)
     if not len(still):
-        return np.zeros(1, dtype=np.int64), FPS * steps.mean(keepdims=True)
-    return still, FPS * _smooth(steps)[still]
+        return np.zeros(1, dtype=np.int64), SAMPLED_FPS * steps.mean(keepdims=True)
+    return still, SAMPLED_FPS * _smooth(steps)[still]
 
 
 def find_still(steps: Floats) -> Ints:
@@ -367,7 +376,7 @@ def find_still(steps: Floats) -> Ints:
 
 def _smooth(steps: Floats) -> Floats:
     """Smooth steps [T - 1] over SMOOTHED seconds about each frame; empty for a clip that is shorter."""
-    window = np.hanning(round(SMOOTHED * FPS) + 2)[1:-1]
+    window = np.hanning(round(SPEED_SMOOTHING_S * SAMPLED_FPS) + 2)[1:-1]
     if len(steps) < len(window):
         return np.zeros(0)
     return np.convolve(np.pad(steps, len(window) // 2, mode="edge"), window / window.sum(), "valid")
@@ -383,13 +392,15 @@ def _fit(efforts: Floats, quickness: Floats, logs: Floats) -> Floats:
     """
     given = np.stack([efforts, quickness], axis=1)
     mean = given.mean(axis=0) if len(given) else np.zeros(2)
-    prior = np.array([SLOPE, PULL])
-    middle = (logs.sum() + AS_MANY * (LEVEL + prior @ mean)) / (len(logs) + AS_MANY)  # of the logs at the mean
+    prior = np.array([PRIOR_SLOPE, PRIOR_PULL])
+    middle = (logs.sum() + PRIOR_COUNT * (PRIOR_LEVEL + prior @ mean)) / (
+        len(logs) + PRIOR_COUNT
+    )  # of the logs at the mean
     off = given - mean
-    # The prior acts as AS_MANY windows on its plane, with a standard deviation of 1 in both regressors.
-    products, sums = off.T @ off + AS_MANY * np.eye(2), off.T @ logs + AS_MANY * prior
-    pull = float(np.clip(np.linalg.solve(products, sums)[1], *PULLS))
-    slope = float(np.clip((sums[0] - products[0, 1] * pull) / products[0, 0], *SLOPES))
+    # The prior acts as PRIOR_COUNT windows on its plane, with a standard deviation of 1 in both regressors.
+    products, sums = off.T @ off + PRIOR_COUNT * np.eye(2), off.T @ logs + PRIOR_COUNT * prior
+    pull = float(np.clip(np.linalg.solve(products, sums)[1], *PULL_RANGE))
+    slope = float(np.clip((sums[0] - products[0, 1] * pull) / products[0, 0], *SLOPE_RANGE))
     left = logs - middle - off @ [slope, pull]
-    spread = np.sqrt((left @ left + AS_MANY * SPREAD**2) / (len(logs) + AS_MANY))
+    spread = np.sqrt((left @ left + PRIOR_COUNT * PRIOR_SPREAD**2) / (len(logs) + PRIOR_COUNT))
     return np.array([middle - slope * mean[0] - pull * mean[1], slope, pull, spread])

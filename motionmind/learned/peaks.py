@@ -11,13 +11,15 @@ import numpy as np
 
 from motionmind._typing import Floats, Ints
 from motionmind.learned.percentiles import Percentile
-from motionmind.learned.sampled import FPS
+from motionmind.learned.sampled import SAMPLED_FPS
 
-RARE = 99.0  # percentile of frames, or windows
-LENGTHS = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0  # window lengths, seconds
-STRIDE = 6  # frames from window to window
-FEW = 10  # least number of windows; with fewer, the peaks of shorter windows apply
-_SIZES = [round(seconds * FPS / STRIDE) for seconds in LENGTHS]  # of the windows, in strides
+PEAK_PERCENTILE = 99.0  # percentile of frames, or windows
+PEAK_WINDOWS_S = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0  # window lengths, seconds
+STRIDE_FRAMES = 6  # frames from window to window
+MIN_WINDOWS = 10  # least number of windows; with fewer, the peaks of shorter windows apply
+_WINDOW_STRIDES = [
+    round(seconds * SAMPLED_FPS / STRIDE_FRAMES) for seconds in PEAK_WINDOWS_S
+]  # of the windows, in strides
 
 
 class Peaks:
@@ -28,9 +30,9 @@ class Peaks:
     """
 
     def __init__(self, lengths: Ints) -> None:
-        parts = -(-lengths // STRIDE)
-        counts = [int(np.maximum(parts - size + 1, 0).sum()) for size in _SIZES]
-        self._windows = [Percentile(RARE, count) if count >= FEW else None for count in counts]
+        parts = -(-lengths // STRIDE_FRAMES)
+        counts = [int(np.maximum(parts - size + 1, 0).sum()) for size in _WINDOW_STRIDES]
+        self._windows = [Percentile(PEAK_PERCENTILE, count) if count >= MIN_WINDOWS else None for count in counts]
 
     def add(self, speeds: Floats, moved: Floats) -> None:
         """Add the next stretch of T steps.
@@ -39,10 +41,10 @@ class Peaks:
             speeds: of all parts [T, K].
             moved: displacements of the root [T, 3], heights.
         """
-        parts = np.column_stack([speeds, np.append(accelerations(moved, FPS), 0.0)])
-        # Reduce each STRIDE frames to their maximum; the maxima of windows stay the same.
-        parts = np.maximum.reduceat(parts, np.arange(0, len(parts), STRIDE))
-        for size, windows in zip(_SIZES, self._windows, strict=True):
+        parts = np.column_stack([speeds, np.append(accelerations(moved, SAMPLED_FPS), 0.0)])
+        # Reduce each STRIDE_FRAMES frames to their maximum; the maxima of windows stay the same.
+        parts = np.maximum.reduceat(parts, np.arange(0, len(parts), STRIDE_FRAMES))
+        for size, windows in zip(_WINDOW_STRIDES, self._windows, strict=True):
             if windows is not None and len(parts) >= size:
                 windows.add(np.lib.stride_tricks.sliding_window_view(parts, size, axis=0).max(axis=-1))
 

@@ -49,7 +49,7 @@ from motionmind.learned.learning import Learned, learn, learn_from_states
 from motionmind.learned.neighbours import Neighbours
 from motionmind.learned.pace import Pace, measure_pace
 from motionmind.learned.plausibility import Plausibility
-from motionmind.learned.trust import PRIOR, Trust
+from motionmind.learned.trust import PRIOR_TRUST, Trust
 from motionmind.learned.validity import (
     ENTRIES,
     FORMS,
@@ -327,7 +327,7 @@ def _trust(arrays: Mapping[str, NDArray[Any]], corpus: Corpus, carriage: Carriag
     """Return the trust in a corpus's walks; the prior for a corpus of an earlier version."""
     if arrays.keys() >= TRUST.keys():
         return _part(Trust, "trust", arrays)
-    return replace(PRIOR, spread=spread_of(corpus, carriage))
+    return replace(PRIOR_TRUST, spread=spread_of(corpus, carriage))
 
 
 def _clip_entry(clip: Clip) -> dict[str, Any]:

@@ -29,10 +29,10 @@ from motionmind.body.motion import Motion
 from motionmind.body.plausibility import SEEN, at_rate, floor_of, greatest, implausibility
 from motionmind.corpus.corpus import FACING, Corpus
 from motionmind.learned.pace import way_of
-from motionmind.learned.sampled import BLOCK, Sampled
+from motionmind.learned.sampled import BLOCK_FRAMES, Sampled
 
 MEASURES = (*SEEN, "pace", "sliding")
-ABOUT = {  # the unit of each, and what it is
+UNITS_AND_MEANINGS = {  # the unit of each, and what it is
     "balance": ("m", "how far the body leans over what it stands on, on one limb and at ease"),
     "bounce": ("m/s^2", "greatest acceleration of the body's mass, up or down"),
     "flight": ("", "share of gravity that the body lacks in the air: 1 where it floats"),
@@ -40,14 +40,14 @@ ABOUT = {  # the unit of each, and what it is
     "pace": ("", "how many times as fast as its fastest the fastest part of the body is"),
     "sliding": ("", "greatest share of a second in which a foot near the floor slides"),
 }
-STRETCH = 1.0  # seconds
-BEYOND = 99.5  # percentile of the corpus's own stretches
-SELDOM = 95.0  # percentile for the speed of feet near the floor
-EVERYDAY = 1.5  # least limit of that speed, heights/s: feet reach it in slow walking
+STRETCH_S = 1.0  # seconds
+LIMIT_PERCENTILE = 99.5  # percentile of the corpus's own stretches
+FOOT_SPEED_PERCENTILE = 95.0  # percentile for the speed of feet near the floor
+MIN_FOOT_SPEED_LIMIT = 1.5  # least limit of that speed, heights/s: feet reach it in slow walking
 # Negligible values in any corpus: metres, m/s^2, share of gravity, metres, ratio of speeds, share.
-TRIFLES = np.array([0.02, 1.0, 0.2, 0.01, 1.0, 0.2])
-_MOST = 40_000  # approximate number of frames to measure
-_PIECE = BLOCK // 32  # frames of each piece of a corpus that has more
+NEGLIGIBLE_EXCESS = np.array([0.02, 1.0, 0.2, 0.01, 1.0, 0.2])
+_N_FRAMES_MEASURED = 40_000  # approximate number of frames to measure
+_PIECE_FRAMES = BLOCK_FRAMES // 32  # frames of each piece of a corpus that has more
 
 
 @dataclass(frozen=True)
@@ -94,9 +94,11 @@ class Plausibility:
     def shown(self, motion: Motion) -> dict[str, Sighting]:
         """Measure a movement on the corpus's joints; return a `Sighting` for each measure, by name."""
         values, part = _summarise(motion, self.fastest, None)
-        most = np.maximum(self.most, TRIFLES)  # NaN stays NaN
+        most = np.maximum(self.most, NEGLIGIBLE_EXCESS)  # NaN stays NaN
         return {
-            name: Sighting(_or_none(value), _or_none(limit), ABOUT[name][0], part if name == "pace" else "")
+            name: Sighting(
+                _or_none(value), _or_none(limit), UNITS_AND_MEANINGS[name][0], part if name == "pace" else ""
+            )
             for name, value, limit in zip(MEASURES, values, most, strict=True)
         }
 
@@ -110,11 +112,11 @@ def learn_plausibility(corpus: Corpus, fastest: Floats) -> Plausibility:
     """
     stretches = [_greatest_of_stretches(values) for values in _frames_of(corpus, fastest)]
     most = np.full(len(MEASURES) + 1, np.nan)
-    for column, percent in enumerate((*[BEYOND] * len(MEASURES), SELDOM)):
+    for column, percent in enumerate((*[LIMIT_PERCENTILE] * len(MEASURES), FOOT_SPEED_PERCENTILE)):
         known = np.concatenate([values[:, column] for values in stretches])
         if np.isfinite(known).any():
             most[column] = np.percentile(known[np.isfinite(known)], percent)
-    return Plausibility(fastest, most[:-1], np.maximum(most[-1:], EVERYDAY))
+    return Plausibility(fastest, most[:-1], np.maximum(most[-1:], MIN_FOOT_SPEED_LIMIT))
 
 
 def summarise_shown(motion: Motion, fastest: Floats, floor: float) -> Floats:
@@ -185,11 +187,11 @@ def _frames_of(corpus: Corpus, fastest: Floats) -> Iterator[Floats]:
     A corpus with more than about _MOST frames is measured in evenly spread pieces, with about _MOST frames in all.
     """
     seconds = sum(corpus.times[clip.stop - 1] - corpus.times[clip.start] for clip in corpus.clips)
-    every = int(np.ceil(RATE * seconds / _MOST))
+    every = int(np.ceil(RATE * seconds / _N_FRAMES_MEASURED))
     pieces = 0
     for clip in corpus.clips:
         recording = Sampled(corpus, clip, RATE, smooth=True)
-        size = max(len(recording), BLOCK) if every <= 1 else _PIECE
+        size = max(len(recording), BLOCK_FRAMES) if every <= 1 else _PIECE_FRAMES
         many = -(-len(recording) // size)
         chosen = range(-pieces % every, many, every) if every > 1 else range(many)
         pieces += many
@@ -206,7 +208,7 @@ def _pieces_of(recording: Sampled, size: int, chosen: range) -> tuple[list[Motio
     lowest: list[Floats] = []
     kept: list[Motion] = []
     numbers = count()
-    for block in recording.blocks(max(size, BLOCK)):
+    for block in recording.blocks(max(size, BLOCK_FRAMES)):
         lowest.append(lowest_height(block.skeleton, block.rotations, block.root))
         parts = (block.slice(start, start + size) for start in range(0, len(block), size))
         kept += [part for part, number in zip(parts, numbers, strict=False) if number in chosen]
@@ -216,5 +218,5 @@ def _pieces_of(recording: Sampled, size: int, chosen: range) -> tuple[list[Motio
 def _greatest_of_stretches(values: Floats) -> Floats:
     """Return the maximum of each column [T, M] in each stretch [stretches, M]; minus infinity if all are NaN."""
     known = np.where(np.isnan(values), -np.inf, values)
-    windows = np.lib.stride_tricks.sliding_window_view(known, min(round(STRETCH * RATE), len(known)), axis=0)
+    windows = np.lib.stride_tricks.sliding_window_view(known, min(round(STRETCH_S * RATE), len(known)), axis=0)
     return np.asarray(windows.max(axis=-1))

@@ -13,8 +13,8 @@ from motionmind.corpus.clip import Clip
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry.splines import natural_spline, rotation_spline
 
-FPS = 30.0  # default frame rate of measurements
-BLOCK = 3840  # frames resampled at a time
+SAMPLED_FPS = 30.0  # default frame rate of measurements
+BLOCK_FRAMES = 3840  # frames resampled at a time
 
 
 class Sampled:
@@ -44,7 +44,7 @@ class Sampled:
 
         The frames of a clip that fits one block are cached.
         """
-        return self._whole.slice(start, stop) if len(self) <= BLOCK else self._make(start, stop)
+        return self._whole.slice(start, stop) if len(self) <= BLOCK_FRAMES else self._make(start, stop)
 
     def _make(self, start: int, stop: int) -> Motion:
         times = self.times[start:stop]
@@ -64,8 +64,8 @@ class Sampled:
         """Return rotations [n, J, 4] and root positions [n, 3], metres, of frames given by increasing index [n]."""
         rotations = np.empty((len(numbers), len(self._corpus.skeleton), 4))
         root = np.empty((len(numbers), 3))
-        for number in np.unique(numbers // BLOCK):
-            here = np.flatnonzero(numbers // BLOCK == number)
+        for number in np.unique(numbers // BLOCK_FRAMES):
+            here = np.flatnonzero(numbers // BLOCK_FRAMES == number)
             first = numbers[here[0]]
             part = self.frames(int(first), int(numbers[here[-1]]) + 1)
             rotations[here], root[here] = part.rotations[numbers[here] - first], part.root[numbers[here] - first]

@@ -19,8 +19,8 @@ import numpy as np
 
 from motionmind._typing import Floats
 
-NO_WAY = 1e-3  # radians per joint: a displacement of zero, but for the rounding of files
-RATIOS = np.array([0.0, 0.25, 0.5, 1.0, 2.0])  # of the distance from the corpus to the displacement
+ZERO_DISPLACEMENT_RAD = 1e-3  # radians per joint: a displacement of zero, but for the rounding of files
+DISTANCE_RATIOS = np.array([0.0, 0.25, 0.5, 1.0, 2.0])  # of the distance from the corpus to the displacement
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class Trust:
     """The share of the walks' departure to keep, and the decay time of end velocities.
 
     Attributes:
-        table: share at each of `RATIOS` [5], from 0 to 1.
+        table: share at each of `DISTANCE_RATIOS` [5], from 0 to 1.
         lasts: seconds for which a velocity at an end has effect, at most [1].
         spread: distance between two random postures of the corpus, by body part [P], RMS radians per joint; at this
             distance from every posture the share is 0. Infinity if unknown.
@@ -55,8 +55,8 @@ def counts(off: Floats, ways: Floats, spread: Floats) -> Floats:
     displacement; it is 0 at w = 0. It is multiplied by 1 - (d / spread)^2, or 0 beyond the spread. Arguments are those
     of `Trust.shares`.
     """
-    nearness = np.where(ways < NO_WAY, 0.0, ways / np.maximum(ways + off, NO_WAY))
-    knots = np.append(1.0 / (1.0 + RATIOS), 0.0)[::-1]  # increasing
+    nearness = np.where(ways < ZERO_DISPLACEMENT_RAD, 0.0, ways / np.maximum(ways + off, ZERO_DISPLACEMENT_RAD))
+    knots = np.append(1.0 / (1.0 + DISTANCE_RATIOS), 0.0)[::-1]  # increasing
     before = np.clip(np.searchsorted(knots, nearness, side="right") - 1, 0, len(knots) - 2)
     along = (nearness - knots[before]) / (knots[before + 1] - knots[before])
     out, parts = np.zeros((len(ways), len(knots))), np.arange(len(ways))
@@ -68,8 +68,8 @@ def counts(off: Floats, ways: Floats, spread: Floats) -> Floats:
 # --- fitting ----------------------------------------------------------------------------------------------------------
 
 # Strengths of the prior, relative to the mean diagonal of A; from almost none to the prior alone.
-STRENGTHS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, np.inf)
-SURE = 2.0  # standard errors by which a table must beat one nearer to the prior: 95 %
+PRIOR_STRENGTHS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, np.inf)
+N_STANDARD_ERRORS = 2.0  # standard errors by which a table must beat one nearer to the prior: 95 %
 
 
 class Squares(NamedTuple):
@@ -122,16 +122,16 @@ def fit_table(families: Sequence[Squares], prior: Floats) -> Floats:
     rest = [Squares.summed(one for one in families if one is not left) for left in families]
     errors = np.array(
         [
-            [left.error(others.fitted(prior, strength)) for strength in STRENGTHS]
+            [left.error(others.fitted(prior, strength)) for strength in PRIOR_STRENGTHS]
             for left, others in zip(families, rest, strict=True)
         ]
     )
     worse = errors - errors[:, [errors.sum(axis=0).argmin()]]
-    doubt = SURE * np.sqrt(len(worse)) * worse.std(axis=0, ddof=1)
-    strength = STRENGTHS[np.flatnonzero(worse.sum(axis=0) <= doubt)[-1]]
+    doubt = N_STANDARD_ERRORS * np.sqrt(len(worse)) * worse.std(axis=0, ddof=1)
+    strength = PRIOR_STRENGTHS[np.flatnonzero(worse.sum(axis=0) <= doubt)[-1]]
     return Squares.summed(families).fitted(prior, strength)
 
 
 # Fitted to cmu-05, cmu-16, cmu-29 and cmu-135 (mocap.cs.cmu.edu) together, with equal weights:
 # python experiments/trust/prior.py
-PRIOR = Trust(np.array([1.0, 1.0, 0.35, 0.13, 0.01]), np.array([0.45]), np.array(np.inf))
+PRIOR_TRUST = Trust(np.array([1.0, 1.0, 0.35, 0.13, 0.01]), np.array([0.45]), np.array(np.inf))

@@ -23,10 +23,10 @@ from motionmind.corpus.entries import Columns
 from motionmind.discretize.states import StateSpace
 from motionmind.files import give_back
 from motionmind.learned.neighbours import node_bounds
-from motionmind.learned.peaks import LENGTHS
-from motionmind.learned.plausibility import EVERYDAY, MEASURES
-from motionmind.learned.sampled import FPS
-from motionmind.learned.trust import RATIOS
+from motionmind.learned.peaks import PEAK_WINDOWS_S
+from motionmind.learned.plausibility import MEASURES, MIN_FOOT_SPEED_LIMIT
+from motionmind.learned.sampled import SAMPLED_FPS
+from motionmind.learned.trust import DISTANCE_RATIOS
 
 _MOST = 1e6  # metres, seconds, rad/s, nats: far beyond any movement, and far below where sums overflow
 _SMALL, _TINY = 1e-9, 1e-300
@@ -94,7 +94,7 @@ FORMS = {
     "pace.fastest": _Form("f8", "J+2", _SMALL),
     "pace.greatest": _Form("f8", "J+2", _SMALL),
     "pace.slowest": _Form("f8", "1", 0.0),
-    "pace.peaks": _Form("f8", f"{len(LENGTHS)} J+4", 0.0),
+    "pace.peaks": _Form("f8", f"{len(PEAK_WINDOWS_S)} J+4", 0.0),
     "pace.lulls": _Form("f8", "N", 0.0),
     "pace.law": _Form("f8", "4", -100.0, 100.0),
     "gauge.starts": _Form("i8", "C+1 3"),
@@ -103,7 +103,7 @@ FORMS = {
     "gauge.windows": _Form("f8", "windows 6"),
     "plausibility.fastest": _Form("f8", "J+2", _SMALL),
     "plausibility.most": _Form("f8", f"{len(MEASURES)}", or_nan=True),
-    "plausibility.slides": _Form("f8", "1", EVERYDAY, or_nan=True),
+    "plausibility.slides": _Form("f8", "1", MIN_FOOT_SPEED_LIMIT, or_nan=True),
 }
 
 TREES = {  # of a corpus of many moments, in versions that have them
@@ -117,7 +117,7 @@ TREES = {  # of a corpus of many moments, in versions that have them
 }
 
 TRUST = {  # in versions that have it
-    "trust.table": _Form("f8", f"{len(RATIOS)}", 0.0, 1.0),
+    "trust.table": _Form("f8", f"{len(DISTANCE_RATIOS)}", 0.0, 1.0),
     "trust.lasts": _Form("f8", "1", _SMALL, 10.0),
     "trust.spread": _Form("f8", "parts", _SMALL),
 }
@@ -286,7 +286,7 @@ def _check_gauge(arrays: Mapping[str, NDArray[Any]], corpus: Corpus) -> None:
     counts, last = np.diff(starts, axis=0), [len(arrays[f"gauge.{name}"]) for name in ("steps", "stills", "windows")]
     if starts[0].any() or starts[-1].tolist() != last or (counts < 0).any():
         raise ValueError(f"gauge.starts does not rise from 0 to {last}")
-    steps = np.floor((corpus.times[bounds[1:] - 1] - corpus.times[bounds[:-1]]) * FPS + 1e-3)
+    steps = np.floor((corpus.times[bounds[1:] - 1] - corpus.times[bounds[:-1]]) * SAMPLED_FPS + 1e-3)
     if (counts[:, 0] != steps).any() or (np.minimum(counts[:, 0], 1) > counts[:, 1]).any():
         raise ValueError("gauge.starts has not the steps and still moments that the corpus's clips have")
 

@@ -18,7 +18,7 @@ from motionmind.body.plausibility import at_rate
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.learned.model import LearnedCorpus
-from motionmind.learned.plausibility import ABOUT, MEASURES, summarise_shown
+from motionmind.learned.plausibility import MEASURES, UNITS_AND_MEANINGS, summarise_shown
 from motionmind.metrics.paths import Habits, arrival_spread, learn_habits
 from motionmind.metrics.smoothness import angular_jerk, angular_speed, sparc
 from motionmind.metrics.style import WINDOW, Styles, features, learn_styles
@@ -107,7 +107,7 @@ _ABOUT: Mapping[str, tuple[str, str]] = {
     "style": ("", "how far from how the corpus's joints move: squared Mahalanobis distance"),
     "skating": ("", "share of frames in which a foot that is low moves far"),
     "slide": ("cm", "how far a foot near the floor slides, a frame"),
-    **ABOUT,
+    **UNITS_AND_MEANINGS,
     "moves": ("", "number of moves"),
     "arrival_spread": ("moves", "how far apart joints arrive for good"),
     "attested": ("", "share of the joints' transitions that were seen in the corpus"),

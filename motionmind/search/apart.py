@@ -29,17 +29,17 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.errors import InfeasibleError
 from motionmind.jit import jit
-from motionmind.search.bounding import PROVEN
+from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.search.costs import path_cost
 from motionmind.search.polish import minimise_chain, minimise_moment
 from motionmind.search.problem import Problem, places
 from motionmind.search.solve import Certificate, Progress, Status, Watch, solve
 from motionmind.search.trellis import Trellis, locate, segment_trellises, states_of
 
-ROUNDS = 30  # most prices to try; real ballet takes 6 for one earlier path, 22 for three
-DEARER = tuple(1.2**k for k in range(1, 12))  # multiples of the prices for making a path differ enough
-CHANGED = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0)  # multiples of the prices for improving it
-LEARNING_RATE = 4.0  # of the weights of earlier paths in the search for any path that differs from all of them
+MAX_PRICE_ROUNDS = 30  # most prices to try; real ballet takes 6 for one earlier path, 22 for three
+PRICE_MULTIPLES_DEARER = tuple(1.2**k for k in range(1, 12))  # multiples of the prices for making a path differ enough
+PRICE_MULTIPLES_TRIED = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0)  # multiples of the prices for improving it
+PATH_WEIGHT_RATE = 4.0  # of the weights of earlier paths in the search for any path that differs from all of them
 
 
 class TooAlikeError(InfeasibleError):
@@ -84,7 +84,7 @@ def solve_apart(
     best, seconds = search.best, search.seconds
     seconds["search"] += perf_counter() - began - sum(seconds.values())
     status: Status = "bounded"
-    if best.cost - search.lower_bound <= PROVEN:
+    if best.cost - search.lower_bound <= OPTIMAL_WITHIN_NATS:
         status = "optimal"
     elif search.ended:
         status = "interrupted"
@@ -120,7 +120,7 @@ class _Search:
         self, problem: Problem, earlier: Sequence[Int32s], share: float, watch: Watch | None, within: float
     ) -> None:
         model, moves, chains = problem.model, problem.rules.longest, len(problem.model.parents)
-        budget = max(problem.rules.node_budget // ROUNDS, 1)
+        budget = max(problem.rules.node_budget // MAX_PRICE_ROUNDS, 1)
         self._problem = replace(problem, rules=replace(problem.rules, node_budget=budget))
         self._earlier, self._watch, self._within = np.stack(earlier), watch, within
         self._on_the_way = max(moves - 1, 0) * chains  # states
@@ -139,7 +139,7 @@ class _Search:
         prices = np.zeros(len(self._earlier))
         self._take(self._find_far(), prices)
         cuts = [_Cut(self.best.cost, self._excess(self.best.states))]
-        for _ in range(ROUNDS):
+        for _ in range(MAX_PRICE_ROUNDS):
             found, refund = self._solve(prices), float(prices.sum()) * self._allowed
             excess = self._excess(found.path)
             self._take(found, prices)
@@ -147,7 +147,7 @@ class _Search:
             cuts.append(_Cut(found.cost - refund - float(prices @ excess), excess))
             cuts.append(_Cut(self.best.cost, self._excess(self.best.states)))
             prices, promised = _greatest(cuts)
-            if self.ended or min(promised, self.best.cost) - self.lower_bound <= PROVEN:
+            if self.ended or min(promised, self.best.cost) - self.lower_bound <= OPTIMAL_WITHIN_NATS:
                 return
             if self.best.cost - self.lower_bound <= self._within * self.lower_bound:
                 return
@@ -185,15 +185,15 @@ class _Search:
         rules = replace(rules, per_move=0.0, wait=rules.wait if np.isinf(rules.wait) else 0.0)
         alone = replace(self._problem, model=model, rules=rules)
         weights, least = np.full(len(self._earlier), 1.0 / len(self._earlier)), 0.0
-        for _ in range(ROUNDS):
+        for _ in range(MAX_PRICE_ROUNDS):
             found = solve(_guided(alone, np.tensordot(weights, self._agreeing, 1)))
             excess = self._excess(found.path)
             if self._on_the_way > 0 and np.all(excess <= 0.0):
                 return found
             least = max(least, found.lower_bound)
-            if self._on_the_way == 0 or least > self._allowed + PROVEN:
+            if self._on_the_way == 0 or least > self._allowed + OPTIMAL_WITHIN_NATS:
                 break
-            weights *= np.exp(LEARNING_RATE * excess / self._on_the_way)
+            weights *= np.exp(PATH_WEIGHT_RATE * excess / self._on_the_way)
             weights /= weights.sum()
         raise TooAlikeError(1.0 - least / self._on_the_way if self._on_the_way > 0 else 0.0)
 
@@ -250,15 +250,15 @@ def _improve(trellis: Trellis, chosen: Ints, agreeing: Floats, allowed: Floats, 
                 part = _replace_next(dearer, chosen, part + 1, everywhere, trial)
 
     too_much = excess(chosen)
-    for _ in replacements(DEARER):
+    for _ in replacements(PRICE_MULTIPLES_DEARER):
         if too_much == 0.0:
             break
         if (less := excess(trial)) < too_much:
             chosen[:], too_much = trial, less
-    cost, before, last = path_cost(trellis, chosen), np.inf, len(CHANGED) * parts
+    cost, before, last = path_cost(trellis, chosen), np.inf, len(PRICE_MULTIPLES_TRIED) * parts
     while cost < before - 1e-9:
         before = cost
-        for number in replacements(CHANGED):
+        for number in replacements(PRICE_MULTIPLES_TRIED):
             if number > last and cost == before:  # all from here on were tried since the path last changed
                 break
             if excess(trial) <= too_much and (least := path_cost(trellis, trial)) < cost:

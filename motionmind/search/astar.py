@@ -27,9 +27,9 @@ from motionmind.search.heuristic import Heuristic, from_start, step
 from motionmind.search.trellis import Trellis
 
 # Costs closer than this, in nats, are the same: sums of the same numbers in another order differ by far less.
-SAME = 1e-9
-KEPT = 0.75  # share of a full memory to keep; more costs time, less generates more nodes again
-FEWEST_BUCKETS = 1 << 10  # of the hash table; their number grows with the nodes
+SAME_COST_RATIO = 1e-9
+KEPT_MEMORY_SHARE = 0.75  # share of a full memory to keep; more costs time, less generates more nodes again
+MIN_BUCKETS = 1 << 10  # of the hash table; their number grows with the nodes
 
 _FREE, _FRESH, _HEAPED, _NODES, _PEAK, _EXPANDED, _FORGOTTEN, _BUCKETS = range(8)  # entries of the tally
 
@@ -101,7 +101,7 @@ def search(
     known = lower = cost
     while nodes.tally[_HEAPED] > 0:
         node = int(np.int64(nodes.heap[0]))
-        if nodes.key[node] >= cost - (slack if cost < known else SAME):
+        if nodes.key[node] >= cost - (slack if cost < known else SAME_COST_RATIO):
             lower = nodes.key[node]
             break
         if nodes.tally[_EXPANDED] >= expansions or (ended[0] and nodes.tally[_EXPANDED] > 0):
@@ -134,7 +134,7 @@ def _expand(
     for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
         x = trellis.row_to[e]
         f = nodes.f[node] + step(trellis, heuristic, i, nodes.frontier[node], e)
-        if max(f, floor) >= cost - SAME:
+        if max(f, floor) >= cost - SAME_COST_RATIO:
             continue
         key = f if f > floor + slack else floor
         choice = x - trellis.dom_ptr[i]
@@ -146,7 +146,7 @@ def _expand(
         twin = _find(nodes, node, i, choice, chain)
         if twin >= 0:
             # Not by the last bit: of two prefixes that cost the same, each could come to replace the other's child.
-            if nodes.f[twin] <= f + SAME:
+            if nodes.f[twin] <= f + SAME_COST_RATIO:
                 continue
             if nodes.slot[twin] >= 0 and nodes.children[twin] == 0:
                 parent = int(np.int64(nodes.parent[twin]))
@@ -179,7 +179,7 @@ def _root(trellis: Trellis, bound: float, budget: int) -> _Nodes:
         np.empty(budget, np.int32),
         np.zeros(8, np.int64),
     )
-    nodes.tally[_BUCKETS] = min(buckets, FEWEST_BUCKETS)
+    nodes.tally[_BUCKETS] = min(buckets, MIN_BUCKETS)
     nodes.bucket[: nodes.tally[_BUCKETS]] = -1
     nodes.tally[_FREE] = nodes.tally[_FRESH] = budget - 1
     nodes.tally[_NODES] = nodes.tally[_PEAK] = 1
@@ -220,7 +220,7 @@ def _forget(nodes: _Nodes, current: int) -> bool:
     size, marked = nodes.tally[_HEAPED], _mark(nodes, kept, current)
     while nodes.tally[_HEAPED] > 0:
         node = int(np.int64(nodes.heap[0]))
-        if marked + _unmarked(nodes, kept, node) > KEPT * len(kept):
+        if marked + _unmarked(nodes, kept, node) > KEPT_MEMORY_SHARE * len(kept):
             break
         _close(nodes, node)
         last = nodes.tally[_HEAPED]

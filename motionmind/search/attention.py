@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-SECONDS_UNWATCHED = 0.1  # between two calls of the watcher
+WATCH_INTERVAL_S = 0.1  # between two calls of the watcher
 
 _Result = TypeVar("_Result")
 
@@ -42,7 +42,7 @@ class Attention:
         with ThreadPoolExecutor(1) as pool:
             result = pool.submit(work, *arguments, self.ended)
             try:
-                while not wait([result], SECONDS_UNWATCHED).done:
+                while not wait([result], WATCH_INTERVAL_S).done:
                     self.ends()
             except BaseException:
                 self.ended[0] = True  # do not let an error of the watcher, or Ctrl-C, wait for the work

@@ -18,17 +18,17 @@ from motionmind.search.pair_chain_tables import count_pairs
 from motionmind.search.polish import polish
 from motionmind.search.trellis import Trellis, states_of
 
-SWEEPS_AT_ONCE = 2  # few, since pruning pays at once: 2 is fastest of 1 to 8 on real ballet
-SWEEPS_AT_FIRST = 3  # of the whole trellis, where one more sweep is worth more than polishing the path
-STALLED = (
+N_SWEEPS_PER_ROUND = 2  # few, since pruning pays at once: 2 is fastest of 1 to 8 on real ballet
+N_FIRST_SWEEPS = 3  # of the whole trellis, where one more sweep is worth more than polishing the path
+STALLED_GAIN_RATIO = (
     0.9  # message sweeps that leave more than this share of the gap, and of the positions, give way to pair chains
 )
-PAIR_CHAIN_SWEEPS = 100  # at most, for each number of moves
-PAIR_CHAINS_STALLED = 0.98  # as STALLED; then A* takes over
-WORTH_POLISHING = 0.1  # paths that cost more than this share above the best are not polished
-MOST_PAIRS = 1 << 23  # pairs of states in pair chains, 32 bytes each; more are not built, nor kept for A*
-PROVEN = 1e-6  # nats: a path within this of its lower bound is reported as optimal
-HAIR = 1e-8  # nats: more than the rounding of a path's cost, less than any precision of interest
+MAX_PAIR_CHAIN_SWEEPS = 100  # at most, for each number of moves
+PAIR_CHAINS_STALLED_RATIO = 0.98  # as STALLED_GAIN_RATIO; then A* takes over
+POLISH_WITHIN_SHARE = 0.1  # paths that cost more than this share above the best are not polished
+MAX_STATE_PAIRS = 1 << 23  # pairs of states in pair chains, 32 bytes each; more are not built, nor kept for A*
+OPTIMAL_WITHIN_NATS = 1e-6  # nats: a path within this of its lower bound is reported as optimal
+ROUNDING_NATS = 1e-8  # nats: more than the rounding of a path's cost, less than any precision of interest
 
 
 class Bounded:
@@ -55,12 +55,12 @@ class Bounded:
     @property
     def closed(self) -> bool:
         """Whether bound and path meet, or the remaining trellis has no better path."""
-        return self.lower_bound >= self.cost - PROVEN
+        return self.lower_bound >= self.cost - OPTIMAL_WITHIN_NATS
 
     @property
     def limit(self) -> float:
         """Cost in nats below which paths are of interest, including the best path found."""
-        return self.cost + HAIR if self.found else self.cost - HAIR
+        return self.cost + ROUNDING_NATS if self.found else self.cost - ROUNDING_NATS
 
     def update(self, lower_bound: float, chosen: Ints, through: Floats | None) -> None:
         """Take in a bound and a path of positions [n]; polish the path if it is near the best.
@@ -72,7 +72,7 @@ class Bounded:
                 it is.
         """
         cost = path_cost(self.trellis, chosen)
-        if through is not None and cost <= self.cost + WORTH_POLISHING * abs(self.cost):
+        if through is not None and cost <= self.cost + POLISH_WITHIN_SHARE * abs(self.cost):
             cost = polish(self.trellis, chosen, through)
         if cost < self.cost:
             self.cost, self.states = cost, states_of(self.trellis, chosen)
@@ -106,7 +106,7 @@ def tighten(state: Bounded, sweeps: int, attention: Attention) -> None:
     """Tighten the bounds of a trellis by at most `sweeps` pairs of message sweeps; then, if needed, by pair chains."""
     _tighten_by_messages(state, sweeps, attention)
     several = state.trellis.chains > 1
-    if not (state.closed or attention.ends()) and several and count_pairs(state.trellis) <= MOST_PAIRS:
+    if not (state.closed or attention.ends()) and several and count_pairs(state.trellis) <= MAX_STATE_PAIRS:
         tables = pair_chains.build(state.trellis, state.heuristic.messages)
         state.heuristic = Heuristic.of_pair_chains(tables)
         tighten_by_pair_chains(state, attention)
@@ -117,7 +117,7 @@ def _tighten_by_messages(state: Bounded, sweeps: int, attention: Attention) -> N
     messages, done = trws.no_messages(state.trellis), 0
     while done < sweeps:
         first, gap, size = done == 0, state.cost - state.lower_bound, len(state.trellis.dom)
-        at_once = min(SWEEPS_AT_FIRST if first else SWEEPS_AT_ONCE, sweeps - done)
+        at_once = min(N_FIRST_SWEEPS if first else N_SWEEPS_PER_ROUND, sweeps - done)
         chosen = np.zeros(len(state.trellis.dom_ptr) - 1, dtype=np.int64)
         lower_bound, _ = trws.tighten(state.trellis, messages, chosen, at_once, state.cost)
         done += at_once
@@ -129,14 +129,14 @@ def _tighten_by_messages(state: Bounded, sweeps: int, attention: Attention) -> N
         # Prune the whole trellis in place, as much of it is left; later copy the little that is left, to free memory.
         trellis, messages = trws.prune(state.trellis, messages, state.limit, first)
         state.replace(trellis, Heuristic.of_messages(messages))
-        if state.closed or last or (not first and state.stalls(gap, size, STALLED)):
+        if state.closed or last or (not first and state.stalls(gap, size, STALLED_GAIN_RATIO)):
             break
 
 
 def tighten_by_pair_chains(state: Bounded, attention: Attention) -> None:
     """Tighten further by the heuristic's pair chains, in the same way."""
     state.lower_bound = max(state.lower_bound, min(pair_chains.lower_bound(state.heuristic.tables), state.cost))
-    for done in range(PAIR_CHAIN_SWEEPS):
+    for done in range(MAX_PAIR_CHAIN_SWEEPS):
         if state.closed:
             break
         gap, size = state.cost - state.lower_bound, len(state.trellis.dom)
@@ -148,5 +148,5 @@ def tighten_by_pair_chains(state: Bounded, attention: Attention) -> None:
         if state.found or not state.closed:
             trellis, tables = pair_chains.prune(state.trellis, tables, through, state.limit)
             state.replace(trellis, Heuristic.of_pair_chains(tables))
-        if attention.ends() or (done and state.stalls(gap, size, PAIR_CHAINS_STALLED)):
+        if attention.ends() or (done and state.stalls(gap, size, PAIR_CHAINS_STALLED_RATIO)):
             break

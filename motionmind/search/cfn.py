@@ -31,7 +31,7 @@ from motionmind._typing import Floats, Int32s, Ints
 from motionmind.search.problem import Model, Problem
 from motionmind.search.trellis import Trellis, segment_trellises
 
-DECIMALS = 6
+N_COST_DECIMALS = 6
 
 
 class Ingredients(NamedTuple):
@@ -233,7 +233,7 @@ def _model_edges(model: Model, segment: _Segment) -> Ints:
 def _write(title: str, variables: dict[str, list[str]], functions: Sequence[_Function]) -> str:
     """Return the text of a network."""
     # More than any path can cost: the sum of the greatest costs of all functions.
-    forbidden = f"{1.0 + sum(np.abs(one.costs).max(initial=0.0) for one in functions):.{DECIMALS}f}"
+    forbidden = f"{1.0 + sum(np.abs(one.costs).max(initial=0.0) for one in functions):.{N_COST_DECIMALS}f}"
     header = {"name": title, "mustbe": f"<{forbidden}"}
     values = (f"{json.dumps(name)}: {json.dumps(states)}" for name, states in variables.items())
     return (
@@ -247,8 +247,8 @@ def _write(title: str, variables: dict[str, list[str]], functions: Sequence[_Fun
 
 def _line(function: _Function, forbidden: str) -> str:
     """Format a function without exponents: toulbar2 does not read numbers such as 2e-06, although JSON does."""
-    rounded = np.round(function.costs, DECIMALS).tolist()
-    costs, default = [f"{cost:.{DECIMALS}f}" if cost else "0" for cost in rounded], ""
+    rounded = np.round(function.costs, N_COST_DECIMALS).tolist()
+    costs, default = [f"{cost:.{N_COST_DECIMALS}f}" if cost else "0" for cost in rounded], ""
     if function.pairs is not None:
         costs = [f"{a}, {b}, {cost}" for (a, b), cost in zip(function.pairs.tolist(), costs, strict=True)]
         default = f'"defaultcost": {forbidden if function.forbids else 0}, '

@@ -15,7 +15,7 @@ import numpy as np
 from motionmind._typing import Bools, Ints
 from motionmind.search import astar, heuristic, pair_chains
 from motionmind.search.attention import Attention
-from motionmind.search.bounding import HAIR, PROVEN, Bounded, tighten_by_pair_chains
+from motionmind.search.bounding import OPTIMAL_WITHIN_NATS, ROUNDING_NATS, Bounded, tighten_by_pair_chains
 from motionmind.search.costs import path_cost
 from motionmind.search.heuristic import Heuristic
 from motionmind.search.polish import polish
@@ -68,7 +68,7 @@ def _search_at_once(state: Bounded, nodes: int, budget: int, attention: Attentio
     if budget <= 0 or (state.closed and not state.found):
         return Effort()
     chosen = np.zeros(len(state.trellis.dom_ptr) - 1, dtype=np.int64)
-    slack = PROVEN + 2.0 * HAIR if state.closed else astar.SAME
+    slack = OPTIMAL_WITHIN_NATS + 2.0 * ROUNDING_NATS if state.closed else astar.SAME_COST_RATIO
     found = attention.run(astar.search, state.trellis, state.heuristic, state.limit, slack, chosen, nodes, budget)
     if found.cost < state.limit:
         state.take(path_cost(state.trellis, chosen), states_of(state.trellis, chosen), found.lower_bound)

@@ -13,7 +13,7 @@ from motionmind.jit import jit
 from motionmind.search.costs import edge_cost, path_cost
 from motionmind.search.trellis import Trellis, correction
 
-_ROUNDING = 1e-6  # nats: more than bounds are off by
+_BOUND_ROUNDING_NATS = 1e-6  # nats: more than bounds are off by
 
 
 @jit
@@ -60,7 +60,7 @@ def polish(trellis: Trellis, path: Ints, through: Floats) -> float:
 @jit
 def _of_use(path: Ints, through: Floats, cost: float) -> Bools:
     """Return which positions [P] a path that costs at most `cost` may go through, including those of `path`."""
-    kept = through <= cost + _ROUNDING
+    kept = through <= cost + _BOUND_ROUNDING_NATS
     for p in path:
         kept[p] = True
     return kept

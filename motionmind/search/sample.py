@@ -25,7 +25,7 @@ from motionmind.search.problem import Problem
 from motionmind.search.solve import Certificate
 from motionmind.search.trellis import Trellis, correction, locate, segment_trellises, states_of
 
-ROUNDS = 100  # each samples every chain and every move once
+N_SAMPLING_ROUNDS = 100  # each samples every chain and every move once
 
 
 def sample_path(problem: Problem, certificate: Certificate, seed: int) -> Certificate:
@@ -45,7 +45,7 @@ def sample_path(problem: Problem, certificate: Certificate, seed: int) -> Certif
     for trellis, (first, last) in zip(segment_trellises(problem, moves), pairwise(moves), strict=True):
         chosen = locate(trellis, path[first : last + 1])
         chosen[: trellis.chains] = trellis.dom_ptr[: trellis.chains]  # a via, at which the segment before may arrive
-        cost += float(gibbs_sample(trellis, chosen, ROUNDS, rng))
+        cost += float(gibbs_sample(trellis, chosen, N_SAMPLING_ROUNDS, rng))
         path[first + 1 : last + 1] = states_of(trellis, chosen)[1:]
     return replace(certificate, path=path, cost=cost + problem.rules.per_move * (len(path) - 1), status="sampled")
 

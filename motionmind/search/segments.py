@@ -15,7 +15,7 @@ import numpy as np
 
 from motionmind._typing import Floats, States
 
-SAME = 1e-9  # nats: closer costs differ by rounding only
+SAME_COST_NATS = 1e-9  # nats: closer costs differ by rounding only
 
 
 class Piece(NamedTuple):
@@ -89,7 +89,7 @@ class Segments:
         """
         self._unseen[piece] = False
         self.lower[piece] = max(self.lower[piece], lower)
-        if len(path) > 0 and cost <= self._cost[piece] + SAME:
+        if len(path) > 0 and cost <= self._cost[piece] + SAME_COST_NATS:
             self._cost[piece], self._paths[piece] = cost, path
             self.best = float(self._so_far(self._cost)[-1].min())
 

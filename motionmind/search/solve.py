@@ -12,14 +12,14 @@ from motionmind._typing import Int32s
 from motionmind.errors import InfeasibleError
 from motionmind.search import bounding, parts, trws
 from motionmind.search.attention import Attention, Clock
-from motionmind.search.bounding import HAIR, PROVEN, Bounded, tighten
+from motionmind.search.bounding import OPTIMAL_WITHIN_NATS, ROUNDING_NATS, Bounded, tighten
 from motionmind.search.heuristic import Heuristic
 from motionmind.search.length import LengthChoice, choose_length
 from motionmind.search.pieces import Pieces
 from motionmind.search.problem import Problem, Rules, Via
 from motionmind.search.segments import Piece, Segments
 
-MOST_STATES_OF_CHAIN = 1 << 16  # A* numbers the states of a chain in 16 bits
+MAX_CHAIN_STATES = 1 << 16  # A* numbers the states of a chain in 16 bits
 
 Status = Literal["optimal", "bounded", "interrupted", "sampled"]
 
@@ -93,8 +93,8 @@ def solve(problem: Problem, watch: Watch | None = None) -> Certificate:
         ValueError: a chain has too many states, or the guide has costs that the problem cannot take.
     """
     states = int(np.diff(problem.model.starts).max())
-    if states > MOST_STATES_OF_CHAIN:
-        raise ValueError(f"a chain has {states} states; the search takes up to {MOST_STATES_OF_CHAIN}")
+    if states > MAX_CHAIN_STATES:
+        raise ValueError(f"a chain has {states} states; the search takes up to {MAX_CHAIN_STATES}")
     solver, rules, length = _Solver(watch), problem.rules, None
     if rules.shortest < rules.longest and problem.tolls is not None:
         length = choose_length(problem)
@@ -147,7 +147,7 @@ class _Solver:
         self._search(lambda: False)
         for piece in self.segments.best_pieces():
             if piece not in self.searched:
-                self._search_piece(piece, self.segments.cost(piece) + 2.0 * HAIR)
+                self._search_piece(piece, self.segments.cost(piece) + 2.0 * ROUNDING_NATS)
 
     def choose_length(self) -> LengthChoice:
         """Search until the number of moves of the best path is proven, and return it: the choice without tolls."""
@@ -158,20 +158,23 @@ class _Solver:
         return LengthChoice(segments.moves, cost, lower_bound, segments.lower_bound_elsewhere(), self.expansions)
 
     def _length_is_proven(self) -> bool:
-        return np.isfinite(self.segments.best) and self.segments.lower_bound_elsewhere() > self.segments.best - PROVEN
+        return (
+            np.isfinite(self.segments.best)
+            and self.segments.lower_bound_elsewhere() > self.segments.best - OPTIMAL_WITHIN_NATS
+        )
 
     def _bound(self, enough: Callable[[], bool]) -> None:
         """Bound pieces, and find paths, until the best is proven or only a search can improve further."""
         pairs = 0  # in the pair chains that are kept
         while True:
             piece, least, below = self.segments.most_promising()
-            if not least < self.segments.best - PROVEN or enough():
+            if not least < self.segments.best - OPTIMAL_WITHIN_NATS or enough():
                 return
             if self.attention.ends() and np.isfinite(self.segments.best):
                 return
             state = self._bounded(piece, below)
             more = len(state.heuristic.tables.pair_cost)
-            if (state.found or not state.closed) and pairs + more <= bounding.MOST_PAIRS:
+            if (state.found or not state.closed) and pairs + more <= bounding.MAX_STATE_PAIRS:
                 self.kept[piece] = state
                 pairs += more
             self._update(piece, state)
@@ -192,7 +195,7 @@ class _Solver:
         while True:
             piece, least, below = self.segments.most_promising()
             spent = self.expansions >= self.rules.node_budget
-            if not least < self.segments.best - PROVEN or enough() or spent or self.attention.ends():
+            if not least < self.segments.best - OPTIMAL_WITHIN_NATS or enough() or spent or self.attention.ends():
                 return
             self._search_piece(piece, below)
 
@@ -216,7 +219,7 @@ class _Solver:
         """Return the best path and the proof."""
         (cost, lower_bound), (path, passed) = self._result(), self.segments.path()
         status: Status = "bounded"
-        if cost - lower_bound <= PROVEN:
+        if cost - lower_bound <= OPTIMAL_WITHIN_NATS:
             status = "optimal"
         elif self.attention.ended[0]:
             status = "interrupted"

@@ -27,7 +27,7 @@ from motionmind.retarget.joint_mapping import joint_mapping
 from motionmind.retarget.retarget import to_human23
 from motionmind.search.length import fewest_moves
 from motionmind.search.problem import Model, Problem, Rules, Via
-from motionmind.search.solve import MOST_STATES_OF_CHAIN
+from motionmind.search.solve import MAX_CHAIN_STATES
 from motionmind.tween.constraints import Constraint, constraints_of, restrict
 from motionmind.tween.guide import find_detour, make_guide
 from motionmind.tween.modes import find_place
@@ -243,11 +243,11 @@ def _lifted(learned: LearnedCorpus, problem: Problem, factor: float) -> tuple[Pr
     """Return the same problem over moves instead of states, and the network over moves."""
     held = problem.model_with_waits()
     count = np.diff(held.starts) + np.diff(held.indptr[held.starts])  # of each chain's states
-    if count.max() > MOST_STATES_OF_CHAIN:
+    if count.max() > MAX_CHAIN_STATES:
         joint = learned.grammar.chains[int(count.argmax())]
         raise MotionMindError(
             f"coordination progression: {joint} has {count.max()} states and moves, and the search takes up to "
-            f"{MOST_STATES_OF_CHAIN}; build the corpus with a coarser tolerance for it, or ask for strict"
+            f"{MAX_CHAIN_STATES}; build the corpus with a coarser tolerance for it, or ask for strict"
         )
     moves = learned.corpus.moves
     network = fit_progression(

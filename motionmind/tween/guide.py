@@ -25,7 +25,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
 from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.pace import over_seconds, way_between
-from motionmind.learned.trust import NO_WAY
+from motionmind.learned.trust import ZERO_DISPLACEMENT_RAD
 from motionmind.realise.detour import detour
 from motionmind.realise.timeline import usual
 from motionmind.tween.pacing import usual_times
@@ -108,7 +108,7 @@ def find_detour(
         duration: total seconds.
     """
     seconds, way = usual(learned.grammar.transitions), way_between(*ends)
-    if way.parts.max() < NO_WAY:  # equal ends: hold still
+    if way.parts.max() < ZERO_DISPLACEMENT_RAD:  # equal ends: hold still
         return None
     (own,) = (time.median for time in usual_times(learned, ends))
     if np.log(duration / own) <= SELDOM * learned.pace.spread:

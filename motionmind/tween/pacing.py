@@ -29,7 +29,7 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.display import displayed
 from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.nearest import postures_near
-from motionmind.learned.pace import ALIKE, over_seconds, way_between, way_of
+from motionmind.learned.pace import N_NEIGHBORS, over_seconds, way_between, way_of
 from motionmind.realise.timeline import usual
 
 A_CHAIN = 10.0  # w: weight of the duration's density for each chain
@@ -75,7 +75,7 @@ def lulls_of(learned: LearnedCorpus, rotations: Floats) -> Floats:
     postures = corpus.to_chains(rotations)[:, :joints]
     if trees is None:
         return learned.pace.lulls_of(postures, shown[: len(corpus), :joints])
-    near = (postures_near(trees, shown, posture, ALIKE, len(corpus)) for posture in postures)
+    near = (postures_near(trees, shown, posture, N_NEIGHBORS, len(corpus)) for posture in postures)
     return np.array([learned.pace.lull_of(numbers) for numbers in near])
 
 

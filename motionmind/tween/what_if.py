@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, TypeVar
 
-from motionmind.search.bounding import PROVEN
+from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.search.length import choose_length
 from motionmind.search.problem import Problem
 from motionmind.search.solve import Certificate, solve
@@ -119,7 +119,7 @@ def _compare(name: str, asked: Answer, freed: Answer, moves: int) -> WhatIf:
     costs = {"cost": _cost, "haste and pace": _paced, "costs without the guide": _unguided}[compared]
     (cost, bound), (freed_cost, freed_bound) = costs(asked), costs(freed)
     least, most = max(bound - freed_cost, 0.0), max(cost - freed_bound, 0.0)
-    return WhatIf(name, least, most, most - least <= 2.0 * PROVEN, moves, compared)
+    return WhatIf(name, least, most, most - least <= 2.0 * OPTIMAL_WITHIN_NATS, moves, compared)
 
 
 def _cost(answer: Answer) -> tuple[float, float]:

@@ -23,7 +23,7 @@ from motionmind.corpus.corpus import Corpus
 from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import Carriage
-from motionmind.learned.trust import NO_WAY, PRIOR, Squares, Trust, counts, fit_table
+from motionmind.learned.trust import PRIOR_TRUST, ZERO_DISPLACEMENT_RAD, Squares, Trust, counts, fit_table
 from motionmind.walks.likelihood import BODY_PART_WEIGHTS
 from motionmind.walks.mean_walk import Walk, walk_between
 from motionmind.walks.minimal import departure, minimal_movement
@@ -81,10 +81,10 @@ def learn_trust(corpus: Corpus, carriage: Carriage, workshop: Workshop | None = 
         gather_evidence(corpus, carriage, N_WINDOWS_PER_LENGTH, workshop) if len(corpus.clips) >= MIN_FAMILIES else []
     )
     if len(evidence) < MIN_FAMILIES:
-        return replace(PRIOR, spread=spread)
+        return replace(PRIOR_TRUST, spread=spread)
     errors = errors_of_lasting(corpus, 2 * N_WINDOWS_PER_LENGTH)
-    lasts = DECAY_CANDIDATES_S[int(np.argmin(errors))] if errors.any() else PRIOR.lasts[0]
-    return Trust(fit_table(evidence, PRIOR.table), np.array([lasts]), spread)
+    lasts = DECAY_CANDIDATES_S[int(np.argmin(errors))] if errors.any() else PRIOR_TRUST.lasts[0]
+    return Trust(fit_table(evidence, PRIOR_TRUST.table), np.array([lasts]), spread)
 
 
 def gather_evidence(corpus: Corpus, carriage: Carriage, count: int, workshop: Workshop | None = None) -> list[Squares]:
@@ -114,7 +114,9 @@ def spread_of(corpus: Corpus, carriage: Carriage) -> Floats:
     """Return the RMS distance per joint between two random postures, for each body part [P], radians."""
     one, other = np.random.default_rng(0).integers(len(corpus), size=(2, N_RANDOM_PAIRS))
     turned = rot.angle(carriage.orientations[one], carriage.orientations[other]) ** 2
-    return np.array([max(float(np.sqrt(turned[:, part].mean())), NO_WAY) for part in parts_of(corpus.skeleton)])
+    return np.array(
+        [max(float(np.sqrt(turned[:, part].mean())), ZERO_DISPLACEMENT_RAD) for part in parts_of(corpus.skeleton)]
+    )
 
 
 def of_pieces(corpus: Corpus, carriage: Carriage, pieces: Sequence[_Piece]) -> Carriage:
@@ -211,7 +213,7 @@ def _squares(corpus: Corpus, carriage: Carriage, others: Carriage, spread: Float
     of_joints = _of_joints(walk, spread)
     inner = of_joints.T @ (np.sum(departs**2, axis=(0, 2))[:, None] * of_joints)
     along, whole = of_joints.T @ np.sum(departs * truly, axis=(0, 2)), float(np.sum(truly**2))
-    weight = 1.0 / max(whole, NO_WAY**2)
+    weight = 1.0 / max(whole, ZERO_DISPLACEMENT_RAD**2)
     return Squares(weight * inner, weight * along, weight * whole)
 
 

@@ -23,7 +23,7 @@ from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline
 from motionmind.learned.carriage import Carriage
-from motionmind.learned.trust import NO_WAY
+from motionmind.learned.trust import ZERO_DISPLACEMENT_RAD
 from motionmind.walks.expectation import Expectation
 from motionmind.walks.frames import Frames, distances_of, frames_near, frames_of
 from motionmind.walks.stops import Stop
@@ -264,7 +264,7 @@ def dance(
     (first, *_, last), passed = stops.values(), np.array([*stops])
     joints, length = walk.poses.shape[1], float(passed[-1])
     way = np.sqrt(np.mean(rot.angle(first.chains[:joints], last.chains[:joints]) ** 2))
-    is_still = way < NO_WAY and len(stops) == 2 and first.rates is None and last.rates is None
+    is_still = way < ZERO_DISPLACEMENT_RAD and len(stops) == 2 and first.rates is None and last.rates is None
     if liveliness == 0.0 or (is_still and place is None):
         return None
     nodes = np.linspace(0.0, length, max(1, round(length * RATE / NODE_FRAMES)) + 1)

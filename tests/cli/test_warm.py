@@ -176,7 +176,7 @@ def test_a_terminal_shows_how_much_is_compiled_until_the_first_run_ends(monkeypa
     monkeypatch.setattr(codecache, "is_all_compiled", lambda: True)
     terminal.truncate(0)
     with warming.preparing():
-        sleep(2 * warming._LOOK)
+        sleep(2 * warming._CHECK_INTERVAL_S)
     assert not terminal.getvalue()
 
 
@@ -218,10 +218,10 @@ def test_nothing_is_started_where_code_cannot_be_kept(
 ) -> None:
     monkeypatch.setattr(codecache, "is_all_compiled", lambda: False)
     monkeypatch.setattr(warming, "_start", lambda *_, **__: pytest.fail("started"))
-    monkeypatch.setattr(warming, "_ROOM", float("inf"))  # as on a full disk
+    monkeypatch.setattr(warming, "_MIN_FREE_BYTES", float("inf"))  # as on a full disk
     warming.prepare()
     assert list(warming.prepare_in_steps()) == []
-    monkeypatch.setattr(warming, "_ROOM", 0.0)
+    monkeypatch.setattr(warming, "_MIN_FREE_BYTES", 0.0)
     monkeypatch.setattr(codecache, "place_of_code", lambda: None)
     warming.prepare()
     assert capsys.readouterr().err == ""
@@ -256,7 +256,7 @@ def test_the_first_search_says_what_it_waits_for_before_it_learns_a_corpus(
     monkeypatch.setattr(codecache, "is_all_compiled", lambda: False)
     monkeypatch.setattr(warming, "_is_running", lambda place: False)
     monkeypatch.setattr(warming, "_start", lambda *_, **__: [])
-    monkeypatch.setattr(warming, "FIRST", "compiling")
+    monkeypatch.setattr(warming, "FIRST_RUN_NOTE", "compiling")
     for words, said in [
         (("ballet/arabesque", "ballet/fifth"), "compiling\nerror: learning\n"),
         (("ballet/arabesk", "ballet/fifth"), "error: ballet: no posture or clip 'arabesk'"),

@@ -23,8 +23,8 @@ from motionmind._typing import Floats, Int32s, Ints
 from motionmind.errors import CorpusError
 from motionmind.geometry import rotations as rot
 from motionmind.grammar import coordination
-from motionmind.grammar.bridges import NEAREST, WITHIN, Bridges, _Neighbours, find_bridges
-from motionmind.grammar.coordination import PSEUDO_COUNT, Coordination, fit_network, learn_coordination
+from motionmind.grammar.bridges import MAX_BRIDGE_DEG, N_BRIDGES_PER_STATE, Bridges, _Neighbours, find_bridges
+from motionmind.grammar.coordination import PRIOR_POSTURES, Coordination, fit_network, learn_coordination
 from motionmind.grammar.grammar import Grammar, learn
 from motionmind.grammar.transitions import Transitions, Weights, count_transitions, flatten
 from motionmind.search.problem import Model, Problem, Rules
@@ -271,8 +271,8 @@ def test_unless_attested_bridges_run_both_ways_along_a_shortest_tree_and_else_to
         tree |= {(j, i) for i, j in tree}
         assert tree <= set(bridges)
         for before, after in set(bridges) - tree:
-            assert angles[before, after] <= WITHIN
-            assert np.sum(angles[before] < angles[before, after]) <= NEAREST  # itself among them
+            assert angles[before, after] <= MAX_BRIDGE_DEG
+            assert np.sum(angles[before] < angles[before, after]) <= N_BRIDGES_PER_STATE  # itself among them
 
 
 def test_of_many_states_the_bridges_are_those_of_all_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -280,7 +280,7 @@ def test_of_many_states_the_bridges_are_those_of_all_pairs(monkeypatch: pytest.M
         centres = rot.normalise(np.random.default_rng(size).normal(size=(size, 4)))
         graph = count_transitions(np.zeros((1, 1), np.int32), np.array([size]), np.zeros(0, np.int64), np.zeros(0))
         every = find_bridges(centres, graph)
-        monkeypatch.setattr("motionmind.grammar.bridges.MOST_COMPARED", 1)
+        monkeypatch.setattr("motionmind.grammar.bridges.MAX_STATES_COMPARED", 1)
         near = find_bridges(centres, graph)
         monkeypatch.undo()
         for one, other in zip(vars(near).values(), vars(every).values(), strict=True):
@@ -307,7 +307,7 @@ def test_bridges_of_twice_as_many_states_look_at_hardly_more_than_twice_as_many_
 
 
 def test_many_states_that_coincide_are_joined(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motionmind.grammar.bridges.MOST_COMPARED", 1)
+    monkeypatch.setattr("motionmind.grammar.bridges.MAX_STATES_COMPARED", 1)
     turns = np.repeat([0.0, 0.3, 2.0], 20)
     centres = rot.from_axis_angle(np.array([1.0, 0.0, 0.0]), turns)
     graph = count_transitions(np.zeros((1, 1), np.int32), np.array([60]), np.zeros(0, np.int64), np.zeros(0))
@@ -337,7 +337,7 @@ def test_the_network_is_the_corpus_counted_with_a_prior_spread_as_the_marginal(s
             above = Counter(body.states[:, parent].tolist())
             expected = [
                 [
-                    (pairs[c, p] + PSEUDO_COUNT * marginal[c] / len(body.states)) / (above[p] + PSEUDO_COUNT)
+                    (pairs[c, p] + PRIOR_POSTURES * marginal[c] / len(body.states)) / (above[p] + PRIOR_POSTURES)
                     for p in range(body.sizes[parent])
                 ]
                 for c in range(body.sizes[chain])
@@ -384,7 +384,7 @@ def test_the_network_is_what_pgmpys_own_estimator_fits(seed: int) -> None:
     estimator = DiscreteBayesianEstimator(
         state_names={name: list(range(body.sizes[j])) for j, name in enumerate(names)},
         prior_type="dirichlet",
-        pseudo_counts={name: PSEUDO_COUNT * prior / len(body.states) for name, prior in priors.items()},
+        pseudo_counts={name: PRIOR_POSTURES * prior / len(body.states) for name, prior in priors.items()},
     )
     network = DiscreteBayesianNetwork()
     network.add_nodes_from(names)
@@ -413,7 +413,7 @@ def test_costs_are_read_out_of_the_networks_tables(seed: int, monkeypatch: pytes
 
 def test_costs_are_the_same_where_the_tables_are_too_large_to_build(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     before = grammar(seed).coordination
-    monkeypatch.setattr(coordination, "MOST_CELLS", 0)
+    monkeypatch.setattr(coordination, "MAX_NETWORK_CELLS", 0)
     after = corpus(seed).learned().coordination
     for name, array in vars(before).items():
         np.testing.assert_allclose(getattr(after, name), array, rtol=0.0, atol=5e-15)
@@ -421,7 +421,7 @@ def test_costs_are_the_same_where_the_tables_are_too_large_to_build(seed: int, m
 
 def test_a_network_that_is_too_large_is_refused_before_it_is_made() -> None:
     sizes = np.array([20_000, 20_000])
-    with pytest.raises(CorpusError, match=r"has 400,000,000 cells, and can have 100,000,000: learn with a coarser"):
+    with pytest.raises(CorpusError, match=r"needs 400,000,000 cells, more than 100,000,000: learn with a coarser"):
         fit_network(("pelvis", "hip"), np.array([-1, 0]), np.zeros((2, 2), dtype=np.int32), sizes)
 
 

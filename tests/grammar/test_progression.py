@@ -20,9 +20,9 @@ from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.bundled import bundled
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_posture
-from motionmind.grammar.coordination import PSEUDO_COUNT, Coordination
+from motionmind.grammar.coordination import PRIOR_POSTURES, Coordination
 from motionmind.grammar.progression import fit_progression
-from motionmind.search.bounding import PROVEN
+from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.search.cfn import Ingredients, cfn
 from motionmind.search.problem import Model, Problem, Rules, Via, costs_to_go, places, with_waits
 from motionmind.search.sample import gibbs_sample, sample_path
@@ -34,7 +34,7 @@ from motionmind.tween.progression import lift_to_moves
 from motionmind.tween.request import TweenRequest
 from motionmind.tween.result import Tween
 
-ALIKE = 2 * PROVEN
+ALIKE = 2 * OPTIMAL_WITHIN_NATS
 MOVES = 4
 POSTURES = bundled("corpora") / "ballet" / "postures"
 
@@ -104,9 +104,11 @@ class Body:
         """-log P(s' | s, p, p') by its definition [s, s', p, p']; of the unattested s' all have that of their class."""
         seen = self.counts(chain)
         pairs = seen.sum(axis=(2, 3))
-        alone = np.where(pairs > 0.0, pairs, PSEUDO_COUNT) / (pairs.sum(axis=1, keepdims=True) + PSEUDO_COUNT)
+        alone = np.where(pairs > 0.0, pairs, PRIOR_POSTURES) / (pairs.sum(axis=1, keepdims=True) + PRIOR_POSTURES)
         return np.asarray(
-            -np.log((seen + PSEUDO_COUNT * alone[:, :, None, None]) / (seen.sum(axis=1, keepdims=True) + PSEUDO_COUNT))
+            -np.log(
+                (seen + PRIOR_POSTURES * alone[:, :, None, None]) / (seen.sum(axis=1, keepdims=True) + PRIOR_POSTURES)
+            )
         )
 
     def best(
@@ -186,12 +188,12 @@ def test_the_tables_are_those_of_a_network_over_two_postures(seed: int) -> None:
         size, above = toy.sizes[chain], toy.sizes[parent]
         pairs = toy.counts(chain).sum(axis=(2, 3))
         alone = np.zeros((size, size + 1))
-        alone[:, :size], alone[:, size] = pairs, PSEUDO_COUNT
+        alone[:, :size], alone[:, size] = pairs, PRIOR_POSTURES
         alone /= alone.sum(axis=1, keepdims=True)
         network = DiscreteBayesianNetwork([("a", "next"), ("b", "next"), ("c", "next")])
         names = {"next": range(size + 1), "a": range(size), "b": range(above), "c": range(above)}
         columns = [(given[0], given) for given in product(range(size), range(above), range(above))]
-        prior = np.array([PSEUDO_COUNT * alone[s] for s, _ in columns]).T
+        prior = np.array([PRIOR_POSTURES * alone[s] for s, _ in columns]).T
         flat = {name: np.ones((len(names[name]), 1)) for name in "abc"}
         frame = pd.DataFrame(
             {
@@ -426,7 +428,7 @@ def test_whole_postures_have_no_progressions(engine: Engine) -> None:
 
 
 def test_more_moves_than_a_node_can_number_are_refused(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motionmind.tween.formulate.MOST_STATES_OF_CHAIN", 50)
+    monkeypatch.setattr("motionmind.tween.formulate.MAX_CHAIN_STATES", 50)
     with pytest.raises(
         MotionMindError, match=r"has \d+ states and moves, and the search takes up to 50; build the corpus"
     ):

@@ -62,7 +62,7 @@ def test_carriage_is_the_same_in_blocks_of_any_size(monkeypatch: pytest.MonkeyPa
     assert whole.loose.any()
     assert not whole.loose.all()
     for size in (1, 7):
-        monkeypatch.setattr("motionmind.learned.carriage.BLOCK", size)
+        monkeypatch.setattr("motionmind.learned.carriage.BLOCK_FRAMES", size)
         monkeypatch.setattr("motionmind.body.limits._BLOCK", size)
         for name, array in vars(learn_carriage(corpus)).items():
             np.testing.assert_array_equal(array, getattr(whole, name), err_msg=name)

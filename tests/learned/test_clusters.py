@@ -14,7 +14,7 @@ from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.distances import squared_distance
 from motionmind.learned import clusters
-from motionmind.learned.clusters import ALIKE
+from motionmind.learned.clusters import CLUSTER_RADIUS_RAD
 
 
 def one_by_one(orientations: Floats, within: float) -> Ints:
@@ -42,10 +42,10 @@ def wander(seed: int, count: int, joints: int, pace: float) -> Floats:
 def test_clusters_are_those_of_all_comparisons(seed: int, joints: int, pace: float, block: int) -> None:
     orientations = wander(seed, 60, joints, pace)
     orientations[17:23] = orientations[40:46]  # what is danced again is in the same cluster
-    within = joints * ALIKE**2
+    within = joints * CLUSTER_RADIUS_RAD**2
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(clusters, "BLOCK", block)
-        patch.setattr(clusters, "LOOKED_AT", 60)
+        patch.setattr(clusters, "N_POSTURES_PER_BLOCK", block)
+        patch.setattr(clusters, "MAX_FOUNDERS_COMPARED", 60)
         found = clusters.clusters(orientations, within)
     np.testing.assert_array_equal(found, one_by_one(orientations, within))
     np.testing.assert_array_equal(found[17:23], found[40:46])
@@ -58,11 +58,11 @@ def test_of_founders_that_are_equally_near_the_first_has_the_posture_whatever_th
     """Founders lie on both sides of a posture, at equal angles, which rounding makes unequal either way."""
     rng = np.random.default_rng(seed)
     middle, turn = rot.exp(rng.normal(0.0, 1.0, (joints, 3))), rng.normal(0.0, 1.0, (joints, 3))
-    turn *= 0.9 * ALIKE / np.linalg.norm(turn, axis=-1, keepdims=True)
+    turn *= 0.9 * CLUSTER_RADIUS_RAD / np.linalg.norm(turn, axis=-1, keepdims=True)
     ends = [rot.mul(middle, rot.exp(sign * turn)) for sign in (1.0, -1.0)]
     noise = rng.normal(0.0, 1e-16, (20, joints, 4))
     postures = np.stack([*ends, *(middle + noise)])
-    np.testing.assert_array_equal(clusters.clusters(postures, joints * ALIKE**2), [0, 1, *[0] * 20])
+    np.testing.assert_array_equal(clusters.clusters(postures, joints * CLUSTER_RADIUS_RAD**2), [0, 1, *[0] * 20])
 
 
 def test_of_many_that_all_differ_few_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -76,7 +76,7 @@ def test_of_many_that_all_differ_few_are_compared(monkeypatch: pytest.MonkeyPatc
     for count in (2_000, 4_000, 8_000):
         compared.append(0)
         orientations = rot.exp(np.random.default_rng(count).normal(0.0, 1.0, (count, 4, 3)))
-        found = clusters.clusters(orientations, 4 * ALIKE**2)
+        found = clusters.clusters(orientations, 4 * CLUSTER_RADIUS_RAD**2)
         assert found.max() > 0.9 * count
         assert compared[-1] <= 2 * 33 * count
 
@@ -86,7 +86,7 @@ def test_those_that_look_nearest_are_compared_and_no_others(seed: int, most: int
     orientations = rot.exp(np.random.default_rng(seed).normal(0.0, 0.7, (150, 3, 3)))
     seen, founders, postures = clusters._seen(orientations, Workshop()), np.arange(0, 150, 2), np.arange(150)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(clusters, "LOOKED_AT", most)
+        patch.setattr(clusters, "MAX_FOUNDERS_COMPARED", most)
         least, place = clusters._nearest(clusters._grow(founders, seen), orientations, seen, postures, enough)
     for posture in postures:
         looks = np.sum((seen[founders] - seen[posture]) ** 2, axis=1)

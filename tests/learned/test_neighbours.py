@@ -17,7 +17,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.distances import squared_distance
 from motionmind.learned import nearest, neighbours, persistence
 from motionmind.learned.nearest import find_near, postures_near
-from motionmind.learned.neighbours import LEAF, Neighbours, build_neighbours, node_bounds
+from motionmind.learned.neighbours import MAX_LEAF_SAMPLES, Neighbours, build_neighbours, node_bounds
 from motionmind.tween.engine import Engine
 
 
@@ -39,7 +39,7 @@ def distances(engine: Engine, part: np.ndarray, posture: np.ndarray) -> np.ndarr
 
 def test_each_ball_holds_its_moments_and_their_weights(engine: Engine, trees: Neighbours) -> None:
     count = len(engine.carriage.weights)
-    assert np.diff(trees.bounds[(len(trees.bounds) - 1) // 2 :]).max() <= LEAF
+    assert np.diff(trees.bounds[(len(trees.bounds) - 1) // 2 :]).max() <= MAX_LEAF_SAMPLES
     for number, part in enumerate(trees.parts):
         order = trees.order[number]
         np.testing.assert_array_equal(np.sort(order), np.arange(count))
@@ -78,7 +78,7 @@ def test_in_all_leaves_the_nearest_are_found_and_in_a_few_nearly(
             assert len(np.unique(found)) == 50
             np.testing.assert_allclose(off[found[0]], np.sort(off)[:50], atol=0.02 if coded else 1e-5)
             few = find_near(trees, number, shown, posture[None], len(shown), leaves // 8)
-            assert few.shape[1] <= leaves // 8 * LEAF
+            assert few.shape[1] <= leaves // 8 * MAX_LEAF_SAMPLES
             nearly.append(off[few[0, 0]] / off.min())
     assert np.median(nearly) < 1.01
     assert np.quantile(nearly, 0.9) < 1.5
@@ -101,7 +101,7 @@ def test_leaves_are_searched_in_the_order_of_what_they_promise(trees: Neighbours
                 continue
             for child in (2 * node + 1, 2 * node + 2):
                 away = np.sqrt(squared_distance(centres[child], posture) / len(part))
-                heapq.heappush(heap, (away - nearest.INSIDE * radii[child], child))
+                heapq.heappush(heap, (away - nearest.NEARER_THAN_CENTRE_RATIO * radii[child], child))
         for leaves in (1, 5, len(expected)):
             assert nearest._search(posture, bounds, centres, radii, leaves).tolist() == expected[:leaves]
 
@@ -111,7 +111,7 @@ def test_centres_are_copied_for_searches_unless_they_are_large(
 ) -> None:
     copied, large, shown = replace(trees), replace(trees), engine.carriage.orientations
     assert len(copied.centres_apart) == len(trees.parts)
-    monkeypatch.setattr(neighbours, "COPIED", 0)
+    monkeypatch.setattr(neighbours, "MAX_COPIED_BYTES", 0)
     for number in range(len(trees.parts)):
         np.testing.assert_array_equal(copied.centres_apart[number], trees.centres_of(number))
         assert not np.shares_memory(copied.centres_apart[number], trees.centres)

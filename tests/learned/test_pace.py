@@ -18,13 +18,13 @@ from motionmind.corpus.clip import JointRepair
 from motionmind.corpus.gather import gather
 from motionmind.geometry import rotations as rot
 from motionmind.learned.pace import (
-    EVERYDAY,
-    LEVEL,
-    PULL,
-    PULLS,
-    SLOPE,
-    SLOPES,
-    STARTS,
+    MIN_PEAK_ROOT_ACCELERATION,
+    MIN_PEAK_SPEEDS,
+    PRIOR_LEVEL,
+    PRIOR_PULL,
+    PRIOR_SLOPE,
+    PULL_RANGE,
+    SLOPE_RANGE,
     Pace,
     Way,
     _fit,
@@ -34,7 +34,7 @@ from motionmind.learned.pace import (
     way_between,
     way_of,
 )
-from motionmind.learned.sampled import FPS
+from motionmind.learned.sampled import SAMPLED_FPS
 
 ARM = 7
 
@@ -43,7 +43,7 @@ def reaches(skeleton: Skeleton, seconds: list[float], angles: list[float], strid
     """All joints but the root turn there and back, one of them farthest; the root travels; still between moves."""
     times, turned, gone = [0.0], [0.0], [0.0]
     for number, (length, angle) in enumerate(zip(seconds, angles, strict=True)):
-        share = np.arange(1, round(length * FPS) + 1) / round(length * FPS)
+        share = np.arange(1, round(length * SAMPLED_FPS) + 1) / round(length * SAMPLED_FPS)
         eased = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)  # least jerk
         way = angle if number % 2 == 0 else -angle
         times += [times[-1] + length * part for part in share]
@@ -131,9 +131,9 @@ def test_of_many_windows_on_a_plane_the_law_is_that_plane() -> None:
 
 def test_windows_that_say_nothing_leave_the_prior() -> None:
     law = _fit(*np.zeros((3, 0)))
-    np.testing.assert_allclose(law[:3], [LEVEL, SLOPE, PULL])
+    np.testing.assert_allclose(law[:3], [PRIOR_LEVEL, PRIOR_SLOPE, PRIOR_PULL])
     slope, pull = _fit(np.linspace(0.5, 3.0, 99), np.linspace(-2.0, 0.5, 99), np.linspace(9.0, 0.0, 99))[1:3]
-    assert (slope, pull) == (SLOPES[0], PULLS[0])  # whatever the windows say, a longer way takes longer
+    assert (slope, pull) == (SLOPE_RANGE[0], PULL_RANGE[0])  # whatever the windows say, a longer way takes longer
 
 
 def test_a_longer_way_takes_longer() -> None:
@@ -141,7 +141,7 @@ def test_a_longer_way_takes_longer() -> None:
     for seed in range(5):
         seconds, angles = rng.uniform(0.4, 1.5, 20).tolist(), rng.uniform(0.1, 2.0, 20).tolist()
         pace = learned(reaches(human23(), seconds, angles, rng.uniform(0.0, 1.0)))
-        assert SLOPES[0] <= pace.law[1] <= SLOPES[1], seed
+        assert SLOPE_RANGE[0] <= pace.law[1] <= SLOPE_RANGE[1], seed
         for kind, most in (("turn", 3.0), ("travel", 5.0), ("facing", 3.0)):
             taken = [expected(pace, way(human23(), **{kind: far})) for far in np.linspace(0.0, most, 20)]
             assert np.all(np.diff(taken) > 0.0), (seed, kind)
@@ -151,13 +151,13 @@ def test_a_longer_way_takes_longer() -> None:
 def rests_and_runs() -> Motion:
     """Movement from rest to rest whose way is long, then movement there and back that never stops."""
     rests = reaches(human23(), [1.5] * 12, [1.5] * 12)
-    times = np.arange(600) / FPS
+    times = np.arange(600) / SAMPLED_FPS
     rotations = np.tile(rests.rotations[-1], (len(times), 1, 1))
     turned = 6.0 * times + 0.8 * np.cos(6.0 * times)  # as many lulls, at a fifth of the mean speed or more
     for joint in range(1, len(rests.skeleton)):
         rotations[:, joint] = rot.from_axis_angle(np.array([0.0, 1.0, 0.0]), 0.2 * turned)
     root = np.tile(rests.root[-1], (len(times), 1))
-    clock = np.concatenate([rests.times, rests.times[-1] + 1 / FPS + times])
+    clock = np.concatenate([rests.times, rests.times[-1] + 1 / SAMPLED_FPS + times])
     return replace(
         rests,
         rotations=np.concatenate([rests.rotations, rotations]),
@@ -169,7 +169,7 @@ def rests_and_runs() -> Motion:
 def test_the_lulls_are_the_speeds_of_the_still_moments_around() -> None:
     clip = rests_and_runs()
     corpus = gather("lulls", [clip], rate=10.0)
-    lulls, speeds = learn_pace(corpus).lulls, FPS * way_of(clip).joints.mean(axis=1)
+    lulls, speeds = learn_pace(corpus).lulls, SAMPLED_FPS * way_of(clip).joints.mean(axis=1)
     resting = corpus.times < 15.0
     running = corpus.times > 20.0
     assert lulls[resting].max() < 0.2 * lulls[running].min()
@@ -210,15 +210,17 @@ def test_nothing_is_learned_of_durations_from_what_was_reconstructed() -> None:
         return learn_pace(replace(corpus, clips=(replace(clip, repairs=repairs),))).law[:3].tolist()
 
     last = float(corpus.times[-1])
-    assert law((0.0, last)) == pytest.approx([LEVEL, SLOPE, PULL])
+    assert law((0.0, last)) == pytest.approx([PRIOR_LEVEL, PRIOR_SLOPE, PRIOR_PULL])
     assert law((0.0, last), exact=True) == law()
-    assert law(*((second, second) for second in np.arange(0.0, last, 0.2))) == pytest.approx([LEVEL, SLOPE, PULL])
+    assert law(*((second, second) for second in np.arange(0.0, last, 0.2))) == pytest.approx(
+        [PRIOR_LEVEL, PRIOR_SLOPE, PRIOR_PULL]
+    )
     assert law((8.9, 9.1)) not in (law(), law((0.0, last)))
 
 
 def test_the_fastest_speeds_are_those_of_the_rarest_frames() -> None:
     clip = reaches(human23(), [1.0] * 30, [1.5] * 30, 1.0)
-    pace, speeds = learned(clip, rate=30.0), FPS * way_of(clip).parts
+    pace, speeds = learned(clip, rate=30.0), SAMPLED_FPS * way_of(clip).parts
     assert pace.fastest[ARM] == pytest.approx(np.percentile(speeds[:, ARM], 99.0), rel=0.05)
     assert pace.fastest[-1] == pytest.approx(np.percentile(speeds[:, -1], 99.0), rel=0.05)
 
@@ -230,20 +232,20 @@ def test_long_movement_shows_no_more_than_the_clips_that_are_as_long() -> None:
     pace = learned(*[quick] * 20, calm, rate=30.0)
     assert quick.times[-1] < 3.0
     assert calm.times[-1] > 6.0
-    tops = [FPS * way_of(clip).parts[:, -1].max() for clip in (quick, calm)]
+    tops = [SAMPLED_FPS * way_of(clip).parts[:, -1].max() for clip in (quick, calm)]
     assert pace.peaks_in(1.0)[-3] == pytest.approx(tops[0], rel=0.05)
     assert pace.peaks_in(9.0)[-3] == pytest.approx(max(tops[1], pace.fastest[-1]), rel=0.05)
     assert np.all(np.diff([pace.peaks_in(seconds)[-3] for seconds in np.linspace(0.5, 7.0, 9)]) <= 0.0)
     assert np.all(pace.peaks[:, :-2] >= pace.fastest)
     assert np.all(pace.peaks[:, -2:] > 0.0)  # also where nothing ever rises
-    starts = [FPS**2 * np.abs(np.diff(clip.root, 2, axis=0)).max() / human23().height for clip in (quick, calm)]
+    starts = [SAMPLED_FPS**2 * np.abs(np.diff(clip.root, 2, axis=0)).max() / human23().height for clip in (quick, calm)]
     assert pace.peaks_in(1.0)[-1] == pytest.approx(starts[0], rel=0.05)
-    assert pace.peaks_in(9.0)[-1] == pytest.approx(max(starts[1], STARTS), rel=0.05)
+    assert pace.peaks_in(9.0)[-1] == pytest.approx(max(starts[1], MIN_PEAK_ROOT_ACCELERATION), rel=0.05)
 
 
 def test_what_was_reconstructed_is_no_peak() -> None:
     calm, quick = (reaches(human23(), [length] * 9, [1.5] * 9) for length in (2.0, 0.4))
-    times = np.concatenate([calm.times, calm.times[-1] + 1 / FPS + quick.times])
+    times = np.concatenate([calm.times, calm.times[-1] + 1 / SAMPLED_FPS + quick.times])
     both = {name: np.concatenate([getattr(calm, name), getattr(quick, name)]) for name in ("rotations", "root")}
     corpus = gather("mended", [replace(calm, times=times, **both)], rate=10.0, flips="keep")
     (clip,) = corpus.clips
@@ -258,7 +260,7 @@ def test_what_never_moves_in_a_corpus_may_move() -> None:
     pace = learned(reaches(human23(), [1.0, 1.0], [1.0, 1.0]))
     assert np.all(pace.fastest > 0.0)
     assert pace.fastest[0] == pytest.approx(0.25 * np.median(pace.fastest[:-2]))
-    assert tuple(pace.fastest[-2:]) == EVERYDAY[1:]
+    assert tuple(pace.fastest[-2:]) == MIN_PEAK_SPEEDS[1:]
 
 
 def test_where_most_joints_rest_they_may_move_as_everyday() -> None:
@@ -267,7 +269,7 @@ def test_where_most_joints_rest_they_may_move_as_everyday() -> None:
     rotations[:, ARM] = motion.rotations[:, ARM]
     rotations *= 1.0 + 1e-15 * np.random.default_rng(0).standard_normal((len(motion), len(human23()), 1))
     pace = learned(replace(motion, rotations=rotations))
-    assert (np.delete(pace.fastest[:-2], ARM) == EVERYDAY[0]).all()
+    assert (np.delete(pace.fastest[:-2], ARM) == MIN_PEAK_SPEEDS[0]).all()
 
 
 @pytest.mark.parametrize("frames", [2, 3])

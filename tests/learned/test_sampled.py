@@ -66,12 +66,12 @@ def learned(corpus: Corpus) -> list[np.ndarray]:
 
 def test_what_is_learned_does_not_depend_on_the_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     corpus = gather("c", [recording(70.0), recording(33.0, 120.0, 1)], rate=5.0)
-    monkeypatch.setattr(plausibility, "_MOST", 1000)
-    monkeypatch.setattr(plausibility, "_PIECE", 20)
+    monkeypatch.setattr(plausibility, "_N_FRAMES_MEASURED", 1000)
+    monkeypatch.setattr(plausibility, "_PIECE_FRAMES", 20)
     usual = learned(corpus)
     for module in (pace, plausibility):
-        monkeypatch.setattr(module, "BLOCK", 60)
-    monkeypatch.setattr("motionmind.learned.sampled.BLOCK", 60)
+        monkeypatch.setattr(module, "BLOCK_FRAMES", 60)
+    monkeypatch.setattr("motionmind.learned.sampled.BLOCK_FRAMES", 60)
     for one, other in zip(usual, learned(corpus), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-12)
 
@@ -88,8 +88,8 @@ def test_a_recording_of_more_frames_than_are_made_at_once_is_learned_from(monkey
 
 
 def test_longer_recordings_take_no_more_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plausibility, "_MOST", 1000)
-    monkeypatch.setattr(plausibility, "BLOCK", 480)
+    monkeypatch.setattr(plausibility, "_N_FRAMES_MEASURED", 1000)
+    monkeypatch.setattr(plausibility, "BLOCK_FRAMES", 480)
     fastest = np.full(len(BODY) + 2, 5.0)
     peaks = []
     for minutes in (1.5, 6.0):

@@ -16,7 +16,7 @@ from motionmind.body.human import human23
 from motionmind.body.plausibility import at_rate
 from motionmind.corpus import store
 from motionmind.corpus.clip import JointRepair
-from motionmind.learned.plausibility import EVERYDAY, MEASURES, Plausibility, learn_plausibility
+from motionmind.learned.plausibility import MEASURES, MIN_FOOT_SPEED_LIMIT, Plausibility, learn_plausibility
 
 BALLET = Engine.load("ballet")
 
@@ -127,7 +127,7 @@ def test_what_was_reconstructed_is_no_measure_of_feet() -> None:
     for repairs, quick in (((), True), ((mended,), False), ((replace(mended, exact=True),), True)):
         corpus = replace(gathered, clips=tuple(replace(clip, repairs=repairs) for clip in gathered.clips))
         slides = float(learn_plausibility(corpus, fastest).slides[0]) * still.skeleton.height
-        assert slides == pytest.approx(9.0 if quick else EVERYDAY * still.skeleton.height, rel=0.02)
+        assert slides == pytest.approx(9.0 if quick else MIN_FOOT_SPEED_LIMIT * still.skeleton.height, rel=0.02)
 
 
 def test_bodies_without_feet_have_no_limit_for_them() -> None:
@@ -142,7 +142,7 @@ def test_a_corpus_of_two_postures_has_limits() -> None:
 
 def test_of_a_long_corpus_pieces_are_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     """The limits of every third piece are near those of all, and cost a third."""
-    monkeypatch.setattr("motionmind.learned.plausibility._MOST", 8_000)
+    monkeypatch.setattr("motionmind.learned.plausibility._N_FRAMES_MEASURED", 8_000)
     fewer = learn_plausibility(BALLET.corpus, BALLET.plausibility.fastest).most
     assert np.all(fewer <= BALLET.plausibility.most * 1.2)
     assert np.all(fewer >= BALLET.plausibility.most * 0.6)

@@ -15,11 +15,19 @@ from motionmind._typing import Floats
 from motionmind.corpus import store
 from motionmind.errors import FormatError
 from motionmind.learned import persistence
-from motionmind.learned.trust import NO_WAY, PRIOR, RATIOS, Squares, Trust, counts, fit_table
+from motionmind.learned.trust import (
+    DISTANCE_RATIOS,
+    PRIOR_TRUST,
+    ZERO_DISPLACEMENT_RAD,
+    Squares,
+    Trust,
+    counts,
+    fit_table,
+)
 from motionmind.tween.engine import Engine
 
 SPREAD = np.array([0.8, 0.5])
-ONES = Trust(np.ones(len(RATIOS)), np.array([0.45]), SPREAD)
+ONES = Trust(np.ones(len(DISTANCE_RATIOS)), np.array([0.45]), SPREAD)
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=5, max_size=5), st.floats(0.0, np.pi), st.floats(0.0, np.pi))
@@ -30,16 +38,18 @@ def test_trust_is_a_share(table: list[float], off: float, way: float) -> None:
 
 def test_entries_of_the_table_are_met_at_their_ratios() -> None:
     near = replace(ONES, table=np.array([0.9, 0.7, 0.4, 0.3, 0.1]), spread=np.array(np.inf))
-    np.testing.assert_allclose(near.shares(0.2 * RATIOS, np.full(5, 0.2)), near.table, atol=1e-12)
+    np.testing.assert_allclose(near.shares(0.2 * DISTANCE_RATIOS, np.full(5, 0.2)), near.table, atol=1e-12)
 
 
 def test_trust_has_no_leaps() -> None:
-    ways = np.geomspace(2.0 * NO_WAY, 3.0, 4000)
-    shares = PRIOR.shares(np.full(len(ways), 0.2), ways)
+    ways = np.geomspace(2.0 * ZERO_DISPLACEMENT_RAD, 3.0, 4000)
+    shares = PRIOR_TRUST.shares(np.full(len(ways), 0.2), ways)
     assert np.abs(np.diff(shares)).max() < 0.01
     assert np.all(np.diff(shares) >= 0.0)
     offs = np.linspace(0.0, 1.0, 4000)
-    assert np.abs(np.diff(replace(PRIOR, spread=np.array(0.8)).shares(offs, np.full(len(offs), 0.3)))).max() < 0.01
+    assert (
+        np.abs(np.diff(replace(PRIOR_TRUST, spread=np.array(0.8)).shares(offs, np.full(len(offs), 0.3)))).max() < 0.01
+    )
 
 
 def test_as_far_as_random_postures_are_from_each_other_nothing_is_trusted() -> None:
@@ -51,7 +61,7 @@ def test_as_far_as_random_postures_are_from_each_other_nothing_is_trusted() -> N
 
 def test_where_there_is_no_way_to_go_nothing_is_trusted() -> None:
     for off in (0.0, 0.3):
-        assert np.all(ONES.shares(np.full(2, off), np.full(2, 0.5 * NO_WAY)) == 0.0)
+        assert np.all(ONES.shares(np.full(2, off), np.full(2, 0.5 * ZERO_DISPLACEMENT_RAD)) == 0.0)
 
 
 # --- fitting ----------------------------------------------------------------------------------------------------------
@@ -73,7 +83,7 @@ def squares(share: float, seed: int, noise: float = 0.05, count: int = 40) -> Sq
 
 @pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
 def test_a_table_is_the_share_that_is_true(share: float) -> None:
-    table = fit_table([squares(share, seed) for seed in range(8)], PRIOR.table)
+    table = fit_table([squares(share, seed) for seed in range(8)], PRIOR_TRUST.table)
     np.testing.assert_allclose(table, share, atol=0.1)
 
 
@@ -86,8 +96,8 @@ def test_the_error_is_the_squared_distance() -> None:
 
 
 def test_one_family_and_families_that_disagree_tell_nothing() -> None:
-    assert fit_table([], PRIOR.table) is PRIOR.table
-    assert fit_table([squares(0.0, 1)], PRIOR.table) is PRIOR.table
+    assert fit_table([], PRIOR_TRUST.table) is PRIOR_TRUST.table
+    assert fit_table([squares(0.0, 1)], PRIOR_TRUST.table) is PRIOR_TRUST.table
     split = [squares(float(number % 2), number, noise=0.5, count=4) for number in range(4)]
     np.testing.assert_array_equal(fit_table(split, np.full(5, 0.5)), 0.5)
 
@@ -133,5 +143,5 @@ def test_of_a_corpus_of_an_earlier_version_the_prior_is_taken(engine: Engine, tm
         del manifest["arrays"][f"trust.{name}"]
     (folder / store.MANIFEST).write_text(json.dumps(manifest))
     loaded = persistence.load(str(folder)).carriage.trust
-    np.testing.assert_array_equal(loaded.table, PRIOR.table)
+    np.testing.assert_array_equal(loaded.table, PRIOR_TRUST.table)
     np.testing.assert_array_equal(loaded.spread, engine.carriage.trust.spread)

@@ -46,7 +46,7 @@ def test_what_is_learned_depends_neither_on_workers_nor_on_room(
     workers: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     kind = Codebook(20.0, {"hip": 10.0})
-    monkeypatch.setattr(carriage, "MANY", 100)  # so that there are trees
+    monkeypatch.setattr(carriage, "MAX_FULL_SEARCH", 100)  # so that there are trees
     plain = learn(gather("dances", dances(), mirror=True), kind)
     monkeypatch.setattr(workshops, "LARGE", 0)
     workshop = Workshop.of(workers, tmp_path)

@@ -23,7 +23,7 @@ from motionmind.footing.root import LEAST_TRAVEL_SHARE, root_trajectory, stand, 
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.transitions import Transitions, count_transitions
-from motionmind.learned.carriage import SLIDES, Carriage, learn_carriage
+from motionmind.learned.carriage import FIRMNESS_HALVED_MPS, Carriage, learn_carriage
 from motionmind.realise.bending import FIRM_PULL_RATIO
 from motionmind.realise.realise import Style, Wishes, realise
 from motionmind.realise.retime import SPEED_HEADROOM_RATIO, keep_pace
@@ -93,7 +93,7 @@ def test_limbs_stand_the_less_the_faster_their_lowest_points_move() -> None:
     q = np.tile(rot.IDENTITY, (9, 23, 1))
     root = np.stack([0.0 * t, 0.9 + 0.0 * t, 0.6 * t], axis=1)
     stands = learn_carriage(gather("drawn", [Motion(drawn, q, root, t, "drawn")])).stands
-    np.testing.assert_allclose(stands, 1.0 / (1.0 + (0.6 / SLIDES) ** 2), atol=1e-9)
+    np.testing.assert_allclose(stands, 1.0 / (1.0 + (0.6 / FIRMNESS_HALVED_MPS) ** 2), atol=1e-9)
     hip, toes = drawn.index("left_hip"), drawn.index("left_toes")
     offset = drawn.positions(q[0], np.zeros(3))[toes]
     # Turned about x until the tip of its toes, the lowest point of the leg, is where it was.
@@ -102,7 +102,7 @@ def test_limbs_stand_the_less_the_faster_their_lowest_points_move() -> None:
     q[:, hip] = rot.from_axis_angle([1.0, 0.0, 0.0], -angle)
     stands = learn_carriage(gather("drawn", [Motion(drawn, q, root, t, "drawn")])).stands
     assert stands[9 + 2 : 9 + 6, 0].min() > 0.95
-    np.testing.assert_allclose(stands[:, 1:], 1.0 / (1.0 + (0.6 / SLIDES) ** 2), atol=1e-9)
+    np.testing.assert_allclose(stands[:, 1:], 1.0 / (1.0 + (0.6 / FIRMNESS_HALVED_MPS) ** 2), atol=1e-9)
     np.testing.assert_allclose(stands[1:8], 0.5 * (stands[9:16] + stands[10:17]), atol=1e-12)
 
 

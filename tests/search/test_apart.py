@@ -14,8 +14,8 @@ from toys import Toy, random_toy, solution
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.errors import InfeasibleError
-from motionmind.search.apart import CHANGED, TooAlikeError, _improve, difference, solve_apart
-from motionmind.search.bounding import PROVEN
+from motionmind.search.apart import PRICE_MULTIPLES_TRIED, TooAlikeError, _improve, difference, solve_apart
+from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.search.costs import path_cost
 from motionmind.search.polish import minimise_chain, minimise_moment
 from motionmind.search.problem import Problem, Via
@@ -110,7 +110,7 @@ def test_the_bound_holds_and_the_path_differs_by_enough(
     expected = toy.cost(best, guide(moves))
     assert found.lower_bound <= expected + ROUNDING
     assert found.cost >= expected - ROUNDING
-    assert (found.status == "optimal") == (found.cost - found.lower_bound <= PROVEN)
+    assert (found.status == "optimal") == (found.cost - found.lower_bound <= OPTIMAL_WITHIN_NATS)
 
 
 def test_on_toys_most_are_proven_and_nearly_all_are_best() -> None:
@@ -127,7 +127,7 @@ def test_on_toys_most_are_proven_and_nearly_all_are_best() -> None:
         expected = next(toy.cost(path, guide(3)) for path in every if difference(path, every[0]) >= 0.5)
         total += 1
         proven += found.status == "optimal"
-        best += found.cost <= expected + PROVEN
+        best += found.cost <= expected + OPTIMAL_WITHIN_NATS
     assert total > 60
     assert proven > 0.5 * total
     assert best > 0.9 * total
@@ -142,7 +142,7 @@ def test_a_share_of_nothing_asks_nothing(seed: int) -> None:
     if found is not None:
         again = solve_apart(problem, [found.path], 0.0)
         assert again.status == "optimal"
-        assert again.cost == pytest.approx(found.cost, abs=2 * PROVEN)
+        assert again.cost == pytest.approx(found.cost, abs=2 * OPTIMAL_WITHIN_NATS)
 
 
 @settings(max_examples=40, deadline=None)
@@ -180,7 +180,7 @@ def test_no_chain_or_moment_alone_would_make_an_improved_path_cheaper(seed: int)
     cost = _improve(trellis, path, agreeing, allowed, prices)
     assert cost == path_cost(trellis, path)
     assert excess(path) <= before
-    for factor, part in product(CHANGED, range(trellis.chains + trellis.moves)):
+    for factor, part in product(PRICE_MULTIPLES_TRIED, range(trellis.chains + trellis.moves)):
         dearer = trellis._replace(unary=trellis.unary + factor * prices @ agreeing)
         trial, kept = path.copy(), np.ones(len(trellis.dom), dtype=np.bool_)
         if part < trellis.chains:

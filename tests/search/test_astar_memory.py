@@ -39,7 +39,7 @@ class Case:
     def search(self, budget: int, expansions: int = ENOUGH, cost: float = np.inf) -> astar.Found:
         path = np.zeros(len(self.trellis.dom_ptr) - 1, np.int64)
         on = np.zeros(1, dtype=bool)
-        return astar.search(self.trellis, self.heuristic, cost, astar.SAME, path, budget, expansions, on)
+        return astar.search(self.trellis, self.heuristic, cost, astar.SAME_COST_RATIO, path, budget, expansions, on)
 
     @property
     def heuristic(self) -> Heuristic:
@@ -135,7 +135,7 @@ def test_merging_frontiers_saves_what_the_tree_of_prefixes_would_cost() -> None:
 
 def test_more_memory_never_gave_a_worse_answer_on_these_bodies(monkeypatch: pytest.MonkeyPatch) -> None:
     """No theorem: who forgets other leaves looks elsewhere first. It holds for these; a change is worth a look."""
-    monkeypatch.setattr(bounding, "PAIR_CHAIN_SWEEPS", 0)
+    monkeypatch.setattr(bounding, "MAX_PAIR_CHAIN_SWEEPS", 0)
     for seed in SEEDS:
         toy = random_toy(seed, frustrated=True)
         found = [
@@ -152,7 +152,7 @@ def test_more_memory_never_gave_a_worse_answer_on_these_bodies(monkeypatch: pyte
 def test_all_numbers_of_moves_together_take_no_more_expansions_than_are_allowed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(bounding, "PAIR_CHAIN_SWEEPS", 0)
+    monkeypatch.setattr(bounding, "MAX_PAIR_CHAIN_SWEEPS", 0)
     spent = 0
     for seed in SEEDS:
         toy = random_toy(seed, frustrated=True)
@@ -175,7 +175,7 @@ def test_when_memory_is_full_a_quarter_of_it_is_forgotten_and_what_is_proven_sta
                 break
             node = nodes.heap[0]  # no integer of Python, for which all of this would be compiled once more
             astar._close(nodes, node)
-            astar._expand(case.trellis, case.heuristic, nodes, node, np.inf, astar.SAME, path)
+            astar._expand(case.trellis, case.heuristic, nodes, node, np.inf, astar.SAME_COST_RATIO, path)
             astar._release(nodes, node)
         if nodes.tally[astar._FREE] >= 8 or nodes.tally[astar._HEAPED] == 0:
             continue
@@ -185,8 +185,10 @@ def test_when_memory_is_full_a_quarter_of_it_is_forgotten_and_what_is_proven_sta
         held, forgotten = nodes.tally[[astar._NODES, astar._FORGOTTEN]]
         assert astar._forget(nodes, current)
         opened = nodes.heap[: nodes.tally[astar._HEAPED]]
-        assert nodes.tally[astar._NODES] <= max(astar.KEPT * budget, case.depth)
-        assert nodes.tally[astar._NODES] > astar.KEPT * budget - case.depth  # a leaf more, and its way, are too many
+        assert nodes.tally[astar._NODES] <= max(astar.KEPT_MEMORY_SHARE * budget, case.depth)
+        assert (
+            nodes.tally[astar._NODES] > astar.KEPT_MEMORY_SHARE * budget - case.depth
+        )  # a leaf more, and its way, are too many
         assert nodes.tally[astar._NODES] + nodes.tally[astar._FREE] == budget
         assert nodes.tally[astar._FORGOTTEN] - forgotten == held - nodes.tally[astar._NODES] > 0
         assert min(nodes.key[opened]) == min(before)
@@ -298,7 +300,7 @@ class ByTheBook:
     def run(self, expansions: int) -> float:
         while self.opened:
             node = min(self.opened, key=lambda node: (node.key, -node.var, node.number))
-            if node.key >= self.cost - astar.SAME:
+            if node.key >= self.cost - astar.SAME_COST_RATIO:
                 break
             if self.expansions == expansions:
                 return node.key
@@ -316,14 +318,14 @@ class ByTheBook:
         chain = var % self.case.trellis.chains
         for choice, f in children(self.case, node):
             key = max(f, floor)
-            if key >= self.cost - astar.SAME:
+            if key >= self.cost - astar.SAME_COST_RATIO:
                 continue
             if var == len(self.case.trellis.dom_ptr) - 2:
                 self.cost = f
                 continue
             frontier = (*node.frontier[:chain], choice, *node.frontier[chain + 1 :])
             twin = next(reversed(self.twins[var, frontier]), None)
-            if twin is not None and twin.f <= f + astar.SAME:
+            if twin is not None and twin.f <= f + astar.SAME_COST_RATIO:
                 continue
             if twin is not None and twin.is_open and twin.children == 0:
                 self.close(twin)

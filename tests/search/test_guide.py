@@ -17,7 +17,7 @@ from toys import Toy, best, evaluate, random_toy, solution
 from motionmind._typing import Bools, Floats
 from motionmind.geometry import rotations as rot
 from motionmind.search import bounding
-from motionmind.search.bounding import PROVEN
+from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.search.cfn import cfn
 from motionmind.search.costs import path_cost
 from motionmind.search.problem import Problem, Rules, Via
@@ -28,7 +28,7 @@ from motionmind.tween.engine import Engine
 from motionmind.tween.problem import build_model, ingredients_of
 
 MOVES = 5
-SAME = 2 * PROVEN
+SAME = 2 * OPTIMAL_WITHIN_NATS
 ROUNDING = 1e-9
 
 seeds = st.integers(0, 10_000)
@@ -115,7 +115,7 @@ def test_the_number_of_moves_is_the_best_without_the_guide(seed: int, frustrated
     assert length.cost >= min(unguided) - ROUNDING
     assert length.lower_bound <= min(unguided) + ROUNDING
     others = [cost for count, cost in enumerate(unguided, start=1) if count != moves]
-    assert length.cost - PROVEN <= length.lower_bound_elsewhere <= min(others) + ROUNDING
+    assert length.cost - OPTIMAL_WITHIN_NATS <= length.lower_bound_elsewhere <= min(others) + ROUNDING
     assert found.status == "optimal"
     assert found.cost == pytest.approx(best(toy, [moves], every(toy), vias, guide), abs=SAME)
     assert guided_cost(toy, found, guide) == pytest.approx(found.cost, abs=ROUNDING)
@@ -130,7 +130,7 @@ def test_the_number_of_moves_is_the_best_without_the_guide(seed: int, frustrated
     st.integers(1, MOVES),
     st.integers(1, 1000),
     st.sampled_from([0, 1, 100]),
-    st.sampled_from([0, bounding.MOST_PAIRS]),
+    st.sampled_from([0, bounding.MAX_STATE_PAIRS]),
     st.none() | st.integers(0, 10),
 )
 def test_the_certificate_holds_however_little_effort_is_allowed(
@@ -141,8 +141,8 @@ def test_the_certificate_holds_however_little_effort_is_allowed(
     told: list[Progress] = []
     watch = None if calls is None else lambda so_far: told.append(so_far) or len(told) > calls
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bounding, "PAIR_CHAIN_SWEEPS", sweeps)
-        patch.setattr(bounding, "MOST_PAIRS", pairs)
+        patch.setattr(bounding, "MAX_PAIR_CHAIN_SWEEPS", sweeps)
+        patch.setattr(bounding, "MAX_STATE_PAIRS", pairs)
         found = solution(toy.problem(toy.rules(fewest, MOVES, nodes, sweeps=1 + seed % 3), vias, guide), watch)
     unguided = {moves: best(toy, [moves], every(toy), vias) for moves in range(fewest, MOVES + 1)}
     if found is None:

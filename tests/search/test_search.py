@@ -27,7 +27,7 @@ from motionmind.tween.engine import Engine
 from motionmind.tween.problem import build_model
 
 MOVES = 6
-PROVEN = 2 * bounding.PROVEN
+PROVEN = 2 * bounding.OPTIMAL_WITHIN_NATS
 ROUNDING = 1e-9
 ON = np.zeros(1, dtype=bool)  # what would end A* before its time
 KINDS = {
@@ -102,14 +102,14 @@ def test_a_path_keeps_the_rules_and_costs_what_is_stated(kind: dict[str, bool]) 
                 assert toy.cost(found.path) == pytest.approx(found.cost, abs=ROUNDING), (seed, node_budget)
 
 
-@pytest.mark.parametrize("pairs", [0, bounding.MOST_PAIRS])
+@pytest.mark.parametrize("pairs", [0, bounding.MAX_STATE_PAIRS])
 @pytest.mark.parametrize("sweeps", [1, 2])
 def test_bound_optimum_and_cost_stand_in_this_order_whatever_effort_is_allowed(
     monkeypatch: pytest.MonkeyPatch, sweeps: int, pairs: int
 ) -> None:
-    monkeypatch.setattr(bounding, "MOST_PAIRS", pairs)
-    monkeypatch.setattr(bounding, "PAIR_CHAIN_SWEEPS", 0)
-    monkeypatch.setattr(bounding, "SWEEPS_AT_ONCE", sweeps)
+    monkeypatch.setattr(bounding, "MAX_STATE_PAIRS", pairs)
+    monkeypatch.setattr(bounding, "MAX_PAIR_CHAIN_SWEEPS", 0)
+    monkeypatch.setattr(bounding, "N_SWEEPS_PER_ROUND", sweeps)
     searched = bounded = 0
     for seed in range(60):
         toy = random_toy(seed, frustrated=True)
@@ -122,7 +122,7 @@ def test_bound_optimum_and_cost_stand_in_this_order_whatever_effort_is_allowed(
                 assert found.cost >= optima[moves] - ROUNDING, (seed, moves, node_budget)
                 assert toy.cost(found.path) == pytest.approx(found.cost, abs=ROUNDING), (seed, moves, node_budget)
                 assert found.lower_bound <= found.cost
-                assert (found.status == "optimal") == (found.cost - found.lower_bound <= bounding.PROVEN)
+                assert (found.status == "optimal") == (found.cost - found.lower_bound <= bounding.OPTIMAL_WITHIN_NATS)
                 assert found.peak_nodes <= node_budget
                 assert min(moves, 1) <= found.expansions <= node_budget
                 searched += found.expansions > moves * len(toy.sizes)
@@ -131,12 +131,12 @@ def test_bound_optimum_and_cost_stand_in_this_order_whatever_effort_is_allowed(
     assert bounded > 0
 
 
-@pytest.mark.parametrize("pairs", [0, bounding.MOST_PAIRS])
+@pytest.mark.parametrize("pairs", [0, bounding.MAX_STATE_PAIRS])
 def test_the_answer_is_the_path_that_the_search_returned_and_never_dearer_than_the_one_before(
     monkeypatch: pytest.MonkeyPatch, kind: dict[str, bool], pairs: int
 ) -> None:
     """Where it had room to walk from the start to the goal, of all parts together."""
-    monkeypatch.setattr(bounding, "MOST_PAIRS", pairs)
+    monkeypatch.setattr(bounding, "MAX_STATE_PAIRS", pairs)
     walked: list[np.ndarray] = []
     search = astar.search
 
@@ -230,7 +230,7 @@ def test_the_best_path_stays_in_what_is_left_of_its_trellis(kind: dict[str, bool
     assert pruned > 20
 
 
-@pytest.mark.parametrize(("sweeps", "ends"), [(20, True), (1, False), (bounding.SWEEPS_AT_FIRST, False), (20, False)])
+@pytest.mark.parametrize(("sweeps", "ends"), [(20, True), (1, False), (bounding.N_FIRST_SWEEPS, False), (20, False)])
 def test_whenever_bounding_ends_no_chain_or_moment_of_its_path_can_be_bettered(
     kind: dict[str, bool], sweeps: int, ends: bool
 ) -> None:
@@ -248,7 +248,7 @@ def test_under_messages_alone_the_search_finds_the_optimum_too(sweeps: int, kind
         messages, path = trws.no_messages(trellis), np.zeros((MOVES + 1) * trellis.chains, np.int64)
         trws.tighten(trellis, messages, path, sweeps, np.inf)
         heuristic = Heuristic.of_messages(messages)
-        found = astar.search(trellis, heuristic, np.inf, astar.SAME, path, 50_000, 50_000, ON)
+        found = astar.search(trellis, heuristic, np.inf, astar.SAME_COST_RATIO, path, 50_000, 50_000, ON)
         assert found.cost == pytest.approx(optimum, abs=PROVEN), seed
         assert found.lower_bound == pytest.approx(optimum, abs=PROVEN), seed
         assert path_cost(trellis, path) == pytest.approx(optimum, abs=PROVEN), seed
@@ -369,7 +369,7 @@ def test_narrowed_pair_chains_keep_every_path_that_is_cheaper_and_what_was_prove
         path = some_path(trellis, seed)
         assert shares(trellis, tables, path) == pytest.approx(path_cost(trellis, path), abs=ROUNDING), seed
         heuristic = Heuristic.of_pair_chains(tables)
-        found = astar.search(trellis, heuristic, np.inf, astar.SAME, path, 50_000, 50_000, ON)
+        found = astar.search(trellis, heuristic, np.inf, astar.SAME_COST_RATIO, path, 50_000, 50_000, ON)
         assert found.cost == pytest.approx(optimum, abs=PROVEN), seed
         assert found.lower_bound == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0
@@ -420,7 +420,7 @@ def test_a_narrowed_trellis_keeps_every_path_that_is_cheaper(spare: float) -> No
             continue
         tables = pair_chains.build(trellis, messages)
         heuristic = Heuristic.of_pair_chains(tables)
-        found = astar.search(trellis, heuristic, np.inf, astar.SAME, path, 50_000, 50_000, ON)
+        found = astar.search(trellis, heuristic, np.inf, astar.SAME_COST_RATIO, path, 50_000, 50_000, ON)
         assert found.cost == pytest.approx(optimum, abs=PROVEN), seed
         assert found.lower_bound == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0
@@ -466,7 +466,7 @@ def test_parts_that_nothing_couples_cost_less_effort_each_by_itself(monkeypatch:
     def one_part(trellis: Trellis) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(trellis.chains, np.int64), np.ones(trellis.chains, dtype=bool)
 
-    monkeypatch.setattr(bounding, "PAIR_CHAIN_SWEEPS", 0)
+    monkeypatch.setattr(bounding, "MAX_PAIR_CHAIN_SWEEPS", 0)
     expansions = {"apart": 0, "at once": 0}
     for seed in range(60):
         toy = random_toy(seed, most=3, frustrated=True)

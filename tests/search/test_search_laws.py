@@ -25,12 +25,12 @@ from motionmind.discretize.codebook import Codebook
 from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
 from motionmind.grammar import coordination
-from motionmind.search.bounding import PROVEN
+from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.tween.engine import Engine
 from motionmind.tween.result import Tween
 
 MOVES = 4
-SAME = 2 * PROVEN
+SAME = 2 * OPTIMAL_WITHIN_NATS
 BODY = Skeleton("body", ("trunk", "arm", "segment"), (-1, 0, 0), np.zeros((3, 3)))
 
 Ends = tuple[Posture, Posture]
@@ -266,7 +266,7 @@ def test_every_clip_twice_says_the_same_once_the_pseudo_count_is_doubled_too_or_
     once = join(engine, ends, **asked)
     with pytest.MonkeyPatch.context() as patch:
         if coordinated:
-            patch.setattr(coordination, "PSEUDO_COUNT", 2.0 * coordination.PSEUDO_COUNT)
+            patch.setattr(coordination, "PRIOR_POSTURES", 2.0 * coordination.PRIOR_POSTURES)
         twice = join(learned([*movement, *again]), ends, **asked)
     assert (once is None) == (twice is None)
     if once is not None and twice is not None:

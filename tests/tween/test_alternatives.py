@@ -14,7 +14,7 @@ from motionmind.body.motion import Posture
 from motionmind.bundled import bundled
 from motionmind.errors import MotionMindError, NoPathError
 from motionmind.formats import read_posture
-from motionmind.search.bounding import PROVEN
+from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.tween.engine import Engine
 from motionmind.tween.result import Tween
 
@@ -42,13 +42,13 @@ def check(found: list[Tween], differ: float, gap: float) -> None:
         assert len(one.path) == len(other.path)
         assert share(one, other) >= differ - 1e-9
         if one.request.passage == other.request.passage:  # else they are solutions of different problems
-            assert one.lower_bound <= other.cost + PROVEN
+            assert one.lower_bound <= other.cost + OPTIMAL_WITHIN_NATS
     for k, tween in enumerate(found):
-        assert tween.lower_bound <= tween.cost + PROVEN
+        assert tween.lower_bound <= tween.cost + OPTIMAL_WITHIN_NATS
         assert tween.gap < gap
         assert tween.costs.total == pytest.approx(tween.cost, abs=1e-6)
         assert tween.differs == pytest.approx([share(tween, other) for other in found[:k]])
-        assert (tween.status == "optimal") == (tween.cost - tween.lower_bound <= PROVEN)
+        assert (tween.status == "optimal") == (tween.cost - tween.lower_bound <= OPTIMAL_WITHIN_NATS)
         assert tween.asked["unlike"] == k
 
 

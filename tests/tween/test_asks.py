@@ -26,7 +26,7 @@ from motionmind.errors import MotionMindError, NoPathError
 from motionmind.formats import read_motion, read_posture
 from motionmind.geometry import rotations as rot
 from motionmind.search import astar
-from motionmind.search.bounding import PROVEN
+from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.search.cfn import cfn
 from motionmind.search.problem import Via
 from motionmind.search.sample import gibbs_sample
@@ -75,7 +75,7 @@ def test_whatever_is_asked_the_cost_is_that_of_brute_force(
         assert expected == np.inf
     else:
         assert found.status == "optimal"
-        assert found.cost == pytest.approx(expected, abs=2 * PROVEN)
+        assert found.cost == pytest.approx(expected, abs=2 * OPTIMAL_WITHIN_NATS)
         assert found.lower_bound <= expected + 1e-9
         assert toy.cost(found.path) == pytest.approx(found.cost, abs=1e-9)
         assert keeps(toy, found.path, allowed, found, vias)
@@ -128,7 +128,7 @@ def test_vias_at_the_postures_of_the_best_path_change_nothing(seed: int, at: boo
     for vias in (inner, inner[:1], inner[-1:]):
         again = solution(toy.problem(toy.rules(2, MOVES), vias))
         assert again is not None
-        assert again.cost == pytest.approx(found.cost, abs=2 * PROVEN)
+        assert again.cost == pytest.approx(found.cost, abs=2 * OPTIMAL_WITHIN_NATS)
 
 
 @settings(max_examples=50)
@@ -147,9 +147,9 @@ def test_a_restriction_never_lowers_the_cost_and_one_that_the_best_path_keeps_ch
         allowed &= rng.random(len(allowed)) > 0.2
         kept = solution(toy.problem(toy.rules(1, MOVES), allowed=allowed | on_it))
         assert kept is not None
-        assert kept.cost == pytest.approx(found.cost, abs=2 * PROVEN)
+        assert kept.cost == pytest.approx(found.cost, abs=2 * OPTIMAL_WITHIN_NATS)
         narrower = solution(toy.problem(toy.rules(1, MOVES), allowed=allowed))
-        assert narrower is None or narrower.cost >= cost - 2 * PROVEN
+        assert narrower is None or narrower.cost >= cost - 2 * OPTIMAL_WITHIN_NATS
         cost = np.inf if narrower is None else narrower.cost
 
 
@@ -186,7 +186,7 @@ def test_states_by_other_numbers_cost_the_same(seed: int) -> None:
     )
     assert (mine is None) == (theirs is None)
     if mine is not None and theirs is not None:
-        assert mine.cost == pytest.approx(theirs.cost, abs=2 * PROVEN)
+        assert mine.cost == pytest.approx(theirs.cost, abs=2 * OPTIMAL_WITHIN_NATS)
 
 
 @settings(max_examples=60)
@@ -211,7 +211,7 @@ def test_chains_in_another_order_cost_the_same(seed: int) -> None:
         kept = np.concatenate([allowed[chain] for chain in chains])
         found = solution(body.problem(body.rules(1, MOVES), [Via(via[list(chains)])], allowed=kept))
         costs.append(np.inf if found is None else found.cost)
-    assert costs[0] == pytest.approx(costs[1], abs=2 * PROVEN)
+    assert costs[0] == pytest.approx(costs[1], abs=2 * OPTIMAL_WITHIN_NATS)
 
 
 def test_what_was_asked_is_in_the_written_problem(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from motionmind.formats import read_posture
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
 from motionmind.realise import realise
-from motionmind.search.bounding import PROVEN
+from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.tween.engine import Engine
 from motionmind.tween.modes import COMPARED, Modes, find_place
 from motionmind.tween.result import Tween
@@ -132,7 +132,7 @@ def check(found: Sequence[Tween]) -> None:
     for number, tween in enumerate(found):
         assert len(tween.differs) == number
         assert min(tween.differs, default=1.0) >= 0.2 - 1e-9
-        assert tween.lower_bound <= tween.cost + PROVEN
+        assert tween.lower_bound <= tween.cost + OPTIMAL_WITHIN_NATS
 
 
 def check_again(engine: Engine, ends: tuple[Posture, Posture], found: Sequence[Tween], number: int) -> None:

@@ -215,8 +215,8 @@ def test_another_skeleton_is_refused_and_the_difference_named(six_segments: Engi
 
 
 def test_more_states_than_can_be_held_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motionmind.learned.learning.MOST_STATES_LEARNED", 12)
-    monkeypatch.setattr("motionmind.learned.learning.MOST_FACINGS", 12)
+    monkeypatch.setattr("motionmind.learned.learning.MAX_STATES_LEARNED", 12)
+    monkeypatch.setattr("motionmind.learned.learning.MAX_FACINGS", 12)
     with pytest.raises(CorpusError, match=r"'many': \w+ has \d+ states within 0.5 degrees, and a joint can have 12"):
         Engine.fit(CLIPS, name="many", discretization=Codebook(0.5), facing="stage")
     with pytest.raises(CorpusError, match=r"'many': the facing has 720 states within 0\.5 degrees, and can have 12"):

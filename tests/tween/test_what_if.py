@@ -18,7 +18,7 @@ from motionmind.cli.printing import format_what_if
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_posture
 from motionmind.realise.timeline import usual
-from motionmind.search.bounding import PROVEN
+from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.search.length import choose_length
 from motionmind.search.solve import solve
 from motionmind.tween.engine import Engine
@@ -30,7 +30,7 @@ from motionmind.tween.what_if import Answer, WhatIf, find_what_if
 POSTURES = bundled("corpora") / "ballet" / "postures"
 A, B, PASSE = POSTURES / "arabesque.json", POSTURES / "fifth.json", POSTURES / "passe.json"
 ENDS = read_posture(A), read_posture(B)
-SAME = 4 * PROVEN
+SAME = 4 * OPTIMAL_WITHIN_NATS
 MOVES = 5
 
 
@@ -133,7 +133,7 @@ def test_a_price_is_the_difference_to_the_tween_without_the_restriction(
             difference = best.cost - tween_of(ballet, **alike).cost
         assert 0.0 <= one.least <= one.most
         assert one.least - SAME <= difference <= one.most + SAME
-        assert one.proven == (one.most - one.least <= 2 * PROVEN)
+        assert one.proven == (one.most - one.least <= 2 * OPTIMAL_WITHIN_NATS)
 
 
 def test_a_duration_of_as_many_moves_is_priced_without_the_guide(ballet: Engine) -> None:

@@ -238,7 +238,7 @@ def test_seams_that_a_viewer_would_wince_at_are_named(
     )
     print_seams_beyond(within, lenient)
     assert capsys.readouterr().out == ""
-    monkeypatch.setattr("motionmind.learned.plausibility.TRIFLES", np.full(len(MEASURES), 1e-3))
+    monkeypatch.setattr("motionmind.learned.plausibility.NEGLIGIBLE_EXCESS", np.full(len(MEASURES), 1e-3))
     print_seams_beyond(within, strict)
     (slides,) = [line for line in capsys.readouterr().out.splitlines() if "feet slide" in line]
     values = {

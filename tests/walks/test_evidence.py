@@ -15,7 +15,7 @@ from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
 from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import learn_carriage
-from motionmind.learned.trust import PRIOR, Squares, fit_table
+from motionmind.learned.trust import PRIOR_TRUST, Squares, fit_table
 from motionmind.walks import evidence
 from motionmind.walks.evidence import (
     DECAY_CANDIDATES_S,
@@ -59,7 +59,7 @@ def repeated(seed: int = 1) -> Corpus:
 def test_a_corpus_whose_clips_go_the_short_way_trusts_no_walk() -> None:
     corpus = straight()
     found = gather_evidence(corpus, learn_carriage(corpus), 24)
-    table = fit_table(found, PRIOR.table)
+    table = fit_table(found, PRIOR_TRUST.table)
     known = np.diag(Squares.summed(found).inner)
     told = known > 1e-2 * known.max()
     assert told.any()
@@ -87,7 +87,7 @@ def test_a_single_take_tells_nothing_of_itself(names: list[str]) -> None:
     carriage = learn_carriage(corpus)
     assert gather_evidence(corpus, carriage, 12) == []
     trust = learn_trust(corpus, carriage)
-    np.testing.assert_array_equal(trust.table, PRIOR.table)
+    np.testing.assert_array_equal(trust.table, PRIOR_TRUST.table)
     np.testing.assert_array_equal(trust.spread, spread_of(corpus, carriage))
 
 
@@ -141,5 +141,5 @@ def test_velocities_last_as_long_as_in_the_clips(slows: float) -> None:
 def test_a_corpus_without_time_for_windows_takes_the_prior() -> None:
     corpus = gather("brief", [clip(postures(2, seed), name) for seed, name in enumerate("abc")])
     trust = learn_trust(corpus, learn_carriage(corpus))
-    np.testing.assert_array_equal(trust.table, PRIOR.table)
-    np.testing.assert_array_equal(trust.lasts, PRIOR.lasts)
+    np.testing.assert_array_equal(trust.table, PRIOR_TRUST.table)
+    np.testing.assert_array_equal(trust.lasts, PRIOR_TRUST.lasts)
