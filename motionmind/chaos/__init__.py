@@ -1,4 +1,4 @@
-"""Chaotic reordering: a piece is wrapped around a strange attractor and read along another trajectory."""
+"""Chaotic reordering: wrap a piece around a strange attractor, and read it along another trajectory."""
 
 from __future__ import annotations
 

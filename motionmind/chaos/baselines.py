@@ -23,10 +23,9 @@ def shuffled(count: int, rng: Generator) -> Ints:
 def chunk_shuffled(lengths: Ints, rng: Generator) -> Ints:
     """Cut a piece of N postures into chunks and put these in random order.
 
-    Given the lengths of a variation's runs, the result keeps as much of the piece's order as the variation does, in
-    stretches as long, and nothing else of it. The lengths are taken in random order, so the cuts are random too. No
-    chunk follows the one that it follows in the piece, so `runs` returns the lengths again. The result is drawn
-    uniformly from all such orders.
+    With the lengths of a variation's runs, the result keeps as much of the piece's order as the variation, in stretches
+    as long. The lengths, and so the cuts, are in random order. No chunk follows its predecessor in the piece, so `runs`
+    returns the lengths again. The distribution is uniform over all such orders.
 
     Args:
         lengths: lengths of the chunks [R], which add up to N.
@@ -40,7 +39,7 @@ def chunk_shuffled(lengths: Ints, rng: Generator) -> Ints:
     """
     lengths = np.asarray(lengths, dtype=np.int64)
     if np.any(lengths < 1):
-        raise MotionMindError(f"a chunk has 1 posture at least, not {lengths.min()}")
+        raise MotionMindError(f"a chunk needs 1 posture or more, not {lengths.min()}")
     cuts = np.cumsum(rng.permutation(lengths))
     order = rng.permutation(len(lengths))
     while len(lengths) > 1 and len(runs(order)) < len(lengths):  # about one order in e has no succession
@@ -52,8 +51,8 @@ def chunk_shuffled(lengths: Ints, rng: Generator) -> Ints:
 def dabby(sites: Floats, points: Floats) -> Ints:
     """Map each point to the site with the smallest first coordinate that is not less than the point's.
 
-    This is the mapping of Dabby, "Musical variations from a chaotic mapping", Chaos 6:95 (1996). It leaves open what
-    comes past the largest site; here it is that site. Of equal sites the one with the lowest index is taken.
+    This is the mapping of Dabby, "Musical variations from a chaotic mapping", Chaos 6:95 (1996), which leaves points
+    past the largest site open; here they map to that site. Of equal sites the one with the lowest index counts.
 
     Args:
         sites: [N, d], in the flow's coordinates.
@@ -73,9 +72,9 @@ def dabby(sites: Floats, points: Floats) -> Ints:
 
 
 def quadrants(skeleton: Skeleton, count: int, rng: Generator) -> Ints:
-    """Shuffle the postures of each part of the body separately, after Merce Cunningham.
+    """Shuffle the postures of each body part separately, after Merce Cunningham.
 
-    Every part (see `sided_parts`) goes through the piece in a random order of its own; its joints stay together.
+    Every body part (see `sided_parts`) has a random order of its own; its joints stay together.
 
     Args:
         skeleton: the body, J joints.
@@ -83,7 +82,7 @@ def quadrants(skeleton: Skeleton, count: int, rng: Generator) -> Ints:
         rng: the random generator.
 
     Returns:
-        The posture that each joint is taken from [N, J].
+        The posture that gives each joint's rotation [N, J].
     """
     indices = np.empty((count, len(skeleton)), dtype=np.int64)
     for joints in sided_parts(skeleton).values():

@@ -1,7 +1,7 @@
 """Chaotic flows dx/dt = f(x): a registry, and the type for any other.
 
-Steps are a sixtieth to a hundredth of a turn around the attractor, so a trajectory of which each 11th point is kept
-goes round in six to ten points. The flow `chua` is Chua's circuit, whose attractor is the double scroll.
+A step is a sixtieth to a hundredth of a turn around the attractor, so every 11th point gives six to ten points a turn.
+The flow `chua` is Chua's circuit, whose attractor is the double scroll.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ class Flow:
     Attributes:
         name: its name.
         field: a function from a point [d] and each parameter to the rate of change, a tuple or array [d]. Numba
-            compiles it if it can; otherwise it is called as it is, which takes some hundred times as long. It should
-            not raise exceptions, which do not get out of compiled code.
+            compiles it if it can; otherwise it runs as it is, about a hundred times slower. It should not raise
+            exceptions: they do not leave compiled code.
         start: a point in the attractor's basin [d].
         step: the step of the integration, in the flow's units of time.
         transient: steps from a start until the trajectory counts as being on the attractor.
@@ -75,10 +75,12 @@ class Flow:
             check_real(f"parameter {name}", value)
         parameters = {name: float(value) for name, value in self.parameters.items()}
         if not start:
-            raise MotionMindError(f"flow {self.name}: a start needs a coordinate at least")
+            raise MotionMindError(f"flow {self.name}: start needs one coordinate or more")
         dimensions = self.dimensions or tuple(f"x{i + 1}" for i in range(len(start)))
         if len(dimensions) != len(start):
-            raise MotionMindError(f"flow {self.name}: {len(start)} coordinates have {len(dimensions)} names")
+            raise MotionMindError(
+                f"flow {self.name}: start has {len(start)} coordinates, dimensions has {len(dimensions)} names"
+            )
         for name, value in parameters.items():
             if not np.isfinite(value):
                 raise MotionMindError(f"flow {self.name}: parameter {name} must be a finite number, not {value}")
@@ -142,7 +144,7 @@ def _chua(x: Floats, alpha: float, beta: float, inner: float, outer: float) -> t
 
 
 def _duffing(x: Floats, damping: float, drive: float, frequency: float) -> tuple[float, ...]:
-    # The last two coordinates are attracted by the unit circle and go round it at a constant rate.
+    # The last two coordinates converge to the unit circle and go round it at a constant rate.
     fade = 1.0 - x[2] * x[2] - x[3] * x[3]
     return (
         x[1],

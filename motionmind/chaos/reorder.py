@@ -1,12 +1,12 @@
-"""Chaotic reordering: a piece is wrapped around an attractor and read along another trajectory.
+"""Chaotic reordering: wrap a piece around an attractor, and read it along another trajectory.
 
-The piece's N postures are placed along a trajectory x, one at each point: its *sites*. A second trajectory y is read
-through the sites' Voronoi cells: its n-th posture is that of the nearest site,
+The piece's N postures lie along a trajectory x, one at each point: its *sites*. A second trajectory y takes at its n-th
+point the posture of the nearest site, in whose Voronoi cell it lies:
 
     index[n] = argmin over i of |x[i] - y[n]|.
 
-The same trajectory gives the piece back. One that begins nearby stays with the piece until the two diverge, at the rate
-of the flow's largest Lyapunov exponent, and then moves from stretch to stretch of it.
+The same trajectory returns the piece. One that begins nearby follows the piece until the two diverge, at the rate of
+the flow's largest Lyapunov exponent, and then jumps from stretch to stretch of it.
 
 Source: Bradley and Stuart, "Using chaos to generate variations on movement sequences", Chaos 8:800 (1998).
 """
@@ -22,9 +22,6 @@ from motionmind._typing import Floats, Ints
 from motionmind.chaos.flows import Flow
 from motionmind.chaos.trajectories import trajectory
 from motionmind.errors import MotionMindError
-
-_FAR = 1e150  # beyond it squares of distances overflow
-_ROUNDING = 1e-12  # relative; where two distances differ by less, the nearer site is found exactly
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,10 +52,10 @@ def itinerary(
 ) -> Itinerary:
     """Reorder a piece along a trajectory that begins near its own.
 
-    The nudge is added after the transient, to the first point of the piece's own trajectory. So the variation begins
-    with the piece's first postures and leaves them gradually, the later the smaller the nudge. Added before the
-    transient, any nudge would lead to some unrelated trajectory on the attractor; for that, call `trajectory` with
-    another start, and `reorder`.
+    The nudge is added to the first point of the piece's own trajectory, after the transient. So the variation begins
+    with the piece's first postures and leaves them gradually, the later the smaller the nudge. A nudge before the
+    transient would lead to an unrelated trajectory on the attractor; for that, call `trajectory` with another start,
+    and `reorder`.
 
     Args:
         flow: the flow.
@@ -74,10 +71,10 @@ def itinerary(
     try:
         nudge = np.asarray(nudge, dtype=np.float64)
     except (TypeError, ValueError):
-        raise MotionMindError(f"a nudge is a number or one for each coordinate, not {nudge!r}") from None
+        raise MotionMindError(f"nudge must be a number, or one for each coordinate, not {nudge!r}") from None
     offset = nudge * np.eye(1, sites.shape[1])[0] if nudge.ndim == 0 else nudge
     if offset.shape != sites[0].shape or not np.isfinite(offset).all():
-        raise MotionMindError(f"a nudge in {flow.name} is a finite number or {sites.shape[1]} of them, not {nudge}")
+        raise MotionMindError(f"nudge in {flow.name} must be a finite number or {sites.shape[1]} of them, not {nudge}")
     length = count if length is None else length
     try:
         points = trajectory(flow, sites[0] + offset, count=length, every=every, step=step, transient=0)
@@ -109,20 +106,21 @@ def reorder(sites: Floats, points: Floats) -> Ints:
     tree = cKDTree(sites[labels], balanced_tree=False, compact_nodes=False)
     if len(labels) == 1:
         return np.full(len(points), labels[0], dtype=np.int64)
-    # Points near each other search the same part of the tree: in that order they take half the time.
+    # Points near each other search the same part of the tree: this order takes half the time.
     order = cKDTree(points, leafsize=64, balanced_tree=False, compact_nodes=False).indices
     distances, found = tree.query(points[order], k=2)
     indices = np.empty(len(points), dtype=np.int64)
     indices[order] = labels[found[:, 0]]
-    tied = distances[:, 1] <= distances[:, 0] * (1.0 + _ROUNDING)
+    margin = 1.0 + 1e-12  # where two distances differ by less, the nearer site is found exactly
+    tied = distances[:, 1] <= distances[:, 0] * margin
     for n, reach in zip(order[tied], distances[tied, 1], strict=True):
-        near = np.sort(labels[tree.query_ball_point(points[n], reach * (1.0 + _ROUNDING))])
+        near = np.sort(labels[tree.query_ball_point(points[n], reach * margin)])
         indices[n] = near[np.argmin(np.sum((sites[near] - points[n]) ** 2, axis=1))]
     return indices
 
 
 def check_sites(sites: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """Return sites [N, d] and points [L, d] as arrays that can be compared.
+    """Return sites [N, d] and points [L, d] as checked arrays.
 
     Raises:
         MotionMindError: there is no site, or sites and points are not finite numbers of the same dimension.
@@ -131,10 +129,11 @@ def check_sites(sites: Floats, points: Floats) -> tuple[Floats, Floats]:
     if sites.ndim != 2 or points.ndim != 2 or sites.shape[1] != points.shape[1] or sites.size == 0:
         raise MotionMindError(
             f"points of shape {list(points.shape)} cannot be compared with sites of shape {list(sites.shape)}: "
-            "that takes sites [N, d], one at least, and points [L, d]"
+            "sites must be [N, d], one or more, and points [L, d]"
         )
-    if not (np.abs(sites) < _FAR).all() or not (np.abs(points) < _FAR).all():
-        raise MotionMindError(f"sites and points must be finite numbers below {_FAR:g}")
+    limit = 1e150  # beyond it squares of distances overflow
+    if not (np.abs(sites) < limit).all() or not (np.abs(points) < limit).all():
+        raise MotionMindError(f"sites and points must be finite numbers below {limit:g}")
     return sites, points
 
 

@@ -10,9 +10,9 @@ d0 from the first along their difference. With d_n the distance after the n-th s
 
     (1 / (N h)) sum over n of log(d_n / d0).
 
-Every trajectory must pass a sequential test of it: it counts as chaotic as soon as the sum reaches 20 nats, and is
-refused if that takes more than 200,000 steps. Near a fixed point the distance shrinks, around a limit cycle it stays
-within a factor, and under mere shear it grows linearly in time, which would take 5e8 turns to pass.
+Every trajectory must pass a sequential test: it counts as chaotic once the sum reaches 20 nats, and is refused if that
+takes more than 200,000 steps. Near a fixed point the distance shrinks, around a limit cycle it stays within a factor,
+and under mere shear it grows linearly in time, which would take 5e8 turns to pass.
 
 Source: Benettin, Galgani and Strelcyn, "Kolmogorov entropy and numerical experiments", Phys. Rev. A 14:2338 (1976).
 """
@@ -36,13 +36,7 @@ from motionmind.jit import either, jit, pointer
 Loop = Callable[..., tuple[Any, Any]]
 Step = Callable[[Floats, float, tuple[float, ...], Floats, Floats], None]
 
-_FAR = 1e9  # farther from the origin than any attractor: the trajectory has left for infinity
-_APART = 1e-8  # distance of Benettin's second trajectory from the first, relative to 1 + |x|
-_ENOUGH = 20.0  # nats by which the distance must grow in a chaotic flow
-_PATIENCE = 200_000  # steps within which it must
-_LONG = 10_000  # steps in which a trajectory that nears a fixed point comes to rest
-_KEPT = 4096  # runs whose beginning is kept: a search for a nudge makes some hundred
-_STILL = 1e-9  # relative to the speed at the flow's own start: slower points are at rest
+_MAX_DISTANCE = 1e9  # from the origin, in the flow's coordinates: beyond it, a trajectory has left for infinity
 
 
 def trajectory(
@@ -60,8 +54,8 @@ def trajectory(
         flow: the flow.
         start: the start [d]; None for the flow's own.
         count: points, 1 at least.
-        every: steps from each point to the next. To skip m points is `every = m + 1`: Bradley and Stuart, Chaos 8:800
-            (1998), skip 10; their report CU-CS-844-97 (1997) takes each tenth, so skips 9.
+        every: steps from each point to the next; `every = m + 1` skips m points. Bradley and Stuart, Chaos 8:800
+            (1998), skip 10; their report CU-CS-844-97 (1997) keeps every tenth, so skips 9.
         step: the step of the integration, in the flow's units of time; None for the flow's own.
         transient: steps to drop before the first point; None for the flow's own.
 
@@ -73,11 +67,11 @@ def trajectory(
             point, or into an orbit that neighbours do not leave (see above).
     """
     if count < 1:
-        raise MotionMindError(f"a trajectory has 1 point at least, not {count}")
+        raise MotionMindError(f"count must be 1 or more, not {count}")
     if every < 1:
-        raise MotionMindError(f"a trajectory's points are 1 step apart at least, not {every}")
+        raise MotionMindError(f"every must be 1 or more, not {every}")
     run = _Run.of(flow, start, step, transient)
-    return run.follow(_once(_begin, run), count, every)
+    return run.follow(_cached(_first_point, run), count, every)
 
 
 def largest_exponent(
@@ -104,14 +98,14 @@ def largest_exponent(
         MotionMindError: an argument is out of range, or the trajectory diverges to infinity.
     """
     if steps < 1:
-        raise MotionMindError(f"an exponent needs 1 step at least, not {steps}")
-    exponent: float = _once(_exponent, _Run.of(flow, start, step, transient), steps)
+        raise MotionMindError(f"steps must be 1 or more, not {steps}")
+    exponent: float = _cached(_exponent, _Run.of(flow, start, step, transient), steps)
     return exponent
 
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """A flow from a start with a step, its arguments checked; `compiled` is None if its field cannot be compiled."""
+    """A flow with a start and a step, all checked; `compiled` is None if numba cannot compile its field."""
 
     flow: Flow
     compiled: Step | None
@@ -136,13 +130,13 @@ class _Run:
             raise MotionMindError(f"the step of {flow.name} must be a positive number, not {step}")
         if isinstance(transient, bool) or not isinstance(transient, int | np.integer) or transient < 0:
             raise MotionMindError(
-                f"the transient of {flow.name} is a whole number of steps, 0 at least, not {transient!r}"
+                f"the transient of {flow.name} must be a whole number of steps, 0 or more, not {transient!r}"
             )
         # Compiled code would silently read past the end of an array, so the field is first called uncompiled.
         try:
             shape = np.shape(flow.field(begin.copy(), *flow.parameters.values()))
         except (TypeError, IndexError, ValueError, ArithmeticError) as error:
-            raise MotionMindError(f"{flow.name}: its field fails at {_written(begin)}: {error}") from error
+            raise MotionMindError(f"{flow.name}: its field fails at {_format_point(begin)}: {error}") from error
         if shape != (d,):
             raise MotionMindError(f"{flow.name}: its field gives an array {list(shape)} at a point [{d}], not [{d}]")
         return cls(flow, _compiled(flow.field, len(flow.parameters)), begin, step, transient)
@@ -152,30 +146,30 @@ class _Run:
         return tuple(self.flow.parameters.values())
 
     @property
-    def _all(self) -> tuple[object, ...]:
+    def _key(self) -> tuple[object, ...]:
         numbers = (*self.parameters, *self.flow.start, self.flow.step, *self.start, self.step)
         return self.flow.field, np.array(numbers).tobytes(), len(self.parameters), self.transient
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Run) and self._all == other._all
+        return isinstance(other, _Run) and self._key == other._key
 
     def __hash__(self) -> int:
-        return hash(self._all)
+        return hash(self._key)
 
-    def settled(self) -> Floats:
-        """The point at which the transient ends [d]."""
+    def end_of_transient(self) -> Floats:
+        """Return the point at which the transient ends [d]."""
         return self.follow(self.start, 2, self.transient)[1] if self.transient else self.start
 
     def follow(self, start: Floats, count: int, every: int) -> Floats:
-        """Points [count, d] from `start` on, `every` steps apart."""
+        """Compute points [count, d] from `start` on, `every` steps apart."""
         points, kept = self._call(_follow, _follow_compiled, start, count, every)
         if kept < count:
             raise self._diverged(kept * every)
         return np.asarray(points)
 
     def growth(self, start: Floats, steps: int, enough: float) -> tuple[float, int]:
-        """Nats by which neighbours of `start` diverge, and the number of steps it took."""
-        growth, used = self._call(_part, _part_compiled, start, steps, enough)
+        """Return the nats by which neighbours of `start` diverge, and the number of steps."""
+        growth, used = self._call(_diverge, _diverge_compiled, start, steps, enough)
         if np.isnan(growth):
             raise self._diverged(used)
         return float(growth), int(used)
@@ -187,74 +181,80 @@ class _Run:
             with np.errstate(all="ignore"):  # compiled code goes on with infinity, too
                 return loop(_step_of(self.flow.field), self.parameters, start, self.step, *rest)
         except (ArithmeticError, ValueError) as error:
-            raise MotionMindError(f"{self.flow.label}: its field fails after {_written(start)}: {error}") from error
+            raise MotionMindError(
+                f"{self.flow.label}: its field fails after {_format_point(start)}: {error}"
+            ) from error
 
     def check(self, start: Floats) -> None:
         """Raise MotionMindError unless the flow is chaotic from `start`.
 
-        The test takes the flow's own step at least: with tiny ones it would take long. Neighbours diverge also on the
-        way to a fixed point that is a saddle, so the trajectory must not come to rest either.
+        The test takes the flow's own step or a longer one: tiny steps would take long. Neighbours diverge also on the
+        way to a saddle point, so the trajectory must not come to rest either.
         """
         run = replace(self, step=max(self.step, self.flow.step))
-        growth, used = run.growth(start, _PATIENCE, _ENOUGH)
-        if growth < _ENOUGH:
+        enough = 20.0  # nats
+        growth, used = run.growth(start, 200_000, enough)
+        if growth < enough:
             raise MotionMindError(
-                f"{self.flow.label} is not chaotic from {_written(self.start)}: in {used} steps of {run.step:g} "
+                f"{self.flow.label} is not chaotic from {_format_point(self.start)}: in {used} steps of {run.step:g} "
                 f"neighbours of its trajectory part by {growth:.3g} nats, an exponent of "
-                f"{growth / (used * run.step):.3g}, where {_ENOUGH:g} nats would show that it is positive; it settles "
+                f"{growth / (used * run.step):.3g}, where {enough:g} nats would show that it is positive; it settles "
                 "on a fixed point or an orbit"
             )
-        end = run.follow(start, 2, _LONG)[1]
-        if run.speed(end) <= _STILL * run.speed(np.array(self.flow.start)):
+        end = run.follow(start, 2, 10_000)[1]  # a trajectory that nears a fixed point rests after so many steps
+        if run.speed(end) <= 1e-9 * run.speed(np.array(self.flow.start)):
             raise MotionMindError(
-                f"{self.flow.label} settles from {_written(self.start)}: it comes to stand still at {_written(end)}; "
-                "a start that is not on the way to a fixed point would move"
+                f"{self.flow.label} settles from {_format_point(self.start)}: it comes to rest at "
+                f"{_format_point(end)}; choose a start that does not lead to a fixed point"
             )
 
     def speed(self, point: Floats) -> float:
-        """The norm of the rate of change at a point [d]."""
+        """Return the norm of the rate of change at a point [d]."""
         return float(np.linalg.norm(self.flow.field(point.copy(), *self.parameters)))
 
     def _diverged(self, steps: int) -> MotionMindError:
         return MotionMindError(
-            f"{self.flow.label} diverges from {_written(self.start)}: within {steps} step{'s' * (steps != 1)} of "
-            f"{self.step:g} it is farther than {_FAR:g} from the origin; a start nearer to "
-            f"{_written(self.flow.start)} or a smaller step may stay on the attractor"
+            f"{self.flow.label} diverges from {_format_point(self.start)}: within {steps} step{'s' * (steps != 1)} of "
+            f"{self.step:g} it is farther than {_MAX_DISTANCE:g} from the origin; a start nearer to "
+            f"{_format_point(self.flow.start)} or a smaller step may stay on the attractor"
         )
 
 
-def _begin(run: _Run) -> Floats:
-    """Return the first point of a trajectory [d], from which the flow is chaotic."""
-    begin = run.settled()
+def _first_point(run: _Run) -> Floats:
+    """Return the first point of a trajectory [d], and check that the flow is chaotic from there."""
+    begin = run.end_of_transient()
     run.check(begin)
     return begin
 
 
 def _exponent(run: _Run, steps: int) -> float:
-    """Return the largest Lyapunov exponent of a trajectory of so many steps, nats per unit of the flow's time."""
-    growth, used = run.growth(run.settled(), steps, np.inf)
+    """Return the largest Lyapunov exponent over a number of steps, nats per unit of the flow's time."""
+    growth, used = run.growth(run.end_of_transient(), steps, np.inf)
     return growth / (used * run.step)
 
 
-_kept = {function: lru_cache(_KEPT)(function) for function in (_begin, _exponent)}
+# A search for a nudge makes some hundred runs.
+_kept = {function: lru_cache(4096)(function) for function in (_first_point, _exponent)}
 
 
-def _once(function: Callable[..., Any], run: _Run, *rest: int) -> Any:
-    """Call a function of a run, or return what it returned before: whoever varies a piece asks for the same runs again
-    and again. What is not compiled may have changed."""
+def _cached(function: Callable[..., Any], run: _Run, *rest: int) -> Any:
+    """Call a function of a run, or return its cached result; varying a piece repeats the same runs.
+
+    A field that is not compiled may have changed, so its runs are not cached.
+    """
     return (_kept[function] if run.compiled else function)(run, *rest)
 
 
-def _written(point: Sequence[float] | Floats) -> str:
+def _format_point(point: Sequence[float] | Floats) -> str:
     return f"({', '.join(f'{x:.6g}' for x in point)})"
 
 
-# --- compiled, or as they are -----------------------------------------------------------------------------------------
+# --- compiled or not --------------------------------------------------------------------------------------------------
 
 
 @cache
 def _compiled(field: Field, parameters: int) -> Step | None:
-    """A step of the field, with so many parameters, as a pointer; None if numba cannot compile it.
+    """Compile a step of a field with a number of parameters to a pointer; None if numba cannot compile it.
 
     Only steps of this package's own fields are cached on disk: their source is known.
     """
@@ -275,7 +275,7 @@ def _compiled(field: Field, parameters: int) -> Step | None:
 
 
 def _step_of(field: Field) -> Step:
-    """A function that moves x [d] on by one Runge-Kutta step of length h; y and total [d] are scratch arrays."""
+    """Return a function that advances x [d] by one Runge-Kutta step of length h; y and total [d] are scratch arrays."""
 
     def step(x: Floats, h: float, parameters: tuple[float, ...], y: Floats, total: Floats) -> None:
         k = field(x, *parameters)
@@ -300,18 +300,18 @@ def _step_of(field: Field) -> Step:
 
 
 @either
-def _near(x: Floats) -> bool:
+def _is_bounded(x: Floats) -> bool:
     """Return whether a point [d] is near enough to the origin for an attractor; NaN is not."""
-    near = True
+    bounded = True
     for i in range(len(x)):
-        near = near and abs(x[i]) < _FAR
-    return near
+        bounded = bounded and abs(x[i]) < _MAX_DISTANCE
+    return bounded
 
 
 def _follow(
     step: Step, parameters: tuple[float, ...], start: Floats, h: float, count: int, every: int
 ) -> tuple[Floats, int]:
-    """Points [count, d] from `start` on, `every` steps apart, and their number: fewer if the trajectory diverged."""
+    """Return points [count, d] from `start` on, `every` steps apart, and how many are valid before it diverged."""
     d = len(start)
     x, y, total = start.copy(), np.empty(d), np.empty(d)
     points = np.empty((count, d))
@@ -319,29 +319,29 @@ def _follow(
     for n in range(1, count):
         for _ in range(every):
             step(x, h, parameters, y, total)
-        if not _near(x):
+        if not _is_bounded(x):
             return points, n
         points[n] = x
     return points, count
 
 
-def _part(
+def _diverge(
     step: Step, parameters: tuple[float, ...], start: Floats, h: float, steps: int, enough: float
 ) -> tuple[float, int]:
-    """Nats by which a neighbour of `start` diverges from its trajectory, and the number of steps made.
+    """Return the nats by which a neighbour of `start` diverges from its trajectory, and the number of steps.
 
-    It stops after `steps`, or as soon as the nats are `enough`. NaN nats: the trajectory went to infinity.
+    It stops after `steps`, or once the nats reach `enough`. NaN nats: the trajectory went to infinity.
     """
     d = len(start)
     x, other, y, total = start.copy(), start.copy(), np.empty(d), np.empty(d)
-    apart = _APART * (1.0 + np.sqrt(np.sum(x * x)))
+    apart = 1e-8 * (1.0 + np.sqrt(np.sum(x * x)))
     for i in range(d):
         other[i] += apart / np.sqrt(d)
     grown = 0.0
     for n in range(steps):
         step(x, h, parameters, y, total)
         step(other, h, parameters, y, total)
-        if not (_near(x) and _near(other)):
+        if not (_is_bounded(x) and _is_bounded(other)):
             return np.nan, n + 1
         square = 0.0
         for i in range(d):
@@ -357,4 +357,4 @@ def _part(
     return grown, steps
 
 
-_follow_compiled, _part_compiled = jit(_follow), jit(_part)
+_follow_compiled, _diverge_compiled = jit(_follow), jit(_diverge)

@@ -48,7 +48,7 @@ def test_shuffled_chunks_prefer_no_order() -> None:
 
 
 def test_chunks_of_nothing_are_refused() -> None:
-    with pytest.raises(MotionMindError, match="a chunk has 1 posture at least, not 0"):
+    with pytest.raises(MotionMindError, match="a chunk needs 1 posture or more, not 0"):
         chunk_shuffled(np.array([2, 0]), np.random.default_rng(0))
 
 

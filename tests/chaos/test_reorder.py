@@ -70,7 +70,7 @@ def test_a_nudge_moves_the_first_point_and_no_site() -> None:
 
 @pytest.mark.parametrize("nudge", [np.nan, [0.1, 0.2], [[0.1, 0.2, 0.3]], [0.1, 0.2, np.inf]])
 def test_a_nudge_that_is_no_point_is_refused(nudge: object) -> None:
-    with pytest.raises(MotionMindError, match="a nudge in lorenz is a finite number or 3 of them"):
+    with pytest.raises(MotionMindError, match="nudge in lorenz must be a finite number or 3 of them"):
         itinerary(FLOWS["lorenz"], 5, nudge=nudge)
 
 
@@ -101,7 +101,7 @@ def test_the_same_arguments_give_the_same_bytes() -> None:
 def test_a_nudge_that_leads_out_of_the_basin_is_named() -> None:
     with pytest.raises(MotionMindError, match=r"nudged by 1e\+09, 0, 0: lorenz .* diverges .* within 1 step of"):
         itinerary(FLOWS["lorenz"], 5, nudge=1e9)
-    with pytest.raises(MotionMindError, match="a nudge is a number or one for each coordinate, not 'x'"):
+    with pytest.raises(MotionMindError, match="nudge must be a number, or one for each coordinate, not 'x'"):
         itinerary(FLOWS["lorenz"], 5, nudge="x")  # type: ignore[arg-type]
 
 
