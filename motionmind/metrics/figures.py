@@ -1,4 +1,4 @@
-"""All measures of one movement at once, each beside the range of the corpus's own movement."""
+"""All measures of a movement, each beside the range of the corpus's own movement."""
 
 from __future__ import annotations
 
@@ -21,17 +21,12 @@ from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.plausibility import MEASURES, UNITS_AND_MEANINGS, summarise_shown
 from motionmind.metrics.paths import Habits, arrival_spread, learn_habits
 from motionmind.metrics.smoothness import angular_jerk, angular_speed, sparc
-from motionmind.metrics.style import WINDOW, Styles, features, learn_styles
-from motionmind.metrics.verbatim import LONGEST, Phrasebook, learn_phrases
+from motionmind.metrics.style import WINDOW_FRAMES, Styles, features, learn_styles
+from motionmind.metrics.verbatim import MAX_NGRAM, Phrasebook, learn_phrases
 from motionmind.realise.timeline import usual
 from motionmind.retarget.retarget import own_skeleton
 
-RANGE = 5.0, 95.0  # percentiles of the corpus's own movement
-_SHORTEST = 4  # frames; a jerk needs as many
-_MOST = 100  # pieces of the corpus that are measured
-_PARTS = 10  # pieces that the corpus is cut into, at least
-_KEYED = 2.0  # frames in the time of a move; fewer are keyframes
-_HUMAN = 1.0  # metres; the limits of skating are for bodies at least as tall
+_MIN_FRAMES = 4  # a jerk needs as many
 
 
 @dataclass(frozen=True)
@@ -39,8 +34,8 @@ class Figure:
     """One measure of a movement.
 
     Attributes:
-        value: the measure; NaN where it has no meaning, as the smoothness of rest.
-        low: 5th percentile over pieces of the corpus's own movement; NaN where that has no value.
+        value: the measure; NaN where it is undefined, such as the smoothness of rest.
+        low: 5th percentile over pieces of the corpus's own movement; NaN where undefined.
         high: 95th percentile, likewise.
         unit: the unit of all three; "" for counts and shares.
         about: a description in words.
@@ -90,13 +85,15 @@ class MeasureReport(msgspec.Struct, frozen=True):
             corpus,
             frames,
             {
-                name: FigureReport(_or_none(one.value), _or_none(one.low), _or_none(one.high), one.unit, one.about)
+                name: FigureReport(
+                    _finite_or_none(one.value), _finite_or_none(one.low), _finite_or_none(one.high), one.unit, one.about
+                )
                 for name, one in figures.items()
             },
         )
 
 
-def _or_none(value: float) -> float | None:
+def _finite_or_none(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
@@ -119,22 +116,22 @@ _ABOUT: Mapping[str, tuple[str, str]] = {
 } | {
     f"copied_{size}_{n}": ("", f"share of what a {size} does in {n} posture{'s' * (n != 1)} that the corpus has")
     for size in ("joint", "limb", "body")
-    for n in range(1, LONGEST + 1)
+    for n in range(1, MAX_NGRAM + 1)
 }
 
 
 def measure(motion: Motion, learned: LearnedCorpus, path: States | None = None) -> dict[str, Figure]:
     """Measure a movement beside a corpus.
 
-    Kinematics are measured at 30 frames a second, with keyframes joined by splines as in tweens. States are taken at
-    the corpus's own rate of postures; of keyframes as they are, and of the engine's movement at the times of its moves.
-    The corpus's range is over its own clips, in pieces as long as the movement, or as the clip or a tenth of the corpus
-    if that is shorter. A clip's own copies are counted from the other clips.
+    Kinematics are measured at 30 frames a second, with keyframes joined by splines as in tweens. States are sampled at
+    the corpus's rate of postures, at keyframes, or at the moves of the engine's movement. The corpus's range is over
+    pieces of its clips, as long as the movement, or as the clip or a tenth of the corpus if that is shorter. Copies
+    in a clip count only if they come from other clips.
 
     Args:
         motion: on the corpus's skeleton, or on one that maps to it.
         learned: the corpus.
-        path: states of the movement [T + 1, L], if the engine's report has them.
+        path: states of the movement [T + 1, L], such as those in the engine's report.
 
     Returns:
         The measures, by name.
@@ -155,42 +152,42 @@ def measure(motion: Motion, learned: LearnedCorpus, path: States | None = None) 
     check_type("learned", learned, LearnedCorpus, wanted="an Engine")
     check_type("path", path, np.ndarray, wanted="an array of states", or_none=True)
     corpus = learned.corpus
-    motion = _on(corpus.skeleton, motion)
+    motion = _map_to(corpus.skeleton, motion)
     step = 1.0 / corpus.rate if corpus.rate else usual(learned.grammar.transitions)
     sampled = at_rate(motion)
     if path is None:
-        path = _path(motion, learned, step)
+        path = _assign_states(motion, learned, step)
     elif path.ndim != 2 or path.shape[1] != len(corpus.chains):
         raise MotionMindError(f"a path through {corpus.name} has {len(corpus.chains)} chains, not {path.shape[1:]}")
-    if len(sampled) < _SHORTEST or len(path) < 2:
+    if len(sampled) < _MIN_FRAMES or len(path) < 2:
         raise MotionMindError(
-            f"{motion.name or 'the movement'} is too short to be measured: it takes {_SHORTEST} frames at {RATE:g} a "
-            f"second, and two postures, {step:.2f} s apart"
+            f"{motion.name or 'the movement'} is too short to measure: that takes {_MIN_FRAMES} frames at {RATE:g} a "
+            f"second, and two postures {step:.2f} s apart"
         )
     habits, phrases = learn_habits(learned.grammar), learn_phrases(corpus, np.asarray(learned.states))
     clips = [at_rate(corpus.recording(clip)) for clip in corpus.clips]
     seen = [features(clip.rotations) for clip in clips]
     fastest = learned.plausibility.fastest
-    own = _motion_figures(sampled, _style(seen, None), fastest) | _path_figures(path, habits, phrases, None)
-    frames = min(len(sampled), max(sum(map(len, clips)) // _PARTS, _SHORTEST))
-    postures = min(len(path), max(len(corpus) // _PARTS, 2))
-    rows = [*_usual_motion(clips, seen, frames, fastest), *_usual_paths(learned, postures, habits, phrases)]
+    own = _measure_motion(sampled, _learn_style(seen, None), fastest) | _measure_path(path, habits, phrases, None)
+    frames = min(len(sampled), max(sum(map(len, clips)) // 10, _MIN_FRAMES))
+    postures = min(len(path), max(len(corpus) // 10, 2))
+    rows = [*_measure_clips(clips, seen, frames, fastest), *_measure_clip_paths(learned, postures, habits, phrases)]
     return _beside_range(own, rows)
 
 
 def _beside_range(own: Mapping[str, float], rows: Sequence[Mapping[str, float]]) -> dict[str, Figure]:
-    """Measures beside their range over the `rows` of pieces of a corpus."""
+    """Put measures beside their 5th and 95th percentile over the `rows` of pieces of a corpus."""
     figures = {}
     for name, value in own.items():
         usual_values = np.array([row[name] for row in rows if name in row])
         known = usual_values[np.isfinite(usual_values)]
-        low, high = np.percentile(known, RANGE) if len(known) else (np.nan, np.nan)
+        low, high = np.percentile(known, (5.0, 95.0)) if len(known) else (np.nan, np.nan)
         figures[name] = Figure(value, float(low), float(high), *_ABOUT[name])
     return figures
 
 
-def _on(skeleton: Skeleton, motion: Motion) -> Motion:
-    """The movement on the corpus's joints; SkeletonError names the difference if it has others."""
+def _map_to(skeleton: Skeleton, motion: Motion) -> Motion:
+    """Map a movement to the corpus's skeleton; SkeletonError names the difference if it has other joints."""
     if skeleton.difference(motion.skeleton) is not None:
         motion = own_skeleton(motion)
     difference = skeleton.difference(motion.skeleton)
@@ -199,20 +196,22 @@ def _on(skeleton: Skeleton, motion: Motion) -> Motion:
     return motion
 
 
-def _path(motion: Motion, learned: LearnedCorpus, step: float) -> States:
-    """The states of a movement [T + 1, L]: at each move of the engine's movement, at the keyframes of keyed movement,
-    else every `step` seconds."""
+def _assign_states(motion: Motion, learned: LearnedCorpus, step: float) -> States:
+    """Return the states of a movement [T + 1, L].
+
+    They are those at the times of the engine's moves, at the keyframes of keyed movement, else every `step` seconds.
+    """
     whole = [one for one in motion.insertions if one.times[0] <= motion.times[0] and one.times[-1] >= motion.times[-1]]
     postures = motion
     if whole:
         postures = motion.at(whole[0].times)
-    elif motion.fps * step >= _KEYED:
+    elif motion.fps * step >= 2.0:  # fewer frames in the time of a move are keyframes
         postures = motion.resample(1.0 / step)
     return learned.space.assign(learned.corpus.to_chains(postures.rotations))
 
 
-def _motion_figures(motion: Motion, style: Styles | None, fastest: Floats) -> dict[str, float]:
-    """Measures of movement at 30 frames a second, its distance from a style, its pace beside `fastest` [J + 2]."""
+def _measure_motion(motion: Motion, style: Styles | None, fastest: Floats) -> dict[str, float]:
+    """Measure movement at 30 frames a second, its distance from a style, and its pace beside `fastest` [J + 2]."""
     body, rotations, root = motion.skeleton, motion.rotations, motion.root
     speed = angular_speed(rotations, RATE)
     out = {
@@ -220,19 +219,19 @@ def _motion_figures(motion: Motion, style: Styles | None, fastest: Floats) -> di
         "jerk": float(angular_jerk(rotations, RATE).mean()),
         "sparc": sparc(speed.mean(axis=1), RATE),
     }
-    if style is not None and len(motion) >= WINDOW:
+    if style is not None and len(motion) >= WINDOW_FRAMES:
         out["style"] = float(style.distances(rotations)[0])
     lowest = find_floor(body, rotations, root, heels=True)
     out |= zip(MEASURES, summarise_shown(motion, fastest, lowest).tolist(), strict=True)
-    if body.height >= _HUMAN and find_feet(body):
+    if body.height >= 1.0 and find_feet(body):  # metres: the limits of skating are for people
         floor = find_floor(body, rotations, root)
         out["skating"] = skating(body, rotations, root, floor)
         out["slide"] = foot_slide(body, rotations, root, floor)
     return out
 
 
-def _path_figures(path: States, habits: Habits, phrases: Phrasebook, clip: int | None) -> dict[str, float]:
-    """Measures of states; `clip` is the clip of the corpus that they come from, if any."""
+def _measure_path(path: States, habits: Habits, phrases: Phrasebook, clip: int | None) -> dict[str, float]:
+    """Measure a path of states; `clip` is the clip of the corpus that it comes from, if any."""
     runs = phrases.runs(path, clip) or [0]
     return {
         "moves": float(len(path) - 1),
@@ -246,51 +245,52 @@ def _path_figures(path: States, habits: Habits, phrases: Phrasebook, clip: int |
     } | {
         f"copied_{size}_{n}": phrases.copied(path, size, n, clip)
         for size in phrases.groups
-        for n in range(1, LONGEST + 1)
+        for n in range(1, MAX_NGRAM + 1)
     }
 
 
-def _style(seen: Sequence[Floats], besides: int | None) -> Styles | None:
-    """The style of clips, by the `features` of all but one; None if nothing is left to learn from."""
+def _learn_style(seen: Sequence[Floats], besides: int | None) -> Styles | None:
+    """Learn the style of clips from the `features` of all but one; None if nothing is left to learn from."""
     rows = [one for number, one in enumerate(seen) if number != besides and len(one)]
     return learn_styles({"own": np.concatenate(rows)}) if rows else None
 
 
-def _usual_motion(
+def _measure_clips(
     clips: Sequence[Motion], seen: Sequence[Floats], frames: int, fastest: Floats
 ) -> Iterator[dict[str, float]]:
-    """Kinematic measures of pieces of a corpus's clips at 30 frames a second, the style beside the other clips."""
-    pieces = _pieces([len(clip) for clip in clips], frames, _SHORTEST)
-    styles = {number: _style(seen, number) for number, _ in pieces}
+    """Yield kinematic measures of pieces of clips at 30 frames a second; their style is that of the other clips."""
+    pieces = _pieces([len(clip) for clip in clips], frames, _MIN_FRAMES)
+    styles = {number: _learn_style(seen, number) for number, _ in pieces}
     for number, start in pieces:
-        yield _motion_figures(clips[number].slice(start, start + frames), styles[number], fastest)
+        yield _measure_motion(clips[number].slice(start, start + frames), styles[number], fastest)
 
 
-def _usual_paths(
+def _measure_clip_paths(
     learned: LearnedCorpus, postures: int, habits: Habits, phrases: Phrasebook
 ) -> Iterator[dict[str, float]]:
-    """Measures of the states of pieces of a corpus's clips."""
+    """Yield the measures of the states of pieces of a corpus's clips."""
     states, clips = np.asarray(learned.states), learned.corpus.clips
     for number, start in _pieces([len(clip) for clip in clips], postures, 2):
         path = states[clips[number].start : clips[number].stop][start : start + postures]
-        found = _path_figures(path, habits, phrases, number)
-        del found["moves"]  # it is only the length that was chosen for the piece
-        if len(clips) == 1:  # there is no other to copy from
+        found = _measure_path(path, habits, phrases, number)
+        del found["moves"]  # the piece's length was chosen, not measured
+        if len(clips) == 1:  # no other clip to copy from
             found = {name: value for name, value in found.items() if not name.endswith("run") and "copied" not in name}
         yield found
 
 
 def _pieces(lengths: Sequence[int], size: int, least: int) -> list[tuple[int, int]]:
-    """The clip and the beginning of each piece of a `size`; a shorter clip is one piece if it has `least` at least.
+    """Cut clips into pieces of `size`; return the clip and the start of each, 100 at most, evenly spread.
 
-    Of many pieces some are chosen, evenly spread."""
+    A shorter clip is one piece if its length is `least` or more.
+    """
     found = [
         (number, start)
         for number, length in enumerate(lengths)
         if length >= least
         for start in range(0, max(length - size, 0) + 1, size)
     ]
-    return [found[k] for k in np.unique(np.linspace(0, len(found) - 1, min(len(found), _MOST)).astype(int))]
+    return [found[k] for k in np.unique(np.linspace(0, len(found) - 1, min(len(found), 100)).astype(int))]
 
 
 def _mean(values: NDArray[Any]) -> float:

@@ -1,8 +1,8 @@
-"""Distances of generated movement from the true movement that it replaces: L2Q, L2P and NPSS.
+"""Distances between generated movement and the true movement that it replaces: L2Q, L2P and NPSS.
 
 The protocol is that of LaFAN1: Harvey, Yurick, Nowrouzezahrai and Pal, "Robust motion in-betweening", ACM TOG 39(4)
-(2020), and `lafan1/benchmarks.py`, which was released with it. Only the frames in between are compared; the given
-ones, A and B, are left out. Rotations and positions are global, of windows that `seen` has aligned.
+(2020), and `lafan1/benchmarks.py`, released with it. Only the frames in between count; the given ones, A and B, are
+left out. Rotations and positions are global, in windows that `seen` has aligned.
 
 LaFAN1 takes the signs of quaternions from the recording, so an error may count more on one hemisphere than on the
 other. Here q and -q are the same rotation: the nearer sign counts.
@@ -23,7 +23,7 @@ def seen(
 ) -> tuple[Floats, Floats]:
     """Align windows as the protocol does, and return global rotations and joint positions.
 
-    The true body then faces +Z in its first frame, and is above the origin on average.
+    The true body then faces +Z in its first frame, and its mean position is above the origin.
 
     Args:
         skeleton: the body.
@@ -46,7 +46,7 @@ def seen(
 def l2q(truth: Floats, made: Floats) -> Floats:
     """Return L2Q of each window: the mean over its frames of ||q_made - q_truth|| over all joints.
 
-    It has no unit; if every joint is off by the angle a, it is 2 sqrt(J) sin(a / 4).
+    It is dimensionless; if every joint is off by the angle a, it is 2 sqrt(J) sin(a / 4).
 
     Args:
         truth: true global rotations [..., T, J, 4].
@@ -68,7 +68,7 @@ def l2p(truth: Floats, made: Floats, spread: Floats) -> Floats:
         spread: standard deviation of each coordinate [J, 3], metres, in the training movement.
 
     Returns:
-        L2P [...], without unit.
+        L2P [...], dimensionless.
     """
     off = (made - truth) / spread
     return np.asarray(np.sqrt(np.sum(off**2, axis=(-2, -1))).mean(axis=-1))
@@ -81,11 +81,11 @@ def position_spread(positions: Floats) -> Floats:
         positions: aligned windows of positions [..., T, J, 3], metres (see `seen`).
 
     Raises:
-        MotionMindError: a coordinate never changes, so it cannot serve as a unit.
+        MotionMindError: a coordinate never changes, so nothing can be measured in units of it.
     """
     spread = np.asarray(positions.reshape(-1, *positions.shape[-2:]).std(axis=0))
     if not np.all(spread > 0.0):
-        raise MotionMindError("L2P needs movement to measure by: there is a joint that never moves along some axis")
+        raise MotionMindError("L2P needs a spread in every coordinate: some joint never moves along an axis")
     return spread
 
 
@@ -93,7 +93,7 @@ def npss(truth: Floats, made: Floats) -> float:
     """Return the normalised power spectrum similarity of a batch: a distance, 0 for equal spectra.
 
     Defined by Gopalakrishnan, Mali, Kifer, Giles and Ororbia, "A neural temporal model for human motion prediction",
-    CVPR (2019), and computed as in LaFAN1. For each quaternion coefficient of each window, the squared real parts of
+    CVPR (2019); computed as in LaFAN1. For each quaternion coefficient of each window, the squared real parts of
     its Fourier coefficients are normalised to a sum of 1; the distance is the sum of the absolute differences of the
     two cumulative spectra. Windows and coefficients are averaged, weighted by the power of the truth. A coefficient
     without power has a spectrum of zeros. Signs are chosen to make each joint's quaternions continuous in time.
@@ -112,7 +112,7 @@ def npss(truth: Floats, made: Floats) -> float:
 
 
 def _continuous(q: Floats) -> Floats:
-    """The same rotations [B, T, ..., 4], each with the sign that is nearer to the frame before."""
+    """Give each rotation [B, T, ..., 4] the sign that is nearer to the frame before."""
     flips = np.sum(q[:, 1:] * q[:, :-1], axis=-1, keepdims=True) < 0.0
     sign = np.cumprod(np.where(flips, -1.0, 1.0), axis=1)
     return np.concatenate([q[:, :1], q[:, 1:] * sign], axis=1)

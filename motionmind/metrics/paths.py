@@ -1,4 +1,4 @@
-"""Measures of a path of states beside the corpus: arrival times, likelihood, cliches.
+"""Measures of a path of states: arrival times, likelihood and cliches.
 
 A path holds the states of L chains in T + 1 postures, int [T + 1, L]. Measures of joints leave the facing out.
 """
@@ -16,7 +16,7 @@ from motionmind.grammar.transitions import Transitions
 
 
 def arrivals(path: States) -> Ints:
-    """Return the number of moves after which each chain has reached its last state for good [L]; 0 if it never moves.
+    """Return the number of moves after which each chain stays in its last state [L]; 0 if it never moves.
 
     Args:
         path: states [T + 1, L].
@@ -27,8 +27,8 @@ def arrivals(path: States) -> Ints:
 def arrival_spread(path: States) -> float:
     """Return the standard deviation, in moves, of when chains arrive for good; 0 if fewer than two move.
 
-    Bradley and Stuart's short paper on MotionMind (about 2000) balances path lengths to keep it small: all parts of the
-    body should arrive together.
+    Bradley and Stuart's short paper on MotionMind (about 2000) balances path lengths to keep it small: all body parts
+    should arrive together.
 
     Args:
         path: states [T + 1, L].
@@ -47,8 +47,8 @@ class Habits:
         is_hold: whether a transition stays in its state [E].
         choice: whether at least two different moves lead out of a state [G].
         likeliest: whether no move out of the same state is more frequent, and some are less frequent [E].
-        percentile: percentile rank, 0 to 100, of a move's frequency among all moves that the joint made: the share of
-            those less frequent, and half the share of those as frequent [E]. 50 for a hold.
+        percentile: percentile rank, 0 to 100, of a move's frequency among all moves of the joint: the share of less
+            frequent moves, plus half the share of equally frequent ones [E]. 50 for a hold.
         log_likelihood: log P(state arrived in | state left), nats [E].
     """
 
@@ -63,8 +63,8 @@ class Habits:
     def cliches(self, path: States) -> Bools:
         """Tell, for each joint's move out of a state with a choice, whether it is the likeliest one.
 
-        The mean is the cliche rate. A move that the corpus does not attest is no cliche; nor is any move out of a
-        state whose moves are all equally frequent.
+        The mean is the cliche rate. Neither an unattested move is a cliche, nor any move out of a state whose moves are
+        all equally frequent.
 
         Args:
             path: states [T + 1, L].

@@ -7,10 +7,6 @@ import numpy as np
 from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
 
-_PADDING = 4  # the spectrum is taken of 2^4 times as many samples, zeros added
-_HIGHEST = 10.0  # Hz; people do not move at higher frequencies
-_LEAST = 0.05  # of the greatest amplitude; beyond the last amplitude as large as this there is only noise
-
 
 def angular_speed(rotations: Floats, fps: float) -> Floats:
     """Return the angular speed between consecutive frames [..., T - 1, J], rad/s.
@@ -51,12 +47,12 @@ def sparc(speed: Floats, fps: float) -> float:
         speed: [T], in any unit, evenly spaced in time.
         fps: samples a second.
     """
-    count = 1 << (int(np.ceil(np.log2(len(speed)))) + _PADDING)
+    count = 1 << (int(np.ceil(np.log2(len(speed)))) + 4)  # zeros pad the samples to 16 times as many, and a power of 2
     amplitude = np.abs(np.fft.fft(speed, count))
     if not amplitude.max() > 0.0:
         return float("nan")
     frequency = np.arange(count) * fps / count
-    amplitude = amplitude[frequency <= _HIGHEST] / amplitude.max()
-    kept = np.flatnonzero(amplitude >= _LEAST)
+    amplitude = amplitude[frequency <= 10.0] / amplitude.max()
+    kept = np.flatnonzero(amplitude >= 0.05)
     curve = amplitude[kept[0] : kept[-1] + 1]
     return float(-np.hypot(1.0 / (len(curve) - 1), np.diff(curve)).sum())

@@ -1,11 +1,11 @@
 """Style of movement: a classifier of how joints move, wherever they are.
 
-Joint positions tell corpora apart at once, but they would also accept implausible movement between a corpus's own
-postures. So the features leave them out: they are how fast each joint turns, and how fast that changes. Corpora are
-separated by linear discriminants (Fisher, "The use of multiple measurements in taxonomic problems", Annals of Eugenics
+Joint positions tell corpora apart at once, but would also accept implausible movement between a corpus's own postures.
+So the features are only how fast each joint turns, and how fast that changes. Linear discriminants separate the
+corpora (Fisher, "The use of multiple measurements in taxonomic problems", Annals of Eugenics
 7:179, 1936) with a common covariance, shrunk towards its diagonal (Friedman, "Regularized discriminant analysis", JASA
-84:165, 1989). Movement is accepted for a corpus if that corpus is the nearest, and no further off than 95 % of the
-corpus's own movement, judged without the sequence that it comes from.
+84:165, 1989). A corpus accepts movement if it is the nearest corpus, and as near as 95 % of its own movement; each
+sequence of that is measured against the others.
 """
 
 from __future__ import annotations
@@ -16,17 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionmind._typing import Floats
+from motionmind.body.contact import RATE
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 
 Sequences = Mapping[str, Sequence[Floats]]  # the unbroken pieces [T, J, 4] of each sequence, at 30 frames a second
 
-RATE = 30.0
-WINDOW = 18  # frames, 0.6 s; each begins half a window after the one before
-_STEP = 2  # frames over which speed and its change are taken
-_STILL = 0.2, 2.0  # rad/s, rad/s^2: much less is hardly visible
-_SHRINKAGE = 0.3
-_OWN = 0.95  # share of a corpus's own movement that is accepted, if no other corpus is nearer
+WINDOW_FRAMES = 18  # 0.6 s; each begins half a window after the one before
 
 
 def features(rotations: Floats) -> Floats:
@@ -38,14 +34,16 @@ def features(rotations: Floats) -> Floats:
     Args:
         rotations: local rotations [T, J, 4] at 30 frames a second.
     """
-    seconds = _STEP / RATE
-    velocity = rot.log(rot.inv_mul(rotations[:-_STEP], rotations[_STEP:])) / seconds
-    change = (velocity[_STEP:] - velocity[:-_STEP]) / seconds
-    starts = range(0, len(rotations) - WINDOW + 1, WINDOW // 2)
-    pairs = (velocity, WINDOW - _STEP), (change, WINDOW - 2 * _STEP)
+    step = 2  # frames
+    seconds = step / RATE
+    velocity = rot.log(rot.inv_mul(rotations[:-step], rotations[step:])) / seconds
+    change = (velocity[step:] - velocity[:-step]) / seconds
+    starts = range(0, len(rotations) - WINDOW_FRAMES + 1, WINDOW_FRAMES // 2)
+    pairs = (velocity, WINDOW_FRAMES - step), (change, WINDOW_FRAMES - 2 * step)
     found = [[np.mean(np.sum(x[s : s + n] ** 2, axis=-1), axis=0) for x, n in pairs] for s in starts]
     size = np.sqrt(np.array(found).reshape(len(starts), 2, rotations.shape[1]))
-    return np.asarray(np.log(size + np.array(_STILL)[:, None]).reshape(len(starts), 2 * rotations.shape[1]))
+    visible = np.array([[0.2], [2.0]])  # rad/s, rad/s^2: much less is hardly visible
+    return np.asarray(np.log(size + visible).reshape(len(starts), 2 * rotations.shape[1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +76,9 @@ def learn_styles(rows: Mapping[str, Floats]) -> Styles:
     """Learn discriminants from the `features` [W, F] of each corpus, by name; all corpora weigh the same."""
     means = np.stack([seen.mean(axis=0) for seen in rows.values()])
     spread = np.mean([np.cov(seen.T, bias=True) for seen in rows.values()], axis=0)
-    shrunk = (1.0 - _SHRINKAGE) * spread + _SHRINKAGE * np.diag(np.diag(spread))
-    # A joint that never moves has no spread: movement that moves it is then very far off.
+    shrinkage = 0.3
+    shrunk = (1.0 - shrinkage) * spread + shrinkage * np.diag(np.diag(spread))
+    # A joint that never moves has no spread; movement of that joint is then very far off.
     return Styles(tuple(rows), means, np.linalg.inv(shrunk + 1e-6 * np.eye(len(shrunk))))
 
 
@@ -91,7 +90,7 @@ class StyleClassifier:
         corpora: the movement to learn from.
         frames: the length of the movement to classify.
         without: discriminants learned without one sequence, by corpus and sequence.
-        limits: the greatest distance that is accepted for each corpus.
+        limits: the greatest distance that each corpus accepts.
     """
 
     corpora: Mapping[str, Sequences]
@@ -100,12 +99,12 @@ class StyleClassifier:
     limits: Mapping[str, float]
 
     def takes(self, rotations: Floats, corpus: str, sequence: str) -> bool:
-        """Tell whether movement is accepted for a corpus.
+        """Tell whether a corpus accepts movement.
 
         Args:
             rotations: local rotations [frames, J, 4].
             corpus: the corpus.
-            sequence: the sequence that the movement replaces a part of, which is left out of the training data.
+            sequence: the sequence that the movement replaces a part of, left out of the training data.
         """
         styles = self.without[corpus, sequence]
         nearest = styles.names[int(styles.distances(rotations).argmin())]
@@ -124,13 +123,12 @@ class StyleClassifier:
                     yield sequence, piece[start : start + self.frames]
 
     def table(self, seed: int) -> dict[str, dict[str, float]]:
-        """Return, for each corpus, the accepted share of its movement that was "held out", and of two fakes of it.
+        """Return the accepted shares of each corpus's "held out" movement, and of two fakes of it.
 
-        The fakes have the same first and last postures: the "slerp" between them, and a "shuffle" of the frames in a
-        random order.
+        The fakes have the same first and last postures: the "slerp" between them, and a random "shuffle" of the frames.
 
         Args:
-            seed: of the random orders.
+            seed: seed of the random orders.
         """
         rng, out = np.random.default_rng(seed), {}
         for corpus in self.corpora:
@@ -146,7 +144,7 @@ class StyleClassifier:
 
 
 def fit_style_classifier(corpora: Mapping[str, Sequences], frames: int) -> StyleClassifier:
-    """Fit a classifier of movement of so many frames, at 30 a second.
+    """Fit a classifier of movement of a number of frames, at 30 a second.
 
     Args:
         corpora: sequences of each corpus, as unbroken pieces [T, J, 4].
@@ -156,15 +154,15 @@ def fit_style_classifier(corpora: Mapping[str, Sequences], frames: int) -> Style
         MotionMindError: a corpus has no second sequence to learn from, or none of that length, or the length is less
             than a window.
     """
-    if frames < WINDOW:
-        raise MotionMindError(f"style is seen in {WINDOW} frames at {RATE:g} a second or more, not in {frames}")
+    if frames < WINDOW_FRAMES:
+        raise MotionMindError(f"style needs {WINDOW_FRAMES} frames or more, at {RATE:g} a second, not {frames}")
     rows = {
         corpus: {name: np.concatenate([features(piece) for piece in pieces]) for name, pieces in sequences.items()}
         for corpus, sequences in corpora.items()
     }
     without = {
         (corpus, name): learn_styles(
-            {key: _all(key, found, None if key != corpus else name) for key, found in rows.items()}
+            {key: _gather(key, found, None if key != corpus else name) for key, found in rows.items()}
         )
         for corpus, sequences in rows.items()
         for name in sequences
@@ -179,12 +177,12 @@ def fit_style_classifier(corpora: Mapping[str, Sequences], frames: int) -> Style
         ]
         if not own:
             raise MotionMindError(f"style: {corpus} has no clip of {frames} frames at {RATE:g} a second")
-        limits[corpus] = float(np.quantile(own, _OWN))
+        limits[corpus] = float(np.quantile(own, 0.95))
     return StyleClassifier(corpora, frames, without, limits)
 
 
-def _all(corpus: str, sequences: Mapping[str, Floats], left_out: str | None) -> Floats:
+def _gather(corpus: str, sequences: Mapping[str, Floats], left_out: str | None) -> Floats:
     found = [rows for name, rows in sequences.items() if name != left_out and len(rows)]
     if not found:
-        raise MotionMindError(f"style: {corpus} needs two sequences at least, each of {WINDOW} frames or more")
+        raise MotionMindError(f"style: {corpus} needs two sequences or more, each of {WINDOW_FRAMES} frames or more")
     return np.concatenate(found)

@@ -1,4 +1,4 @@
-"""Verbatim copies in a path: runs of whole postures, and n-grams of the states of a joint, a limb or the body."""
+"""Verbatim copies in a path: runs of whole postures, and n-grams of the states of joints, limbs and the body."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from motionmind._typing import Int32s, Ints, States
 from motionmind.body.limbs import sided_parts
 from motionmind.corpus.corpus import Corpus
 
-LONGEST = 5  # states in the longest n-grams
-_SEVERAL = -1  # for the clip of an n-gram that several clips have
+MAX_NGRAM = 5  # states in the longest n-grams
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +19,7 @@ class Phrasebook:
     """The n-grams of a corpus's N postures, and where each whole posture occurs.
 
     Attributes:
-        groups: the parts of the body of each size, as lists of joints: "joint", "limb" (the trunk is one) and "body".
+        groups: the body parts of each size, "joint", "limb" (the trunk is one) and "body", as lists of joints.
         grams: for n from 1 on, the n-grams of all parts, each with the number of its clip, or -1 if several have it.
         places: the postures at which each whole posture occurs.
         clip_of: the clip of each posture [N].
@@ -32,13 +31,13 @@ class Phrasebook:
     clip_of: Ints
 
     def copied(self, path: States, size: str, n: int, besides: int | None = None) -> float:
-        """Return the share of a path's n-grams that the corpus has, over all parts of one size.
+        """Return the share of a path's n-grams that the corpus has, over all body parts of one size.
 
         Args:
             path: states [T + 1, L].
             size: "joint", "limb" or "body".
-            n: states in a sequence, 1 to `LONGEST`.
-            besides: a clip that does not count: the one that the path comes from.
+            n: states in a sequence, 1 to `MAX_NGRAM`.
+            besides: a clip that does not count, such as the source of the path.
 
         Returns:
             A share from 0 to 1; NaN for a path of fewer than `n` postures.
@@ -53,11 +52,11 @@ class Phrasebook:
     def runs(self, path: States, besides: int | None = None) -> list[int]:
         """Return the lengths, in postures, of the maximal runs of whole postures that a path copies from one clip.
 
-        A run has the clip's postures in the clip's order; where they face does not matter.
+        A run has the clip's postures in the clip's order; facing does not count.
 
         Args:
             path: states [T + 1, L].
-            besides: a clip that does not count: the one that the path comes from.
+            besides: a clip that does not count, such as the source of the path.
 
         Returns:
             Lengths in the order of the runs' ends.
@@ -84,7 +83,7 @@ def learn_phrases(corpus: Corpus, states: Int32s) -> Phrasebook:
     joints = list(range(len(corpus.skeleton)))
     parts = [part.tolist() for part in sided_parts(corpus.skeleton).values()]
     groups = {"joint": [[joint] for joint in joints], "limb": parts, "body": [joints]}
-    grams: list[dict[bytes, int]] = [{} for _ in range(LONGEST)]
+    grams: list[dict[bytes, int]] = [{} for _ in range(MAX_NGRAM)]
     places: dict[bytes, list[int]] = {}
     for number, clip in enumerate(corpus.clips):
         own = np.asarray(states[clip.start : clip.stop])
@@ -93,13 +92,13 @@ def learn_phrases(corpus: Corpus, states: Int32s) -> Phrasebook:
         for n, known in enumerate(grams, start=1):
             for part in {tuple(part): None for parts in groups.values() for part in parts}:
                 for gram in _grams(own, part, n):
-                    known[gram] = number if known.get(gram, number) == number else _SEVERAL
+                    known[gram] = number if known.get(gram, number) == number else -1
     clip_of = np.repeat(np.arange(len(corpus.clips)), [len(clip) for clip in corpus.clips])
     return Phrasebook(groups, grams, places, clip_of)
 
 
 def _grams(path: States, part: Sequence[int], n: int) -> list[bytes]:
-    """All n-grams of a part of the body in a path, each headed by the joints of the part."""
+    """List the n-grams of a body part in a path, each headed by the joints of the part."""
     own = np.ascontiguousarray(path[:, list(part)], dtype=np.int32)
     head = np.array(part, dtype=np.int32).tobytes()
     width = own.shape[1] * own.itemsize
