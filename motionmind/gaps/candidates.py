@@ -1,9 +1,9 @@
-"""Choose the transitions that lower a sample's costs most, without the joints' coordination.
+"""Choose the transitions that most lower the costs of a sample, without the joints' coordination.
 
-The cost of paths of T moves has a lower bound, the sum of one bound for each joint chain: all chains make T moves, and
-each state costs as much as alone. A transition adds an edge to each joint graph that lacks it; its gain is how much it
-lowers the bounds. The best few are later solved exactly. A transition is a candidate if no joint turns by more than in
-some move of the corpus, so that it can be danced in one move.
+The cost of a path of T moves has a lower bound: the sum over joint chains of the chain's cheapest path of T moves, with
+each state at its cost alone. A transition adds an edge to each joint graph that lacks it; its gain is how much it
+lowers the bounds. The best few are later solved exactly. In a candidate, no joint turns farther than in some move of
+the corpus, so the transition can be danced in one move.
 """
 
 from __future__ import annotations
@@ -11,16 +11,11 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
-from motionmind.gaps.sample import PLAIN
+from motionmind.gaps.sample import PLAIN_REQUEST
 from motionmind.gaps.transition import Transition, states_of
 from motionmind.geometry import rotations as rot
 from motionmind.learned.model import LearnedCorpus
 from motionmind.tween.problem import build_model
-
-MOST_POSTURES = 400  # postures of a corpus, at most, drawn at random as ends of transitions
-MOST_CANDIDATES = 4000  # transitions between them, at most, drawn at random
-_FEWEST = 100  # candidates, at least, however large the corpus is
-_WORK = 1e10  # edges to visit, about
 
 
 def choose_candidates(learned: LearnedCorpus, pairs: Ints, moves: int, count: int, seed: int) -> list[Transition]:
@@ -39,7 +34,7 @@ def choose_candidates(learned: LearnedCorpus, pairs: Ints, moves: int, count: in
     chosen = _distinct(np.asarray(learned.states), rng)
     possible = np.argwhere(_danceable(learned, chosen))
     bounds = _Bounds(learned, pairs, moves)
-    most = int(np.clip(_WORK / bounds.edges, _FEWEST, MOST_CANDIDATES))
+    most = int(np.clip(1e10 / bounds.edges, 100, 4000))  # visits about 1e10 edges
     if len(possible) > most:
         possible = possible[np.sort(rng.choice(len(possible), most, replace=False))]
     candidates = [Transition(begin, end) for begin, end in chosen[possible].tolist()]
@@ -55,9 +50,10 @@ def choose_candidates(learned: LearnedCorpus, pairs: Ints, moves: int, count: in
 
 
 def _distinct(states: Int32s, rng: np.random.Generator) -> Ints:
-    """Return the first posture of each distinct row of states [N, L], or `MOST_POSTURES` random ones, in order."""
+    """Return the first posture of each distinct row of states [N, L], or 400 random ones of these, in order."""
     first = np.sort(np.unique(states, axis=0, return_index=True)[1])
-    return first if len(first) <= MOST_POSTURES else np.sort(rng.choice(first, MOST_POSTURES, replace=False))
+    most = 400
+    return first if len(first) <= most else np.sort(rng.choice(first, most, replace=False))
 
 
 def _danceable(learned: LearnedCorpus, chosen: Ints) -> Bools:
@@ -84,7 +80,9 @@ class _Bounds:
     def __init__(self, learned: LearnedCorpus, pairs: Ints, moves: int) -> None:
         self._learned, self._moves = learned, moves
         self._graph = learned.grammar.transitions
-        self._model = build_model(learned.grammar, PLAIN.weights, PLAIN.coordination_factor, PLAIN.bridge_price)
+        self._model = build_model(
+            learned.grammar, PLAIN_REQUEST.weights, PLAIN_REQUEST.coordination_factor, PLAIN_REQUEST.bridge_price
+        )
         self._leaving = np.bincount(self._graph.sources, weights=self._graph.counts, minlength=len(self._graph.visits))
         self._ends = np.asarray(learned.states)[pairs].transpose(2, 1, 0)  # [L, 2, P]
         self.edges = float(len(self._model.targets)) * len(pairs) * moves
@@ -104,7 +102,7 @@ class _Bounds:
 
     def _total(self, chains: Floats) -> Floats:
         """Return the sum of bounds over chains [L, T + 1, P], minimised over numbers of moves [P]."""
-        per_move = PLAIN.tau * np.arange(self._moves + 1)
+        per_move = PLAIN_REQUEST.tau * np.arange(self._moves + 1)
         return np.asarray((chains.sum(axis=0) + per_move[:, None]).min(axis=0))
 
     def _bound(self, chain: int, edge: tuple[int, int] | None = None) -> Floats:
@@ -130,7 +128,9 @@ class _Bounds:
             then = np.full_like(reached, np.inf)
             if len(targets):
                 then[:, targets[starts]] = np.minimum.reduceat(reached[:, sources] + costs, starts, axis=1)
-            then[pair, b] = np.minimum(then[pair, b], reached[pair, b] + PLAIN.beta + alone[b])  # a wait at the goal
+            then[pair, b] = np.minimum(
+                then[pair, b], reached[pair, b] + PLAIN_REQUEST.beta + alone[b]
+            )  # a wait at the goal
             reached = then
             bounds.append(reached[pair, b])
         return np.stack(bounds)[:, which.reshape(-1)]

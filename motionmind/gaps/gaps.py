@@ -1,4 +1,4 @@
-"""Find the gaps of a corpus: the worst-connected joint graphs, and the transitions that would help its tweens most."""
+"""Find the gaps of a corpus: the worst-connected joint graphs, and the transitions that would most help its tweens."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.summary import joined_pairs
 
-TRIED = 4  # candidates that are solved exactly for each recommended transition
-MOST_PAIRS, MOST_TRANSITIONS = 10_000, 100
+N_TRIED = 4  # candidates that are solved exactly for each recommended transition
 OnProgress = Callable[[int, int], None]  # called with grammars tried, and grammars in all, at most
 
 
@@ -124,8 +123,8 @@ def find_gaps(
 ) -> Gaps:
     """Find the worst-connected joint graphs, and the transitions that would lower a sample's cost most.
 
-    Transitions are chosen one by one: for each of the `TRIED` most promising, the grammar is learned again with it and
-    the sample solved again; the best transition stays.
+    Transitions are chosen one by one: for each of the `N_TRIED` most promising, learn the grammar again with it and
+    solve the sample again; the best transition stays.
 
     Args:
         learned: the learned corpus.
@@ -147,7 +146,7 @@ def find_gaps(
     check_type("learned", learned, LearnedCorpus, wanted="a learned corpus, such as an Engine")
     check_mapping("named", named, or_none=True)
     check_function("on_progress", on_progress, or_none=True)
-    for name, value, least, most in (("pairs", pairs, 1, MOST_PAIRS), ("count", count, 0, MOST_TRANSITIONS)):
+    for name, value, least, most in (("pairs", pairs, 1, 10_000), ("count", count, 0, 100)):
         check_integer(name, value)
         if not least <= value <= most:
             raise MotionMindError(f"{name} must be from {least} to {most}, not {value}")
@@ -158,9 +157,9 @@ def find_gaps(
     for number in range(count):
         chosen: tuple[Transition, LearnedCorpus, Solved] | None = None
         longest = max(1, int(best.moves.max()))
-        for at, candidate in enumerate(choose_candidates(current, sample, longest, TRIED, seed)):
+        for at, candidate in enumerate(choose_candidates(current, sample, longest, N_TRIED, seed)):
             if on_progress:
-                on_progress(number * TRIED + at, count * TRIED)
+                on_progress(number * N_TRIED + at, count * N_TRIED)
             tried = with_transitions(learned, [*taken, candidate])
             solved = solve_pairs(tried, sample)
             if _cost(solved) < _cost(chosen[2] if chosen else best):
@@ -175,7 +174,7 @@ def find_gaps(
 
 
 def _cost(solved: Solved) -> float:
-    """Return the mean cost, rounded, so that rounding errors of sums do not decide."""
+    """Return the mean cost, rounded: rounding errors of sums must not decide."""
     return round(float(solved.costs.mean()), 9)
 
 
@@ -185,7 +184,7 @@ def _energy(solved: Solved) -> Energy:
 
 
 def _joint_gaps(learned: LearnedCorpus, sample: Ints, solved: Solved) -> list[JointGap]:
-    """Return the joint graphs, the worst first: by the share of pairs that they do not join, then by bridges."""
+    """Return the joint graphs, the worst first: by the share of unjoined pairs, then by bridges."""
     graph = learned.grammar.transitions
     apart = 1.0 - joined_pairs(learned.grammar, np.asarray(learned.states), sample).mean(axis=0)
     bridges = solved.bridged.mean(axis=0)

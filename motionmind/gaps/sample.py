@@ -1,7 +1,7 @@
-"""Draw random pairs of a corpus's postures, and find the cheapest paths that join them.
+"""Draw random pairs of a corpus's postures, and find the cheapest paths between them.
 
-The paths depend on the grammar alone: they have any number of moves, no guide and no pace of the corpus. They show how
-well the joint graphs are connected, and the value of another transition.
+The paths depend on the grammar alone: any number of moves, no guide, no pace. They show how well the joint graphs are
+connected, and the value of another transition.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from motionmind.search.solve import solve
 from motionmind.tween.formulate import formulate
 from motionmind.tween.request import TweenRequest
 
-PLAIN = TweenRequest(guide=0.0, without=("pace",))
+PLAIN_REQUEST = TweenRequest(guide=0.0, without=("pace",))
 
 
 class Solved(NamedTuple):
@@ -46,18 +46,18 @@ def draw_pairs(corpus: Corpus, pairs: int, seed: int) -> Ints:
         MotionMindError: the corpus has a single posture.
     """
     if len(corpus) < 2:
-        raise MotionMindError(f"corpus {corpus.name!r} has one posture, and no pair to join")
+        raise MotionMindError(f"corpus {corpus.name!r} has one posture; a pair needs two")
     rng = np.random.default_rng(seed)
     first, apart = rng.integers(len(corpus), size=pairs), rng.integers(1, len(corpus), size=pairs)
     return np.stack([first, (first + apart) % len(corpus)], axis=1)
 
 
 def solve_pairs(learned: LearnedCorpus, pairs: Ints) -> Solved:
-    """Find the cheapest path between the postures of each pair [P, 2], with the options of `PLAIN`."""
+    """Find the cheapest path between the postures of each pair [P, 2], with the options of `PLAIN_REQUEST`."""
     costs, bounds, moves = np.zeros(len(pairs)), np.zeros(len(pairs)), np.zeros(len(pairs), np.int64)
     bridged = np.zeros((len(pairs), len(learned.grammar.chains)), np.int64)
     for number, (a, b) in enumerate(pairs.tolist()):
-        formulation = formulate(learned, _posture(learned.corpus, a), _posture(learned.corpus, b), PLAIN)
+        formulation = formulate(learned, _posture(learned.corpus, a), _posture(learned.corpus, b), PLAIN_REQUEST)
         if not formulation.stays:
             found = solve(formulation.searched)
             costs[number], bounds[number], moves[number] = found.cost, found.lower_bound, len(found.path) - 1

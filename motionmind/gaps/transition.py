@@ -1,4 +1,4 @@
-"""A transition to record, one move between two postures of a corpus, and how to learn a grammar with it."""
+"""A transition to record: one move between two postures of a corpus; and the grammar with it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Transition(NamedTuple):
 
 
 def with_transitions(learned: LearnedCorpus, transitions: list[Transition]) -> LearnedCorpus:
-    """Return a learned corpus with the grammar that it would have if each transition were recorded as a clip.
+    """Learn the grammar of a corpus again as if each transition had been recorded as a clip.
 
     These clips have the greatest weight of a clip, and their moves the usual duration. Only the grammar changes:
     states, movement, posture statistics and pace stay.
