@@ -1,4 +1,4 @@
-/** A widget of anywidget: the player's page in a frame, which shares the time and the selection with the model. */
+/** An anywidget: the player's page in a frame that shares time and selection with the model. */
 
 const SHARED = ["time", "selection"];
 
@@ -9,14 +9,14 @@ function render({ model, el }) {
   Object.assign(frame.style, { width: "100%", height: `${model.get("height")}px`, border: "0" });
   const show = () => (frame.srcdoc = model.get("_page"));
 
-  const known = {}; // what the page has been told, or has said
-  const tell = (name) => {
+  const known = {}; // the values last sent to the page, or received from it
+  const send = (name) => {
     known[name] = JSON.stringify(model.get(name));
     frame.contentWindow?.postMessage({ [name]: model.get(name) }, "*");
   };
-  const hear = ({ source, data }) => {
+  const receive = ({ source, data }) => {
     if (source !== frame.contentWindow) return;
-    if (data.ready) return SHARED.forEach(tell);
+    if (data.ready) return SHARED.forEach(send);
     for (const name of SHARED.filter((name) => name in data)) {
       known[name] = JSON.stringify(data[name]);
       model.set(name, data[name]);
@@ -24,16 +24,16 @@ function render({ model, el }) {
     model.save_changes();
   };
   const listeners = Object.fromEntries(
-    SHARED.map((name) => [`change:${name}`, () => JSON.stringify(model.get(name)) !== known[name] && tell(name)]),
+    SHARED.map((name) => [`change:${name}`, () => JSON.stringify(model.get(name)) !== known[name] && send(name)]),
   );
   listeners["change:_page"] = show;
 
-  window.addEventListener("message", hear);
+  window.addEventListener("message", receive);
   for (const [event, listener] of Object.entries(listeners)) model.on(event, listener);
   show();
   el.append(frame);
   return () => {
-    window.removeEventListener("message", hear);
+    window.removeEventListener("message", receive);
     for (const [event, listener] of Object.entries(listeners)) model.off(event, listener);
   };
 }

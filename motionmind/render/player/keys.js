@@ -1,35 +1,35 @@
-/** The keys of the page: one table, by which they act and which the sheet shows. */
+/** The keys of the page: one table for their actions and for the sheet that lists them. */
 
 const inserted = (motion) => motion.insertions.length > 0;
 const joining = (motion) => motion.insertions.some((insertion) => motion.ends(insertion).length > 0);
 const moving = (motion) => motion.length > 1;
 
-/** Each row: the keys, how they are shown, what they do, the name of the action, and for which motions there are any. */
+/** Each row: the keys, their labels, what they do, the name of the action, and the motions that have it. */
 export const KEYS = [
   { keys: [" "], shown: ["Space"], does: "play or pause", action: "play", when: moving },
   { keys: ["ArrowLeft"], shown: ["←"], does: "one frame back", action: "back", when: moving },
-  { keys: ["ArrowRight"], shown: ["→"], does: "one frame on", action: "forward", when: moving },
-  { keys: ["Home"], shown: ["Home"], does: "the start", action: "home", when: moving },
-  { keys: ["End"], shown: ["End"], does: "the end", action: "end", when: moving },
-  { keys: ["p"], shown: ["P"], does: "the insertion before", action: "previous", when: inserted },
-  { keys: ["n"], shown: ["N"], does: "the next insertion", action: "next", when: inserted },
-  { shown: ["Tab", "←", "→"], does: "on the line of time: from insertion to insertion, and Enter goes there", when: inserted },
-  { keys: ["l"], shown: ["L"], does: "loop: from the end to the start", action: "loop", when: moving },
+  { keys: ["ArrowRight"], shown: ["→"], does: "one frame forward", action: "forward", when: moving },
+  { keys: ["Home"], shown: ["Home"], does: "go to the start", action: "home", when: moving },
+  { keys: ["End"], shown: ["End"], does: "go to the end", action: "end", when: moving },
+  { keys: ["p"], shown: ["P"], does: "previous insertion", action: "previous", when: inserted },
+  { keys: ["n"], shown: ["N"], does: "next insertion", action: "next", when: inserted },
+  { shown: ["Tab", "←", "→"], does: "on the timeline: from insertion to insertion; Enter goes there", when: inserted },
+  { keys: ["l"], shown: ["L"], does: "loop: restart at the end", action: "loop", when: moving },
   { keys: ["1"], shown: ["1"], does: "from the front", action: "front" },
   { keys: ["2"], shown: ["2"], does: "from the side", action: "side" },
   { keys: ["3"], shown: ["3"], does: "from above", action: "top" },
-  { keys: ["4"], shown: ["4"], does: "half from the side, a little from above", action: "quarter" },
-  { keys: ["r"], shown: ["R"], does: "the view at the start", action: "reset" },
-  { shown: ["Shift", "arrows"], does: "turn the picture, as dragging does" },
-  { shown: ["+", "-"], does: "nearer, farther, as scrolling does" },
-  { keys: ["a"], shown: ["A"], does: "the postures A and B", action: "ends", when: joining },
+  { keys: ["4"], shown: ["4"], does: "three quarters from the front, slightly from above", action: "quarter" },
+  { keys: ["r"], shown: ["R"], does: "reset the view", action: "reset" },
+  { shown: ["Shift", "arrows"], does: "rotate, like dragging" },
+  { shown: ["+", "-"], does: "zoom, like scrolling" },
+  { keys: ["a"], shown: ["A"], does: "the end postures A and B", action: "ends", when: joining },
   { keys: ["o"], shown: ["O"], does: "onion skin: frames before and after", action: "onion", when: moving },
-  { keys: ["c"], shown: ["C"], does: "what the colours mean", action: "legend" },
-  { keys: ["d"], shown: ["D"], does: "dark paper, or light", action: "dark" },
+  { keys: ["c"], shown: ["C"], does: "legend of the colours", action: "legend" },
+  { keys: ["d"], shown: ["D"], does: "dark or light background", action: "dark" },
   { keys: ["?"], shown: ["?"], does: "these keys", action: "help" },
 ];
 
-const TURN = Math.PI / 24; // by an arrow
+const TURN = Math.PI / 24; // radians, by an arrow
 const NEARER = 0.9;
 const TURNS = {
   ArrowLeft: (controls) => controls.rotateLeft(TURN),
@@ -43,7 +43,7 @@ const STEPS = {
   "-": (controls) => controls.dollyIn(1 / NEARER),
 };
 
-/** Turn a camera, or bring it nearer, if the key is one that does so; returns whether it is. */
+/** Rotate or zoom a camera if the key does so; return whether it does. */
 export function orbit(event, controls) {
   const act = (event.shiftKey && TURNS[event.key]) || STEPS[event.key];
   if (!act || event.ctrlKey || event.metaKey || event.altKey) return false;
@@ -54,7 +54,7 @@ export function orbit(event, controls) {
   return true;
 }
 
-/** Let keys do what `actions` hold, by name; a key that an element needs for itself is left to it. */
+/** Bind keys to `actions`, by name, except where an element needs the key itself. */
 export function listen(actions, motion, controls) {
   const acting = new Map();
   for (const { keys = [], action, when } of KEYS) {
@@ -70,7 +70,7 @@ export function listen(actions, motion, controls) {
   });
 }
 
-/** Write the rows that a motion has into the sheet's list. */
+/** Write the rows that apply to a motion into the sheet's list. */
 export function writeKeys(list, motion) {
   for (const { shown, does, when } of KEYS) {
     if (when && !when(motion)) continue;

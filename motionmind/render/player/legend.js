@@ -1,4 +1,4 @@
-/** The legend: which colours a motion's picture has, and what each means. */
+/** The legend: the colours of a motion's picture, and their meanings. */
 
 const SIDES = ["left", "right", "middle"];
 
@@ -27,11 +27,11 @@ export function writeLegend(list, motion, body, { given, inserted, bridged }) {
   if (paints.has("right")) line([given.right], "right");
   if (paints.has("mark")) line([given.mark], "front of knees and trunk");
   if (motion.insertions.length === 0) return;
-  line(sides.map((side) => inserted[side]), "inserted: what the engine made");
+  line(sides.map((side) => inserted[side]), "inserted by the engine");
   if (motion.insertions.some((insertion) => insertion.bridged.length > 0)) {
-    line([bridged], "bridged: a joint's move that no clip shows");
+    line([bridged], "bridged: a joint's move that no clip attests");
   }
   if (motion.insertions.some((insertion) => motion.ends(insertion).length > 0)) {
-    line(sides.map((side) => given[side]), "A and B: the postures that are joined", true);
+    line(sides.map((side) => given[side]), "A and B: the end postures of an insertion", true);
   }
 }

@@ -1,4 +1,4 @@
-/** The page: what is on it, put together; buttons and keys. README.md describes `window.motionmind`. */
+/** The page: its parts, buttons and keys. README.md describes `window.motionmind`. */
 
 import { Body } from "motionmind/body";
 import { writeCredits } from "motionmind/credits";
@@ -13,7 +13,7 @@ import { Theme } from "motionmind/theme";
 import { Timeline } from "motionmind/timeline";
 
 const VIEWS = ["front", "side", "top", "quarter"];
-const ROOMY = { width: 680, height: 380 }; // CSS pixels of a stage on which the legend is open at first
+const ROOMY = { width: 680, height: 380 }; // CSS pixels: on a stage at least as large, the legend starts open
 
 const $ = (id) => document.getElementById(id);
 
@@ -63,14 +63,14 @@ function start() {
   window.motionmind = { motion, body, player, stage, theme, timeline, solids: (frame) => solids(motion, body, frame) };
 }
 
-/** The stage; undefined, and a message on the page, where the browser cannot draw it. */
+/** Make the stage; if the browser cannot draw it, show a message and return undefined. */
 function makeStage(...things) {
   try {
     return new Stage($("canvas"), ...things);
   } catch (error) {
     $("message").hidden = false;
     $("message").textContent =
-      "This browser shows no 3D pictures (WebGL 2 is not available), so the movement cannot be shown. " +
+      "This browser cannot show the movement: WebGL 2 is not available. " +
       "Turn on hardware acceleration in its settings, or open the page in another browser.";
     for (const element of document.querySelectorAll("footer, #views, #page, #legend, #credits, #canvas")) element.hidden = true;
     return undefined;
@@ -104,7 +104,7 @@ function bind(player, stage, theme, refresh) {
     $(id).addEventListener("click", action);
   }
   document.addEventListener("click", (event) => {
-    // Clicked, not chosen by keys: the space bar goes on to play and pause.
+    // After a click, not a key: the space bar continues to play and pause.
     if (event.detail > 0) event.target.closest("button, summary")?.blur();
   });
   for (const select of document.querySelectorAll("select")) {
@@ -135,7 +135,7 @@ function bind(player, stage, theme, refresh) {
   );
 }
 
-/** Say in words where the player is. */
+/** Write the player's frame, time and state. */
 function describe(player) {
   const { motion, frame, time } = player;
   $("play").setAttribute("aria-label", player.playing ? "Pause" : "Play");

@@ -1,10 +1,10 @@
-/** The line of time: what the engine inserted on it, its moves and bridges, and the playhead, which can be dragged. */
+/** The timeline: insertions with their moves and bridges, and a playhead that can be dragged. */
 
 import { MOMENT } from "motionmind/motion";
 
 const TRACK = { top: 15, height: 6 }; // CSS pixels
 const BRIDGES = { top: 24, height: 4 };
-const APART = 7; // CSS pixels between frames' ticks, at least
+const APART = 7; // CSS pixels between the ticks of frames, at least
 
 export class Timeline {
   /**
@@ -31,7 +31,7 @@ export class Timeline {
     new ResizeObserver(() => this.draw()).observe(element);
   }
 
-  /** Put the playhead where the player is. */
+  /** Move the playhead to the player's time. */
   update() {
     const { time, frame } = this.player;
     this.playhead.style.left = `${100 * this.#share(time)}%`;
@@ -75,7 +75,7 @@ export class Timeline {
     return this.motion.start + share * (this.motion.end - this.motion.start);
   }
 
-  /** Lay a button on each insertion, which keys can reach; the pointer goes through to the line, and drags. */
+  /** Lay a button on each insertion for keys; the pointer passes through to the timeline and drags. */
   #insertions() {
     const group = document.createElement("div");
     group.className = "insertions";
@@ -87,7 +87,7 @@ export class Timeline {
       const button = document.createElement("button");
       button.style.left = `${100 * from}%`;
       button.style.width = `${100 * (to - from)}%`;
-      button.tabIndex = i === 0 ? 0 : -1; // one stop of the Tab key; arrows lead on
+      button.tabIndex = i === 0 ? 0 : -1; // one tab stop; arrows move between the buttons
       button.setAttribute("aria-label", this.#described(i).join(", "));
       button.addEventListener("click", () => this.player.seek(times[0]));
       button.addEventListener("focus", () => {
@@ -110,7 +110,7 @@ export class Timeline {
     return buttons;
   }
 
-  /** Say in words what an insertion is. */
+  /** Describe an insertion. */
   #described(index) {
     const { times, bridged } = this.motion.insertions[index];
     const moves = times.length - 1;
@@ -129,7 +129,7 @@ export class Timeline {
     return length === 1 ? "insertion" : `insertion ${index + 1} of ${length}`;
   }
 
-  /** The insertion in which `time` is, and its move; nothing if there is none. */
+  /** The name of the insertion at `time`, and its move; empty outside insertions. */
   #inserted(time) {
     const index = this.motion.insertions.indexOf(this.motion.insertionAt(time));
     if (index < 0) return [];
@@ -157,7 +157,7 @@ export class Timeline {
     this.insertions.forEach((button, i) => button.classList.toggle("under", i === under));
   }
 
-  /** Show words over the place on the line that is a `share` of it from the left, within the page. */
+  /** Show text over the timeline at a `share` of its width from the left, within the page. */
   #hint(words, share) {
     this.hint.textContent = words.join(" · ");
     this.hint.hidden = false;
