@@ -8,8 +8,17 @@ from dataclasses import dataclass, field
 from html import escape
 
 from motionmind.render.markup import hexadecimal
-from motionmind.render.palette import SERIES
 
+SERIES = (  # one colour a series
+    (31, 111, 139),
+    (192, 86, 42),
+    (91, 140, 58),
+    (125, 79, 158),
+    (176, 138, 30),
+    (68, 68, 68),
+    (208, 85, 143),
+    (46, 156, 143),
+)
 WIDTH, HEIGHT = 330, 250  # of a panel, pixels
 LEFT, RIGHT, TOP, BOTTOM = 52, 12, 30, 42  # its margins, pixels
 

@@ -1,4 +1,4 @@
-"""Movement in notebooks: what plays in a cell, and `Player`, a widget that Python and the page share."""
+"""Movement in notebooks: cells that play it, and `Player`, a widget that Python and the page share."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["Player"]
 
 
 def __getattr__(name: str) -> Any:
-    """Import the widget when it is used: it needs the extra `notebook`, and what plays in a cell does not."""
+    """Import the widget on first use: it needs the extra `notebook`; cells that play movement do not."""
     if name != "Player":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from motionmind.notebook import widget

@@ -1,7 +1,7 @@
-"""A cell of a notebook that plays movement: the player's page in a frame of its own, packed.
+"""A notebook cell that plays movement: the player's page, compressed, in a frame.
 
 The frame is sandboxed: its scripts see nothing of the notebook, and the page's own policy forbids every request. The
-whole page lies in the cell, so that a saved notebook plays anywhere; see docs/design/notebooks.md for its size.
+cell holds the whole page, so a saved notebook plays anywhere; see docs/design/notebooks.md for its size.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from motionmind.arguments import check_type
 from motionmind.body.motion import Motion, Posture
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
-from motionmind.render.page import base64_of, page
+from motionmind.render.markup import base64_of
+from motionmind.render.page import page
 from motionmind.tween.headline import beyond, headline
 from motionmind.tween.result import Tween
 from motionmind.variation.piece import Piece
@@ -24,19 +25,17 @@ from motionmind.variation.variation import Variation
 
 Movement = Motion | Posture | Tween | Piece | Variation
 
-MOST_PLACES = 300_000  # joints times frames that a cell holds, 2.4 MB: seven minutes of 23 joints at 30 frames a second
-_HEIGHT = 480  # of the frame, pixels
+MAX_ROTATIONS = 300_000  # joints times frames of a cell, 2.4 MB: seven minutes of 23 joints at 30 frames a second
 
 
-def html_of(thing: Movement) -> str:
-    """Return the HTML that plays a thing in a cell.
+def html_of(movement: Movement) -> str:
+    """Return the HTML that plays movement in a cell.
 
-    Of a tween, what matters stands above it in words; of a variation, how it is made up. Movement that is too long for
-    a cell is said to be.
+    Text above it summarises a tween or a variation. Movement that is too long for a cell gets a message instead.
     """
-    words = [headline(thing), *beyond(thing)] if isinstance(thing, Tween) else []
-    words += [repr(thing)] if isinstance(thing, Variation) else []
-    motion = motion_of(thing)
+    words = [headline(movement), *beyond(movement)] if isinstance(movement, Tween) else []
+    words += [repr(movement)] if isinstance(movement, Variation) else []
+    motion = motion_of(movement)
     try:
         check_length(motion)
     except MotionMindError as error:
@@ -44,23 +43,23 @@ def html_of(thing: Movement) -> str:
     name = displayed(motion.name or motion.skeleton.name)
     return _lines(*words) + (
         f'<iframe title="{html.escape(name)}" sandbox="allow-scripts allow-downloads" loading="lazy"'
-        f' style="width:100%;height:{_HEIGHT}px;border:0" srcdoc="{html.escape(packed(page(motion), name))}"></iframe>'
+        f' style="width:100%;height:480px;border:0" srcdoc="{html.escape(packed(page(motion), name))}"></iframe>'
     )
 
 
-def motion_of(thing: Movement) -> Motion:
-    """Return the motion of anything that moves; WrongTypeError if it does not."""
-    check_type("movement", thing, Motion, Posture, Tween, Piece, Variation)
-    if isinstance(thing, Posture):
-        return thing.as_motion()
-    if isinstance(thing, Motion):
-        return thing
-    return thing.motion() if isinstance(thing, Variation) else thing.motion
+def motion_of(movement: Movement) -> Motion:
+    """Return the motion of any kind of movement; WrongTypeError for other objects."""
+    check_type("movement", movement, Motion, Posture, Tween, Piece, Variation)
+    if isinstance(movement, Posture):
+        return movement.as_motion()
+    if isinstance(movement, Motion):
+        return movement
+    return movement.motion() if isinstance(movement, Variation) else movement.motion
 
 
 def check_length(motion: Motion) -> None:
-    """Raise MotionMindError if a motion is too long for a notebook; it says what makes it shorter."""
-    if len(motion) * len(motion.skeleton) > MOST_PLACES:
+    """Raise MotionMindError, with ways to shorten it, if a motion is too long for a notebook."""
+    if len(motion) * len(motion.skeleton) > MAX_ROTATIONS:
         raise MotionMindError(
             f"{motion!r} is too long to play in a notebook: motion.slice(start, stop) and motion.resample(rate) make "
             "it shorter, draw_picture('clip.html', motion) writes a page of it all"
@@ -68,7 +67,7 @@ def check_length(motion: Motion) -> None:
 
 
 def packed(content: str, title: str) -> str:
-    """Return a small page that unpacks another and becomes it."""
+    """Return a small page that unpacks another page and replaces itself with it."""
     data = base64_of(gzip.compress(content.encode(), compresslevel=9, mtime=0))
     return _shell().substitute(title=html.escape(title), packed=data)
 

@@ -1,4 +1,4 @@
-"""A player that Python and the page share: where one of them moves in time, or selects, the other follows."""
+"""A player that Python and the page share: if one of them changes the time or the selection, the other follows."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.errors import MotionMindError
 from motionmind.notebook.cell import check_length, motion_of, packed
 from motionmind.render.page import page_beside
+from motionmind.render.timing import SAME_TIME_S
 
 try:
     import anywidget
@@ -20,8 +21,6 @@ except ImportError as error:
     raise ImportError(
         f'the player in notebooks needs anywidget: pip install "motionmind[notebook]" ({error})'
     ) from error
-
-_MOMENT = 1e-6  # seconds: times no further apart count as equal
 
 
 class Player(anywidget.AnyWidget):
@@ -32,13 +31,13 @@ class Player(anywidget.AnyWidget):
         height: of the widget, pixels.
 
     Attributes:
-        motion: the motion that is shown; another one takes its place in the widget.
-        time: the moment that is shown, seconds; while it plays, Python learns of it ten times a second.
-        selection: the stretch of time that is selected, from and to, seconds; None if none is.
+        motion: the motion shown; assign another to replace it.
+        time: the time shown, seconds; during playback Python receives it ten times a second.
+        selection: start and end of the selected time, seconds; None without a selection.
 
     Raises:
-        WrongTypeError: what is given is no movement.
-        MotionMindError: the motion is too long for a notebook; a time or a selection is not within the motion.
+        WrongTypeError: the argument is not a movement.
+        MotionMindError: the motion is too long for a notebook, or a time or a selection is outside the motion.
 
     >>> from motionmind import Engine
     >>> from motionmind.notebook import Player
@@ -64,17 +63,17 @@ class Player(anywidget.AnyWidget):
     def selected(self) -> Motion:
         """Return the frames of the selection, at unchanged times; all frames if nothing is selected.
 
-        A selection that holds no frame gives the one before it.
+        A selection without a frame returns the frame before it.
         """
         if self.selection is None:
             return self.motion
         start, end = self.selection
-        first = int(np.searchsorted(self.motion.times, start - _MOMENT))
-        stop = int(np.searchsorted(self.motion.times, end + _MOMENT))
+        first = int(np.searchsorted(self.motion.times, start - SAME_TIME_S))
+        stop = int(np.searchsorted(self.motion.times, end + SAME_TIME_S))
         return self.motion.slice(min(first, max(stop - 1, 0)), max(stop, 1))
 
     def posture(self) -> Posture:
-        """Return the posture at the moment that is shown."""
+        """Return the posture at the time shown."""
         return self.motion.at(np.array([self.time])).posture(0)
 
     @traitlets.validate("motion")
@@ -108,5 +107,5 @@ class Player(anywidget.AnyWidget):
     def _check_within(self, name: str, *times: float) -> None:
         first, last = map(float, self.motion.times[[0, -1]])
         for time in times:
-            if not first - _MOMENT <= time <= last + _MOMENT:
-                raise MotionMindError(f"{name}: the motion goes from {first:g} to {last:g} s, not to {time:g}")
+            if not first - SAME_TIME_S <= time <= last + SAME_TIME_S:
+                raise MotionMindError(f"{name}: the motion lasts from {first:g} to {last:g} s; {time:g} is outside")

@@ -1,4 +1,4 @@
-"""Plots on one canvas, as SVG and PNG: joint graphs, and variations on their attractors."""
+"""Plots as SVG and PNG: joint graphs, joint angles over time, variations on their attractors, and gaps."""
 
 from __future__ import annotations
 

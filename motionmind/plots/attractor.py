@@ -18,22 +18,20 @@ from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.plots import symbols
-from motionmind.plots.brush import Point, font, mixed
-from motionmind.plots.canvas import Plate, png, svg
-from motionmind.plots.cells import HEIGHT, TOP, WIDTH, Field
+from motionmind.plots.brush import Point, as_point, mixed
+from motionmind.plots.canvas import Plate
+from motionmind.plots.cells import PAGE_PX, Field
 from motionmind.plots.marks import Dot, Line, Mark, Words
 from motionmind.plots.portrait import Portrait, portrait_of
-from motionmind.plots.symbols import LETTERS, SMALL
-from motionmind.render.palette import EDGE, INK, PIECE, PLOT_PALE, VARIATION
+from motionmind.plots.symbols import TEXT_PX, TICK_PX
+from motionmind.render.lettering import font
+from motionmind.render.palette import INK, PLOT
 from motionmind.variation.variation import Variation
 
 ATTRACTORS = (".png", ".svg", ".html")  # suffixes that `draw_attractor` writes
 
-# In pixels:
-_MARGIN = 44.0
-_TITLE = 24  # height of the title's letters
-_UNDER = 80.0  # between the attractor and the itineraries
-_GRAPH = 330.0  # height of the itineraries
+_MARGIN_PX = 44.0
+_ITINERARIES_PX = 330.0  # their height
 
 
 def draw_attractor(path: FilePath, variation: Variation) -> None:
@@ -67,16 +65,16 @@ def draw_attractor(path: FilePath, variation: Variation) -> None:
 
         write_atomically(path, attractor_page(portrait).encode())
         return
-    plate = attractor(portrait)
-    write_atomically(path, svg(plate).encode() if suffix == ".svg" else png(plate))
+    write_atomically(path, attractor(portrait).encode(suffix))
 
 
 def attractor(portrait: Portrait) -> Plate:
     """Draw a portrait of a variation: the heading, the attractor, and the itineraries."""
     field = Field(portrait)
-    marks = [*_heading(portrait), *field.marks(), *_itineraries(portrait, TOP + HEIGHT + _UNDER)]
-    height = ceil(TOP + HEIGHT + _UNDER + _GRAPH + 2 * _MARGIN)
-    return Plate(WIDTH, height, _title(portrait), tuple(marks))
+    top = PAGE_PX.top + PAGE_PX.height + 80.0  # of the itineraries
+    marks = [*_heading(portrait), *field.marks(), *_itineraries(portrait, top)]
+    height = ceil(top + _ITINERARIES_PX + 2 * _MARGIN_PX)
+    return Plate(PAGE_PX.width, height, _title(portrait), tuple(marks))
 
 
 def _title(portrait: Portrait) -> str:
@@ -87,7 +85,7 @@ def _title(portrait: Portrait) -> str:
 def _heading(portrait: Portrait) -> Iterator[Mark]:
     """Yield the title, a summary and the legend."""
     course, count = portrait.course, len(portrait.sites)
-    yield Words((_MARGIN, _MARGIN), _title(portrait), _TITLE, INK)
+    yield Words((_MARGIN_PX, _MARGIN_PX), _title(portrait), 24, INK)
     nudge = ", ".join(f"{value:.4g}" for value in course.nudge)
     summary = f"{_count(count, 'posture')}, a site each, {portrait.every} steps of {course.step:g} apart. "
     if portrait.parting is None:
@@ -109,18 +107,18 @@ def _heading(portrait: Portrait) -> Iterator[Mark]:
     if portrait.variation.kept:
         summary += f" Its stretches have {_count(portrait.variation.kept.limits.stretch, 'posture')} at least."
         about += " A point may lie in a cell nearby."
-    yield Words((_MARGIN, _MARGIN + 30), summary, LETTERS, INK)
-    yield from _legend(_MARGIN, _MARGIN + 60)
+    yield Words((_MARGIN_PX, _MARGIN_PX + 30), summary, TEXT_PX, INK)
+    yield from _legend(_MARGIN_PX, _MARGIN_PX + 60)
     yield Words(
-        (_MARGIN, _MARGIN + 84),
+        (_MARGIN_PX, _MARGIN_PX + 84),
         about,
-        LETTERS,
-        PLOT_PALE,
+        TEXT_PX,
+        PLOT.pale,
     )
 
 
 def _legend(x: float, y: float) -> Iterator[Mark]:
-    """Yield the signs of the picture and their meanings, in a line from a point on."""
+    """Yield the legend, in a line from a point on."""
     for swatch, words in (
         ("piece", "the piece, a site for each posture"),
         ("other", "the variation: at each point the posture in whose cell it is"),
@@ -130,10 +128,10 @@ def _legend(x: float, y: float) -> Iterator[Mark]:
     ):
         line = np.array([[x, y], [x + 26, y]])
         if swatch == "piece":
-            yield Line(line, PIECE, 2.6)
+            yield Line(line, PLOT.piece, 2.6)
             yield symbols.site((x + 13, y), 3.0)
         elif swatch == "other":
-            yield Line(line, VARIATION, 1.3)
+            yield Line(line, PLOT.variation, 1.3)
             yield symbols.point((x + 13, y), 2.4)
         elif swatch == "jump":
             yield symbols.jump((x + 13, y), 4.2)
@@ -141,9 +139,9 @@ def _legend(x: float, y: float) -> Iterator[Mark]:
             yield from symbols.parting((x + 13, y), 6.0)
         else:
             for n, times in enumerate((0, 1, 3)):
-                yield Dot((x + 4 + 9 * n, y), 5.5, symbols.tint(times), EDGE, 0.8)
-        yield Words((x + 33, y), words, LETTERS, PLOT_PALE)
-        x += 33 + 1.12 * font(LETTERS).getlength(words) + 20  # letters of a browser may be wider
+                yield Dot((x + 4 + 9 * n, y), 5.5, symbols.tint(times), PLOT.edge, 0.8)
+        yield Words((x + 33, y), words, TEXT_PX, PLOT.pale)
+        x += 33 + 1.12 * font(TEXT_PX).getlength(words) + 20  # letters of a browser may be wider
 
 
 def _count(count: int, noun: str) -> str:
@@ -151,42 +149,42 @@ def _count(count: int, noun: str) -> str:
 
 
 def _itineraries(portrait: Portrait, top: float) -> Iterator[Mark]:
-    """Yield the posture at each time: of the piece, a straight line; of the variation, a line for each run."""
+    """Yield the posture at each time: of the piece, one straight line; of the variation, a line for each run."""
     order, count = portrait.order, len(portrait.sites)
     long = max(len(order), count)
-    left, right, bottom = _MARGIN + 40.0, WIDTH - _MARGIN, top + _GRAPH
-    x_step, y_step = (right - left) / max(long - 1, 1), _GRAPH / max(count - 1, 1)
+    left, right, bottom = _MARGIN_PX + 40.0, PAGE_PX.width - _MARGIN_PX, top + _ITINERARIES_PX
+    x_step, y_step = (right - left) / max(long - 1, 1), _ITINERARIES_PX / max(count - 1, 1)
 
     def at(n: float, posture: float) -> Point:
         return left + x_step * n, bottom - y_step * posture
 
     size = float(np.clip(0.35 * x_step, 1.0, 3.0))
-    yield Line(np.array([at(0, 0), (right, bottom)]), EDGE, 0.8)
-    yield Line(np.array([at(0, 0), at(0, count - 1)]), EDGE, 0.8)
+    yield Line(np.array([at(0, 0), (right, bottom)]), PLOT.edge, 0.8)
+    yield Line(np.array([at(0, 0), at(0, count - 1)]), PLOT.edge, 0.8)
     for tick in symbols.round_numbers(0.0, max(long - 1.0, 1.0)):
-        yield Words((at(tick, 0)[0], bottom + 14.0), f"{tick:g}", SMALL, PLOT_PALE, "middle")
+        yield Words((at(tick, 0)[0], bottom + 14.0), f"{tick:g}", TICK_PX, PLOT.pale, "middle")
     for tick in symbols.round_numbers(0.0, max(count - 1.0, 1.0)):
-        yield Words((left - 10.0, at(0, tick)[1]), f"{tick:g}", SMALL, PLOT_PALE, "end")
-    yield Words((left, top - 40.0), "posture of the piece", LETTERS, PLOT_PALE)
-    yield Words((right, bottom + 34.0), "place in the movement", LETTERS, PLOT_PALE, "end")
-    yield Line(np.array([at(0, 0), at(count - 1, count - 1)]), PIECE, 2.6)
+        yield Words((left - 10.0, at(0, tick)[1]), f"{tick:g}", TICK_PX, PLOT.pale, "end")
+    yield Words((left, top - 40.0), "posture of the piece", TEXT_PX, PLOT.pale)
+    yield Words((right, bottom + 34.0), "place in the movement", TEXT_PX, PLOT.pale, "end")
+    yield Line(np.array([at(0, 0), at(count - 1, count - 1)]), PLOT.piece, 2.6)
     starts = [0, *sorted(portrait.jumps), len(order)]
     for before, after in pairwise(starts):
         run = np.array([at(n, order[n]) for n in range(before, after)])
         if before:
-            yield Line(np.array([at(before - 1, order[before - 1]), run[0]]), mixed(VARIATION, 0.45), 0.7, 2.0)
+            yield Line(np.array([at(before - 1, order[before - 1]), run[0]]), mixed(PLOT.variation, 0.45), 0.7, 2.0)
         if len(run) > 1:
-            yield Line(run, VARIATION, 1.3)
+            yield Line(run, PLOT.variation, 1.3)
         for n, place in enumerate(run, before):
             if n != before or not before:
-                yield symbols.point(symbols.pair(place), 0.8 * size)
+                yield symbols.point(as_point(place), 0.8 * size)
         if before:
             seam = portrait.jumps[before]
             yield symbols.jump(
-                symbols.pair(run[0]), 1.3 * size, f"jump from posture {seam.start} to {seam.end}, seam {seam.number}"
+                as_point(run[0]), 1.3 * size, f"jump from posture {seam.start} to {seam.end}, seam {seam.number}"
             )
     if portrait.parting is not None:
         n = portrait.parting
         yield Line(np.array([(at(n, 0)[0], bottom), (at(n, 0)[0], top - 8.0)]), INK, 0.8, 3.0)
         yield from symbols.parting(at(n, float(order[n])), 5.0)
-        yield Words((at(n, 0)[0], top - 18.0), f"they part at {n}", LETTERS, INK, "middle")
+        yield Words((at(n, 0)[0], top - 18.0), f"they part at {n}", TEXT_PX, INK, "middle")

@@ -8,16 +8,15 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.plots.portrait import Portrait
-from motionmind.render.page import base64_of, page_beside
-from motionmind.render.palette import PIECE, VARIATION
-
-_THINNED = 50  # every 50th point of the sheets is enough to show the attractor
+from motionmind.render.markup import base64_of
+from motionmind.render.page import page_beside
+from motionmind.render.palette import PLOT
 
 
 def attractor_page(portrait: Portrait) -> str:
     """Build the HTML page of a portrait; player/README.md documents its data."""
     arranged = portrait.variation.arrange()
-    sheets = portrait.sheets[::_THINNED]
+    sheets = portrait.sheets[::50]  # enough to show the attractor
     points = portrait.in_space(sheets)
     low, high = points.min(axis=0), points.max(axis=0)
     radius = 0.5 * float(np.linalg.norm(high - low))
@@ -36,6 +35,6 @@ def attractor_page(portrait: Portrait) -> str:
         "other": encode(portrait.other),
         "sheets": encode(sheets),
         "cells": base64_of(portrait.postures_at(sheets).astype("<u2").tobytes()),
-        "colours": {"piece": PIECE, "other": VARIATION},
+        "colours": {"piece": PLOT.piece, "other": PLOT.variation},
     }
     return page_beside(arranged.motion, "attractor", data)

@@ -10,10 +10,9 @@ from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.plots.brush import Brush
 from motionmind.plots.marks import Mark
+from motionmind.render.lettering import FONT_FAMILY
 from motionmind.render.markup import hexadecimal, xml_text
 from motionmind.render.palette import PAPER
-
-LETTERING = 'font-family="system-ui,Helvetica,Arial,sans-serif"'
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +38,7 @@ class Plate:
     title: str
     marks: tuple[Mark, ...]
     headings: tuple[Mark, ...] = ()
-    style: str = f'stroke-linejoin="round" stroke-linecap="round" {LETTERING}'
+    style: str = f'stroke-linejoin="round" stroke-linecap="round" {FONT_FAMILY}'
 
     def save(self, path: FilePath) -> None:
         """Write the picture; MotionMindError if the suffix is neither `.svg` nor `.png`, or it cannot be written."""
@@ -47,7 +46,11 @@ class Plate:
         suffix = Path(path).suffix.lower()
         if suffix not in (".svg", ".png"):
             raise MotionMindError(f"{path}: suffix {suffix!r} is unknown; this picture is written as .svg or .png")
-        write_atomically(path, svg(self).encode() if suffix == ".svg" else png(self))
+        write_atomically(path, self.encode(suffix))
+
+    def encode(self, suffix: str) -> bytes:
+        """Return the contents of a file with the suffix `.svg` or `.png`."""
+        return svg(self).encode() if suffix == ".svg" else png(self)
 
     def __repr__(self) -> str:
         return f"<Picture of {self.width} x {self.height} pixels: {self.title}>"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
 
@@ -12,33 +12,52 @@ import numpy as np
 from motionmind._typing import Floats, Int16s, Pixels
 from motionmind.body.motion import Posture
 from motionmind.plots import symbols
-from motionmind.plots.brush import FINE
-from motionmind.plots.marks import LETTER, Dot, Inset, Line, Mark, Region, Words
+from motionmind.plots.brush import N_SUBSAMPLES, as_point
+from motionmind.plots.marks import LETTER_WIDTH_RATIO, Dot, Inset, Line, Mark, Region, Words
 from motionmind.plots.portrait import Portrait
-from motionmind.plots.scene import Room
-from motionmind.plots.symbols import LETTERS, SMALL
+from motionmind.plots.scene import Labels, Room
+from motionmind.plots.symbols import TEXT_PX, TICK_PX
 from motionmind.render.body_shape import shape_of
 from motionmind.render.body_solids import BodyShape
-from motionmind.render.camera import SMOOTH
+from motionmind.render.camera import SAMPLES_PER_PX
 from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.figure import colour, draw, halved
-from motionmind.render.palette import EDGE, INK, PAPER, PIECE, PLOT_PALE, VARIATION
+from motionmind.render.palette import INK, PAPER, PLOT
+from motionmind.render.solids import bounding_box
 from motionmind.render.trace import outlines, smooth
 from motionmind.render.view import VIEWS, to_view
 
-WIDTH = 1400  # of the picture, pixels
-TOP, HEIGHT = 150.0, 900.0  # the field's upper edge and its height, pixels
-_WIDE, _HIGH = 960.0, 820.0  # greatest size of the attractor, pixels
-_AIR = 6  # pixels around the attractor
-_APART = 22.0  # pixels from the attractor to the axes
-_FIGURE = 104.0  # height of a body at rest, pixels
-_FIGURES = 16  # figures, at most
-_NUMBERS = 160  # numbers beside sites, at most
-_CLEAR = 4.0  # pixels between a figure and its leader
+
+@dataclass(frozen=True)
+class PageLengths:
+    """Lengths of the picture, pixels.
+
+    Attributes:
+        width: its width.
+        top, height: the field's upper edge and its height.
+        attractor: greatest width and height of the attractor.
+        air: free edge around the attractor.
+        to_axes: from the attractor to the axes.
+        figure: height of a body at rest.
+        to_leader: from a figure to its leader.
+    """
+
+    width: int = 1400
+    top: float = 150.0
+    height: float = 900.0
+    attractor: tuple[float, float] = (960.0, 820.0)
+    air: int = 6
+    to_axes: float = 22.0
+    figure: float = 104.0
+    to_leader: float = 4.0
+
+
+PAGE_PX = PageLengths()
+_MAX_FIGURES = 16
 
 
 class Field:
-    """The attractor's place in the picture, and the marks on it.
+    """The attractor in the picture, and the marks on it.
 
     Attributes:
         portrait: the variation on its attractor.
@@ -53,10 +72,13 @@ class Field:
         self.portrait = portrait
         places = portrait.seen(np.concatenate([portrait.sheets, portrait.other]))
         self.low, self.high = places.min(axis=0), places.max(axis=0)
-        self.scale = float(min([_WIDE, _HIGH] / np.maximum(self.high - self.low, 1e-12)))
+        self.scale = float(min(PAGE_PX.attractor / np.maximum(self.high - self.low, 1e-12)))
         size = self.scale * (self.high - self.low)
-        self.width, self.height = (ceil(length) + 2 * _AIR for length in size)
-        self.corner = float(round(0.5 * (WIDTH - self.width))), TOP + round(0.5 * (HEIGHT - self.height))
+        self.width, self.height = (ceil(length) + 2 * PAGE_PX.air for length in size)
+        self.corner = (
+            float(round(0.5 * (PAGE_PX.width - self.width))),
+            PAGE_PX.top + round(0.5 * (PAGE_PX.height - self.height)),
+        )
         self.visits = np.bincount(portrait.order, minlength=len(portrait.sites))
 
     def at(self, points: Floats) -> Floats:
@@ -66,12 +88,12 @@ class Field:
     def _in_picture(self, places: Floats) -> Floats:
         """Convert the two coordinates shown [..., 2] to pixels [..., 2]."""
         shown = (places - [self.low[0], self.high[1]]) * [self.scale, -self.scale]
-        return np.asarray(shown + self.corner + _AIR)
+        return np.asarray(shown + self.corner + PAGE_PX.air)
 
     @cached_property
     def cells(self) -> Int16s:
         """The posture whose cell each pixel is in [height, width], from `corner` on; EMPTY beside the attractor."""
-        corner = np.array([self.low[0] - _AIR / self.scale, self.high[1] + _AIR / self.scale])
+        corner = np.array([self.low[0] - PAGE_PX.air / self.scale, self.high[1] + PAGE_PX.air / self.scale])
         return self.portrait.cells(corner, self.scale, self.width, self.height)
 
     def marks(self) -> Iterator[Mark]:
@@ -91,7 +113,7 @@ class Field:
                 outline,
                 self.corner,
                 PAPER if hole else symbols.tint(int(self.visits[posture])),
-                EDGE,
+                PLOT.edge,
                 0.7,
                 "" if hole else self._describe_posture(posture),
             )
@@ -102,19 +124,19 @@ class Field:
         names = [self.portrait.flow.dimensions[i] for i in (across, up)]
         for axis, outwards in ((0, (0.0, 1.0)), (1, (-1.0, 0.0))):
             out = np.array(outwards)
-            ends = self._on_axis(axis, np.array([self.low[axis], self.high[axis]])) + _APART * out
+            ends = self._on_axis(axis, np.array([self.low[axis], self.high[axis]])) + PAGE_PX.to_axes * out
             ticks = symbols.round_numbers(self.low[axis], self.high[axis])
-            yield Line(ends, PLOT_PALE, 0.8)
-            for tick, at in zip(ticks, self._on_axis(axis, ticks) + _APART * out, strict=True):
-                yield Line(np.stack([at, at + 5.0 * out]), PLOT_PALE, 0.8)
+            yield Line(ends, PLOT.pale, 0.8)
+            for tick, at in zip(ticks, self._on_axis(axis, ticks) + PAGE_PX.to_axes * out, strict=True):
+                yield Line(np.stack([at, at + 5.0 * out]), PLOT.pale, 0.8)
                 yield Words(
-                    symbols.pair(at + 12.0 * out), f"{tick:g}", SMALL, PLOT_PALE, "middle" if axis == 0 else "end"
+                    as_point(at + 12.0 * out), f"{tick:g}", TICK_PX, PLOT.pale, "middle" if axis == 0 else "end"
                 )
             yield Words(
-                symbols.pair(ends[1] + 14.0 * np.abs(out[::-1]) * [1.0, -1.0]),
+                as_point(ends[1] + 14.0 * np.abs(out[::-1]) * [1.0, -1.0]),
                 names[axis],
-                LETTERS,
-                PLOT_PALE,
+                TEXT_PX,
+                PLOT.pale,
                 "middle",
             )
 
@@ -131,17 +153,17 @@ class Field:
 
     def _trajectories(self) -> Iterator[Mark]:
         portrait, size = self.portrait, self.size
-        yield Line(self.at(portrait.piece), PIECE, 0.75 * size)
-        yield Line(self.at(portrait.other), VARIATION, 0.36 * size)
+        yield Line(self.at(portrait.piece), PLOT.piece, 0.75 * size)
+        yield Line(self.at(portrait.other), PLOT.variation, 0.36 * size)
         for posture, at in enumerate(self.at(portrait.sites)):
-            yield symbols.site(symbols.pair(at), size, self._describe_posture(posture))
+            yield symbols.site(as_point(at), size, self._describe_posture(posture))
         for n, at in enumerate(self.at(portrait.points)):
             if n in portrait.jumps:
-                yield symbols.jump(symbols.pair(at), 1.2 * size, self._describe_point(n))
+                yield symbols.jump(as_point(at), 1.2 * size, self._describe_point(n))
             else:
-                yield symbols.point(symbols.pair(at), 0.65 * size, self._describe_point(n))
+                yield symbols.point(as_point(at), 0.65 * size, self._describe_point(n))
         if portrait.parting is not None:
-            yield from symbols.parting(symbols.pair(self.at(portrait.points[portrait.parting])), 6.0)
+            yield from symbols.parting(as_point(self.at(portrait.points[portrait.parting])), 6.0)
 
     def _describe_posture(self, posture: int) -> str:
         """Describe a posture: its time in the piece, and its places in the variation."""
@@ -165,10 +187,12 @@ class Field:
         """Yield figures of some postures, joined to their sites, and the numbers of others."""
         portrait = self.portrait
         sites, size = self.at(portrait.sites), self.size
-        room = Room(WIDTH, ceil(TOP + HEIGHT))
-        room.take(0.0, 0.0, WIDTH, TOP - 10.0)
-        room.take(self.corner[0] - 44.0, self.corner[1] - 20.0, self.corner[0] - 10.0, TOP + HEIGHT)  # the axes
-        room.take(0.0, self.corner[1] + self.height + 10.0, WIDTH, TOP + HEIGHT)
+        room = Room(PAGE_PX.width, ceil(PAGE_PX.top + PAGE_PX.height))
+        room.take(0.0, 0.0, PAGE_PX.width, PAGE_PX.top - 10.0)
+        room.take(
+            self.corner[0] - 44.0, self.corner[1] - 20.0, self.corner[0] - 10.0, PAGE_PX.top + PAGE_PX.height
+        )  # the axes
+        room.take(0.0, self.corner[1] + self.height + 10.0, PAGE_PX.width, PAGE_PX.top + PAGE_PX.height)
         room.cover(self.corner, self.cells)
         room.trace(self.at(portrait.piece))
         room.trace(self.at(portrait.other))
@@ -179,30 +203,35 @@ class Field:
             pixels = _figure(body, piece.ends(posture, posture)[0])
             figure = Inset((0.0, 0.0), pixels, self._describe_posture(posture))
             wide, high = figure.size
-            place = room.near(posture, sites[posture], wide + 2 * _CLEAR, high + 1.6 * LETTERS)
+            place = room.near(posture, sites[posture], wide + 2 * PAGE_PX.to_leader, high + 1.6 * TEXT_PX)
             if place is None:
                 continue
-            left, top = place[0] + _CLEAR, place[1]
+            left, top = place[0] + PAGE_PX.to_leader, place[1]
             leader = np.stack([_edge(pixels, np.array([left, top]), sites[posture]), sites[posture]])
-            room.join(place, wide + 2 * _CLEAR, high + 1.6 * LETTERS, leader)
+            room.join(place, wide + 2 * PAGE_PX.to_leader, high + 1.6 * TEXT_PX, leader)
             marked.add(posture)
             yield Line(leader, INK, 0.8)
             yield Dot(
-                symbols.pair(sites[posture]), max(1.25 * size, 3.0), PIECE, INK, 1.2, self._describe_posture(posture)
+                as_point(sites[posture]),
+                max(1.25 * size, 3.0),
+                PLOT.piece,
+                INK,
+                1.2,
+                self._describe_posture(posture),
             )
             yield replace(figure, at=(left, top))
-            yield Words((left + 0.5 * wide, top + high + 0.8 * LETTERS), str(posture), LETTERS, INK, "middle")
-            if len(marked) == _FIGURES:
+            yield Words((left + 0.5 * wide, top + high + 0.8 * TEXT_PX), str(posture), TEXT_PX, INK, "middle")
+            if len(marked) == _MAX_FIGURES:
                 break
         yield from self._numbers(sites, marked)
 
     def _far_apart(self) -> Iterator[int]:
-        """Yield postures to show as figures: the first, the one where they part, then ones far from all before."""
+        """Yield postures to show as figures: the first, that of the parting, then each the farthest from all before."""
         portrait = self.portrait
         sites = self.at(portrait.sites)
         first = [0] + ([int(portrait.order[portrait.parting])] if portrait.parting is not None else [])
         far = np.full(len(sites), np.inf)
-        for _ in range(min(len(sites), 8 * _FIGURES)):
+        for _ in range(min(len(sites), 8 * _MAX_FIGURES)):
             posture = first.pop(0) if first else int(np.argmax(far))
             if far[posture] > 0.0:
                 yield posture
@@ -210,32 +239,29 @@ class Field:
 
     def _numbers(self, sites: Floats, marked: set[int]) -> Iterator[Mark]:
         """Yield numbers beside sites where there is room, the roundest first."""
-        size, left_over = self.size, _NUMBERS
-        boxes = np.concatenate([sites - size, sites + size], axis=1)
+        size, left_over = self.size, 160
+        labels = Labels(sites, size)
         for posture in sorted(range(len(sites)), key=lambda n: (-_roundness(n), n)):
             if posture in marked or not left_over:
                 continue
             text, (x, y) = str(posture), sites[posture]
-            long, half, off = LETTER * SMALL * len(text) + 2.0, 0.5 * SMALL, size + 2.0
-            for left, middle in (
-                (x + off, y), (x - off - long, y), (x - 0.5 * long, y - off - half), (x - 0.5 * long, y + off + half)
-            ):  # fmt: skip
-                box = np.array([left, middle - half, left + long, middle + half])
-                covers = (boxes[:, :2] < box[2:]).all(axis=1) & (boxes[:, 2:] > box[:2]).all(axis=1)
-                if not covers.any():
-                    boxes = np.concatenate([boxes, box[None]])
-                    left_over -= 1
-                    yield Words((float(left), float(middle)), text, SMALL, INK)
-                    break
+            width, half, off = LETTER_WIDTH_RATIO * TICK_PX * len(text) + 2.0, 0.5 * TICK_PX, size + 2.0
+            beside = (x + off, y), (x - off - width, y)
+            above_and_below = (x - 0.5 * width, y - off - half), (x - 0.5 * width, y + off + half)
+            place = labels.place([*beside, *above_and_below], width, half)
+            if place:
+                left_over -= 1
+                yield Words(place, text, TICK_PX, INK)
 
 
 def _figure(body: BodyShape, posture: Posture) -> Pixels:
-    """Draw a posture as a small picture [FINE h, FINE w, 4], RGBA, three quarters from the front."""
+    """Draw a posture as a small picture [N_SUBSAMPLES h, N_SUBSAMPLES w, 4], RGBA, three quarters from the front."""
     cones, balls = to_view(*body.solids(posture.rotations, posture.root), VIEWS["quarter"], posture.root)
-    low, high = np.concatenate([cones.reach(), balls.reach()], axis=-2)[..., :2]
-    (left, bottom), (right, top) = low.min(axis=0), high.max(axis=0)
-    scale, rim = SMOOTH * FINE * _FIGURE / body.height, 2 * SMOOTH * FINE
-    width, height = (SMOOTH * ceil((length * scale + 2 * rim) / SMOOTH) for length in (right - left, top - bottom))
+    (left, bottom), (right, top) = bounding_box(cones, balls)[:, :2]
+    scale, rim = SAMPLES_PER_PX * N_SUBSAMPLES * PAGE_PX.figure / body.height, 2 * SAMPLES_PER_PX * N_SUBSAMPLES
+    width, height = (
+        SAMPLES_PER_PX * ceil((length * scale + 2 * rim) / SAMPLES_PER_PX) for length in (right - left, top - bottom)
+    )
     buffer = DepthBuffer(left - rim / scale, top + rim / scale, width, height, scale)
     draw(buffer, cones, balls)
     paper = np.full((height, width, 3), PAPER, dtype=np.uint8)
@@ -248,12 +274,12 @@ def _figure(body: BodyShape, posture: Posture) -> Pixels:
 
 
 def _edge(pixels: Pixels, corner: Floats, site: Floats) -> Floats:
-    """Return the point [2], pixels, just before a figure's nearest pixel, where a leader from its site ends."""
+    """Return the end [2], pixels, of the leader from a site to a figure, just before the figure's nearest pixel."""
     rows, columns = np.nonzero(pixels[..., 3])
-    places = corner + np.stack([columns, rows], axis=1) / FINE
+    places = corner + np.stack([columns, rows], axis=1) / N_SUBSAMPLES
     nearest = places[np.argmin(np.linalg.norm(places - site, axis=1))]
     away = site - nearest
-    return np.asarray(nearest + away * min(_CLEAR / max(float(np.linalg.norm(away)), 1e-9), 1.0))
+    return np.asarray(nearest + away * min(PAGE_PX.to_leader / max(float(np.linalg.norm(away)), 1e-9), 1.0))
 
 
 def _roundness(number: int) -> int:

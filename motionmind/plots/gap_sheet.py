@@ -1,4 +1,4 @@
-"""A sheet of the transitions that a corpus lacks: each with its two postures, and what the engine makes of the way."""
+"""A sheet of the transitions that a corpus lacks: each with its two postures, and the tween between them."""
 
 from __future__ import annotations
 
@@ -17,14 +17,9 @@ from motionmind.geometry import rotations as rot
 from motionmind.render.sheet import Row, evenly, row_sheet
 from motionmind.tween.engine import Engine
 
-_BETWEEN = 3  # moments of the way that are drawn
-_CLIP = 24  # characters of a clip's name
-_APART = 1.0  # seconds from the end of one movement to the beginning of the next
-_FLOOR = np.array([1.0, 0.0, 1.0])
-
 
 def gap_sheet(engine: Engine, gaps: Gaps) -> Image.Image:
-    """Draw the transitions that a corpus lacks; between their postures, in violet, the best movement it has for them.
+    """Draw the transitions that a corpus lacks: both postures and, in violet, three of the engine's tween between them.
 
     Args:
         engine: the corpus.
@@ -38,8 +33,8 @@ def gap_sheet(engine: Engine, gaps: Gaps) -> Image.Image:
     motions = [engine.tween(*_ends(engine.corpus, one)).motion for one in gaps.transitions]
     rows, first, before = [], 0, gaps.energy.cost
     for number, (one, motion) in enumerate(zip(gaps.transitions, motions, strict=True), start=1):
-        frames = evenly(range(first, first + len(motion)), _BETWEEN + 2)
-        blanks = [None] * (_BETWEEN + 2 - len(frames))
+        frames = evenly(range(first, first + len(motion)), 5)
+        blanks = [None] * (5 - len(frames))
         inner = [f"{motion.times[frame - first]:.2f} s" for frame in frames[1:-1]]
         captions = ["from", *inner, *[""] * len(blanks), "to"]
         less = before - one.energy.cost
@@ -51,17 +46,17 @@ def gap_sheet(engine: Engine, gaps: Gaps) -> Image.Image:
 
 
 def _words(place: Place) -> str:
-    return f"{displayed(place.clip, _CLIP)} at {place.seconds:.2f} s"
+    return f"{displayed(place.clip, 24)} at {place.seconds:.2f} s"
 
 
 def _ends(corpus: Corpus, recommended: Recommended) -> tuple[Posture, Posture]:
-    """Return a transition's postures, the second on the same place, and, if it may face anywhere, as the first."""
+    """Return a transition's postures; the second is at the place of the first and, if facing is free, faces like it."""
     begin, end = recommended.postures
     turned = np.array(corpus.rotations[end])
     if corpus.facing == "free":
         turn = rot.heading(corpus.rotations[begin, 0]) - rot.heading(turned[0])
         turned[0] = rot.mul(rot.about_vertical(turn), turned[0])
-    place = np.where(_FLOOR > 0.0, corpus.root[begin], corpus.root[end])
+    place = np.where([True, False, True], corpus.root[begin], corpus.root[end])
     return (
         Posture(corpus.skeleton, corpus.rotations[begin], corpus.root[begin]),
         Posture(corpus.skeleton, rot.normalise(turned), place),
@@ -69,12 +64,12 @@ def _ends(corpus: Corpus, recommended: Recommended) -> tuple[Posture, Posture]:
 
 
 def _joined(motions: Sequence[Motion]) -> Motion:
-    """Return motions one after another."""
+    """Join motions one after another, 1 s apart."""
     times, insertions, clock = [], list[Insertion](), 0.0
     for motion in motions:
         times.append(motion.times + clock)
         insertions += [replace(one, times=one.times + clock) for one in motion.insertions]
-        clock += float(motion.times[-1]) + _APART
+        clock += float(motion.times[-1]) + 1.0
     return replace(
         motions[0],
         rotations=np.concatenate([motion.rotations for motion in motions]),

@@ -1,11 +1,11 @@
-"""The layout of a joint graph: where its states and transitions lie on the page, so that it can be read."""
+"""The layout of a joint graph: legible places of its states and transitions on the page."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, hypot, sqrt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,22 +13,18 @@ from motionmind._typing import Floats
 from motionmind.corpus.corpus import FACING
 from motionmind.display import displayed
 from motionmind.geometry import rotations as rot
-from motionmind.plots.brush import Point
-from motionmind.plots.marks import LETTER
+from motionmind.plots.brush import Point, as_point
+from motionmind.plots.marks import LETTER_WIDTH_RATIO
+from motionmind.plots.scene import Labels
 
 if TYPE_CHECKING:
     import networkx as nx
 
-LETTERS, TITLE = 11, 17  # heights of the letters of names and of the heading, pixels
-MARGIN = 40.0  # pixels around the picture
+NAME_PX, HEADING_PX = 11, 17  # heights of the letters of names and of the heading
+MARGIN_PX = 40.0  # around the picture
 
-_STEP = 90.0  # usual distance between states that a transition joins, pixels
-_APART = 14.0  # least gap between circles, pixels, plus this for each letter of an average name:
-_APART_A_LETTER = 1.6
-_ON_RING = 64.0  # distance between states of the facing, pixels
-_SMALL, _LARGE = 5.0, 20.0  # radii of the least and of the most visited state, pixels
-_BEND = 0.14  # bend of an arrow to its left, by its length, which separates the two directions
-_HEAD = 56.0  # height of the words above the picture, pixels
+_STEP_PX = 90.0  # median distance between states that a transition joins
+_HEAD_PX = 56.0  # height of the text above the graph
 
 
 @dataclass(frozen=True)
@@ -76,7 +72,7 @@ class GraphLayout:
 
     Attributes:
         width, height: size, pixels.
-        heading, legend: the words above it.
+        heading, legend: the text above it.
         circles: the states.
         arrows: the transitions, the likeliest last.
     """
@@ -92,32 +88,37 @@ class GraphLayout:
 def lay_out(graph: nx.DiGraph) -> GraphLayout:
     """Lay out a joint graph, as from `Engine.joint_graph`.
 
-    States that no transition joins to another are left out, and counted in the heading.
+    States without a transition to or from another are left out; the heading counts them.
     """
     shown = [state for state in graph if any(other != state for other in (*graph.succ[state], *graph.pred[state]))]
     visits = np.array([graph.nodes[state]["visits"] for state in shown])
-    radii = _SMALL + (_LARGE - _SMALL) * np.sqrt(visits / visits.max()) if shown else np.zeros(0)
+    radii = 5.0 + (20.0 - 5.0) * np.sqrt(visits / visits.max()) if shown else np.zeros(0)  # pixels
     names = _names(graph, shown)
     letters = float(np.mean([len(name) for name in names])) if names else 0.0
-    places = _separate(_place_states(graph, shown), radii, _APART + _APART_A_LETTER * letters)
+    places = _separate(_place_states(graph, shown), radii, 14.0 + 1.6 * letters)  # a gap for names, pixels
     low = (places - radii[:, None]).min(axis=0) if shown else np.zeros(2)
-    places = places - low + (MARGIN, MARGIN + _HEAD)
+    places = places - low + (MARGIN_PX, MARGIN_PX + _HEAD_PX)
     radius, place = dict(zip(shown, radii, strict=True)), dict(zip(shown, places, strict=True))
     heading, legend = _words(graph, len(graph) - len(shown))
     words_at = _place_names(places, radii, names)
     circles = tuple(
         Circle(
-            _point(place[state]), float(radius[state]), probability(graph, state, state), name, at, _facts(graph, state)
+            as_point(place[state]),
+            float(radius[state]),
+            probability(graph, state, state),
+            name,
+            at,
+            _facts(graph, state),
         )
         for state, name, at in zip(shown, names, words_at, strict=True)
     )
     pairs = sorted(((a, b) for a, b in graph.edges if a != b), key=lambda pair: probability(graph, *pair))
     arrows = tuple(_arrow(graph, a, b, place, radius) for a, b in pairs)
     ends = [(*circle.at, circle.radius) for circle in circles]
-    right = max([x + r for x, _, r in ends] + [at[0] + _long(n) for n, at in zip(names, words_at, strict=True) if at]
-                + [LETTER * TITLE * len(heading), _long(legend) + MARGIN], default=0.0)  # fmt: skip
-    bottom = max([y + r for _, y, r in ends], default=MARGIN + _HEAD)
-    return GraphLayout(ceil(right + MARGIN), ceil(bottom + MARGIN), heading, legend, circles, arrows)
+    rights = [x + r for x, _, r in ends] + [at[0] + _width(n) for n, at in zip(names, words_at, strict=True) if at]
+    right = max(*rights, LETTER_WIDTH_RATIO * HEADING_PX * len(heading), _width(legend) + MARGIN_PX)
+    bottom = max([y + r for _, y, r in ends], default=MARGIN_PX + _HEAD_PX)
+    return GraphLayout(ceil(right + MARGIN_PX), ceil(bottom + MARGIN_PX), heading, legend, circles, arrows)
 
 
 # --- where the states lie ---------------------------------------------------------------------------------------------
@@ -130,8 +131,8 @@ def _place_states(graph: nx.DiGraph, shown: Sequence[int]) -> Floats:
     count = len(shown)
     if graph.graph["joint"] == FACING:
         turns = rot.heading(_orientations(graph, shown))
-        radius = max(220.0, _ON_RING * count / (2.0 * np.pi))
-        # As seen from above, the front of the stage below: a body that faces the audience faces down the page.
+        radius = max(220.0, 64.0 * count / (2.0 * np.pi))  # neighbours 64 pixels apart
+        # Seen from above, the audience below: a body that faces the audience faces down the page.
         return radius * np.stack([np.sin(turns), np.cos(turns)], axis=1)
     joined = nx.Graph((a, b) for a, b in graph.edges if a != b)
     parts = [sorted(part) for part in sorted(nx.connected_components(joined), key=lambda part: (-len(part), min(part)))]
@@ -145,9 +146,9 @@ def _place_states(graph: nx.DiGraph, shown: Sequence[int]) -> Floats:
         across, down = here.max(axis=0)
         widest = max(widest, across)
         if x > 0.0 and x + across > widest:
-            x, y, high = 0.0, y + high + _STEP, 0.0
+            x, y, high = 0.0, y + high + _STEP_PX, 0.0
         places[[row[state] for state in part]] = here + np.array([x, y])
-        x, high = x + across + _STEP, max(high, down)
+        x, high = x + across + _STEP_PX, max(high, down)
     return places
 
 
@@ -155,15 +156,15 @@ def _place_component(part: nx.Graph, states: Sequence[int], orientations: Floats
     """Place the states of a connected component [N, 2], pixels, by distances along the graph.
 
     Distances on the page approximate those along the graph (Kamada & Kawai, "An algorithm for drawing general
-    undirected graphs", Information Processing Letters 31, 1989), where a transition is longer the farther it turns. So
-    states of similar orientation lie near each other, as if placed by orientation alone, but arrows cross half as
-    often, as little as if all had the same length. Classical multidimensional scaling gives the start.
+    undirected graphs", Information Processing Letters 31, 1989), where a transition is longer the farther it turns.
+    States of similar orientation so lie near each other, as with placement by orientation alone, but with half the
+    crossings, as few as with transitions of equal length. Classical multidimensional scaling gives the start.
     """
     import networkx as nx
     from scipy.sparse.csgraph import shortest_path
 
     if len(states) < 3:
-        return np.asarray(np.arange(len(states))[:, None] * np.array([_STEP, 0.0]))
+        return np.asarray(np.arange(len(states))[:, None] * np.array([_STEP_PX, 0.0]))
     row = {state: number for number, state in enumerate(states)}
     a, b = np.array([(row[s], row[t]) for s, t in part.edges]).T
     angles = rot.angle(orientations[a], orientations[b])
@@ -182,7 +183,7 @@ def _place_component(part: nx.Graph, states: Sequence[int], orientations: Floats
     )
     places = np.array([layout[state] for state in states])
     apart = np.linalg.norm(places[a] - places[b], axis=1)
-    places *= _STEP / max(float(np.median(apart)), 1e-9)
+    places *= _STEP_PX / max(float(np.median(apart)), 1e-9)
     # The longest extent lies across the page.
     across = np.linalg.svd(places - places.mean(axis=0), full_matrices=False)[2]
     return np.asarray(places @ across.T, dtype=np.float64)
@@ -203,27 +204,22 @@ def _separate(places: Floats, radii: Floats, gap: float) -> Floats:
 
 
 def _place_names(places: Floats, radii: Floats, names: Sequence[str]) -> list[Point | None]:
-    """Place each name right, left, below or above its circle, where it covers no circle and no other name.
+    """Place each name right, left, below or above its circle, covering no circle and no other name.
 
-    Larger circles choose first.
+    Larger circles come first.
 
     Returns:
         For each name the middle of its left edge, pixels; None if there is no room.
     """
-    boxes = np.concatenate([places - radii[:, None], places + radii[:, None]], axis=1)  # left, top, right, bottom
+    labels = Labels(places, radii[:, None])
     places_of_names: list[Point | None] = [None] * len(names)
     for number in np.argsort(-radii, kind="stable"):
-        (x, y), r, long, half = places[number], radii[number] + 3.0, _long(names[number]), 0.5 * LETTERS + 1.0
-        for left, middle in (
-            *((x + r, y), (x - r - long, y), (x - 0.5 * long, y + r + half), (x - 0.5 * long, y - r - half)),
+        (x, y), r, width, half = places[number], radii[number] + 3.0, _width(names[number]), 0.5 * NAME_PX + 1.0
+        candidates = (
+            *((x + r, y), (x - r - width, y), (x - 0.5 * width, y + r + half), (x - 0.5 * width, y - r - half)),
             *((x + 0.7 * r, y - 0.7 * r - half), (x + 0.7 * r, y + 0.7 * r + half)),
-        ):
-            box = np.array([left, middle - half, left + long, middle + half])
-            covers = (boxes[:, :2] < box[2:]).all(axis=1) & (boxes[:, 2:] > box[:2]).all(axis=1)
-            if left > 0.0 and not covers.any():
-                places_of_names[number] = (float(left), float(middle))
-                boxes = np.concatenate([boxes, box[None]])
-                break
+        )
+        places_of_names[number] = labels.place([one for one in candidates if one[0] > 0.0], width, half)
     return places_of_names
 
 
@@ -239,7 +235,8 @@ def _arrow(graph: nx.DiGraph, a: int, b: int, place: dict[int, Floats], radius: 
     chance = probability(graph, a, b)
     start, end = place[a], place[b]
     along = end - start
-    bent = 0.5 * (start + end) + _BEND * np.array([along[1], -along[0]])
+    # It bends to its left, which separates the two directions.
+    bent = 0.5 * (start + end) + 0.14 * np.array([along[1], -along[0]])
     width, size = 0.6 + 2.6 * chance, 5.0 + 4.0 * chance
     into = (end - bent) / max(hypot(*(end - bent)), 1e-9)
     tip = end - (radius[b] + 1.0) * into
@@ -248,8 +245,8 @@ def _arrow(graph: nx.DiGraph, a: int, b: int, place: dict[int, Floats], radius: 
     names = [displayed(graph.nodes[state]["label"]) for state in (a, b)]
     data = graph.edges[a, b]
     return Arrow(
-        (_point(start + radius[a] * away), _point(bent), _point(base)),
-        (_point(tip), _point(base + side), _point(base - side)),
+        (as_point(start + radius[a] * away), as_point(bent), as_point(base)),
+        (as_point(tip), as_point(base + side), as_point(base - side)),
         width,
         0.22 + 0.68 * sqrt(chance),
         f"{names[0]} -> {names[1]}: {chance:.1%}, seen {data['count']:g} times, {data['seconds']:.2f} s",
@@ -269,7 +266,7 @@ def _names(graph: nx.DiGraph, states: Sequence[int]) -> list[str]:
 
 
 def _facts(graph: nx.DiGraph, state: int) -> str:
-    """List the facts about a state: visits, successors, and the parent joint's states that go with it."""
+    """List the facts about a state: visits, successors, and the parent joint's states that occur with it."""
     data = graph.nodes[state]
     lines = [f"{displayed(data['label'])}: {data['visits']:g} visits, stays {probability(graph, state, state):.0%}"]
     after = sorted(
@@ -296,10 +293,6 @@ def _words(graph: nx.DiGraph, left_out: int) -> tuple[str, str]:
     return heading, legend
 
 
-def _point(at: Any) -> Point:
-    return float(at[0]), float(at[1])
-
-
-def _long(name: str) -> float:
+def _width(name: str) -> float:
     """Estimate the width of a name, pixels."""
-    return LETTER * LETTERS * len(name)
+    return LETTER_WIDTH_RATIO * NAME_PX * len(name)

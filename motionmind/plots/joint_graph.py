@@ -15,11 +15,12 @@ from motionmind.body.palette import Colour
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.plots.brush import Brush, Point, mixed
-from motionmind.plots.canvas import LETTERING, Plate, png, svg
-from motionmind.plots.graph_layout import LETTERS, MARGIN, TITLE, Arrow, Circle, lay_out, probability
+from motionmind.plots.canvas import Plate
+from motionmind.plots.graph_layout import HEADING_PX, MARGIN_PX, NAME_PX, Arrow, Circle, lay_out, probability
 from motionmind.plots.marks import Group
+from motionmind.render.lettering import FONT_FAMILY
 from motionmind.render.markup import hexadecimal, xml_text
-from motionmind.render.palette import INK, PAPER, PLOT_PALE, STATE, STAYS, TRANSITION
+from motionmind.render.palette import INK, PAPER, PLOT
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -28,8 +29,7 @@ if TYPE_CHECKING:
 
 GRAPHS = (".svg", ".png", ".graphml", ".gexf")  # suffixes that `draw_joint_graph` writes
 
-_CURVE_POINTS = 17  # of an arrow in a PNG
-_HALO = 2.0  # width of the paper around words of a PNG, pixels
+_PNG_HALO_PX = 2.0  # width of the paper around text
 
 
 def draw_joint_graph(path: FilePath, engine: Engine, joint: str) -> nx.DiGraph:
@@ -55,7 +55,7 @@ def draw_joint_graph(path: FilePath, engine: Engine, joint: str) -> nx.DiGraph:
     >>> graph.graph["joint"]
     'left_hip'
     """
-    # Imported here, for numba is slow to import, and graphs that were made already are drawn without it.
+    # Imported here: numba is slow to import, and drawing an existing graph does not need it.
     from motionmind.tween.engine import Engine
 
     check_path("path", path)
@@ -79,8 +79,7 @@ def write_graph(path: FilePath, graph: nx.DiGraph) -> None:
     if suffix not in GRAPHS:
         raise MotionMindError(f"{path}: a graph is written as one of {', '.join(GRAPHS)}")
     if suffix in (".svg", ".png"):
-        plate = graph_plate(graph)
-        write_atomically(path, svg(plate).encode() if suffix == ".svg" else png(plate))
+        write_atomically(path, graph_plate(graph).encode(suffix))
         return
     import networkx as nx
 
@@ -99,7 +98,7 @@ def graph_plate(graph: nx.DiGraph) -> Plate:
         layout.heading,
         (
             Group(
-                f'fill="none" stroke="{hexadecimal(TRANSITION)}" stroke-linecap="round"',
+                f'fill="none" stroke="{hexadecimal(PLOT.transition)}" stroke-linecap="round"',
                 tuple(_Transition(arrow) for arrow in layout.arrows),
             ),
             *(_State(circle) for circle in layout.circles),
@@ -109,10 +108,10 @@ def graph_plate(graph: nx.DiGraph) -> Plate:
             ),
         ),
         headings=(
-            _Heading((MARGIN, MARGIN), layout.heading, TITLE, INK),
-            _Heading((MARGIN, MARGIN + 20), layout.legend, LETTERS, PLOT_PALE),
+            _Heading((MARGIN_PX, MARGIN_PX), layout.heading, HEADING_PX, INK),
+            _Heading((MARGIN_PX, MARGIN_PX + 20), layout.legend, NAME_PX, PLOT.pale),
         ),
-        style=f'{LETTERING} font-size="{LETTERS}"',
+        style=f'{FONT_FAMILY} font-size="{NAME_PX}"',
     )
 
 
@@ -129,13 +128,13 @@ class _Transition:
         yield (
             f'<g opacity="{arrow.opacity:.2f}"><title>{xml_text(arrow.title)}</title>'
             f'<path d="M{a:.1f} {b:.1f}Q{c:.1f} {d:.1f} {e:.1f} {f:.1f}" stroke-width="{arrow.width:.2f}"/>'
-            f'<polygon points="{head}" fill="{hexadecimal(TRANSITION)}" stroke="none"/></g>'
+            f'<polygon points="{head}" fill="{hexadecimal(PLOT.transition)}" stroke="none"/></g>'
         )
 
     def paint(self, brush: Brush) -> None:
-        ink = mixed(TRANSITION, self.arrow.opacity)
+        ink = mixed(PLOT.transition, self.arrow.opacity)
         a, b, c = map(np.array, self.arrow.curve)
-        shares = np.linspace(0.0, 1.0, _CURVE_POINTS)
+        shares = np.linspace(0.0, 1.0, 17)
         points = np.array([(1.0 - t) ** 2 * a + 2.0 * t * (1.0 - t) * b + t * t * c for t in shares])
         brush.line(points, ink, self.arrow.width)
         brush.polygon(np.array(self.arrow.head), ink)
@@ -154,19 +153,19 @@ class _State:
 
     def svg(self) -> Iterator[str]:
         (x, y), ring = self.circle.at, self.ring
+        radius, fill, stroke = self.circle.radius - 0.5 * ring, hexadecimal(PLOT.state), hexadecimal(PLOT.stays)
         yield (
-            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{self.circle.radius - 0.5 * ring:.2f}" fill="{hexadecimal(STATE)}"'
-            f' stroke="{hexadecimal(STAYS)}" stroke-width="{ring:.2f}"><title>{xml_text(self.circle.title)}</title>'
-            "</circle>"
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.2f}" fill="{fill}" stroke="{stroke}"'
+            f' stroke-width="{ring:.2f}"><title>{xml_text(self.circle.title)}</title></circle>'
         )
 
     def paint(self, brush: Brush) -> None:
-        brush.disc(self.circle.at, self.circle.radius, STATE, STAYS, self.ring)
+        brush.disc(self.circle.at, self.circle.radius, PLOT.state, PLOT.stays, self.ring)
 
 
 @dataclass(frozen=True)
 class _Name:
-    """The name of a state, the middle of its left edge at `at`; its colours are those of its group."""
+    """The name of a state, the middle of its left edge at `at`, in the colours of its group."""
 
     at: Point
     text: str
@@ -176,12 +175,12 @@ class _Name:
         yield f'<text x="{x:.1f}" y="{y:.1f}" dy=".35em" pointer-events="none">{xml_text(self.text)}</text>'
 
     def paint(self, brush: Brush) -> None:
-        brush.text(self.at, self.text, LETTERS, INK, _HALO)
+        brush.text(self.at, self.text, NAME_PX, INK, _PNG_HALO_PX)
 
 
 @dataclass(frozen=True)
 class _Heading:
-    """Words above the picture, the left end of their baseline at `at`."""
+    """Text above the graph, the left end of its baseline at `at`."""
 
     at: Point
     text: str
@@ -190,16 +189,16 @@ class _Heading:
 
     def svg(self) -> Iterator[str]:
         x, y = self.at
-        size = f' font-size="{self.size}"' if self.size != LETTERS else ""
+        size = f' font-size="{self.size}"' if self.size != NAME_PX else ""
         yield f'<text x="{x:g}" y="{y:g}"{size} fill="{hexadecimal(self.ink)}">{xml_text(self.text)}</text>'
 
     def paint(self, brush: Brush) -> None:
         x, y = self.at
-        brush.text((x, y - 0.35 * self.size), self.text, self.size, self.ink, _HALO)
+        brush.text((x, y - 0.35 * self.size), self.text, self.size, self.ink, _PNG_HALO_PX)
 
 
 def _to_export(graph: nx.DiGraph) -> nx.DiGraph:
-    """Reduce a joint graph to numbers and strings, as files for other programs hold them."""
+    """Reduce a joint graph to numbers and strings, the types that files for other programs hold."""
     import networkx as nx
 
     out = nx.DiGraph(**{key: value for key, value in graph.graph.items() if value is not None})

@@ -1,11 +1,10 @@
-"""Marks of a plate: lines, regions, dots, words and small pictures, each drawn as SVG and as PNG.
+"""Marks of a plate: lines, regions, dots, text and small pictures, each drawn as SVG and as PNG.
 
 Coordinates are pixels of the finished picture, x to the right and y down.
 """
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
@@ -16,15 +15,14 @@ import numpy as np
 
 from motionmind._typing import Floats, Pixels
 from motionmind.body.palette import Colour
-from motionmind.plots.brush import FINE, Anchor, Brush, Point
-from motionmind.render.bspline import path
-from motionmind.render.markup import hexadecimal, xml_text
+from motionmind.plots.brush import N_SUBSAMPLES, Anchor, Brush, Point
+from motionmind.render.bspline import UNITS_PER_PX, path
+from motionmind.render.markup import base64_of, hexadecimal, xml_text
 from motionmind.render.palette import PAPER
 from motionmind.render.trace import Lines
 
-LETTER = 0.54  # approximate width of a letter, by its height
-_UNITS = 10  # of a region's whole numbers to a pixel
-_HALO = 1.5  # width of the paper around words, pixels
+LETTER_WIDTH_RATIO = 0.54  # approximate width of a letter, by its height
+_HALO_PX = 1.5  # width of the paper around text
 
 
 class Mark(Protocol):
@@ -127,9 +125,9 @@ class Region:
         """Yield the region as SVG."""
         x, y = self.corner
         yield (
-            f'<path transform="translate({x:g} {y:g})scale({1 / _UNITS:g})" fill="{hexadecimal(self.fill)}"'
-            f' stroke="{hexadecimal(self.edge)}" stroke-width="{self.width * _UNITS:g}"'
-            f' d="{path(self.outline, _UNITS)}"{_titled("path", self.title)}'
+            f'<path transform="translate({x:g} {y:g})scale({1 / UNITS_PER_PX:g})" fill="{hexadecimal(self.fill)}"'
+            f' stroke="{hexadecimal(self.edge)}" stroke-width="{self.width * UNITS_PER_PX:g}"'
+            f' d="{path(self.outline, UNITS_PER_PX)}"{_titled("path", self.title)}'
         )
 
     def paint(self, brush: Brush) -> None:
@@ -175,11 +173,11 @@ class Dot:
 
 @dataclass(frozen=True)
 class Words:
-    """A line of words.
+    """A line of text.
 
     Attributes:
         at: the point at the middle of its height, and at the start, middle or end of its width as `anchor` says.
-        text: the words.
+        text: the text.
         size: height of its letters, pixels.
         ink: its colour.
         anchor: which part of its width `at` is.
@@ -192,17 +190,17 @@ class Words:
     anchor: Anchor = "start"
 
     def svg(self) -> Iterator[str]:
-        """Yield the words as SVG."""
+        """Yield the text as SVG."""
         x, y = self.at
         yield (
             f'<text x="{x:.1f}" y="{y:.1f}" dy=".35em" font-size="{self.size:g}" text-anchor="{self.anchor}"'
-            f' fill="{hexadecimal(self.ink)}" stroke="{hexadecimal(PAPER)}" stroke-width="{2 * _HALO:g}"'
+            f' fill="{hexadecimal(self.ink)}" stroke="{hexadecimal(PAPER)}" stroke-width="{2 * _HALO_PX:g}"'
             f' paint-order="stroke" pointer-events="none">{xml_text(self.text)}</text>'
         )
 
     def paint(self, brush: Brush) -> None:
-        """Write the words with a brush."""
-        brush.text(self.at, self.text, self.size, self.ink, _HALO, self.anchor)
+        """Write the text with a brush."""
+        brush.text(self.at, self.text, self.size, self.ink, _HALO_PX, self.anchor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +209,7 @@ class Inset:
 
     Attributes:
         at: its upper left corner.
-        pixels: RGBA [FINE h, FINE w, 4].
+        pixels: RGBA [N_SUBSAMPLES h, N_SUBSAMPLES w, 4].
         title: what shows under the pointer.
     """
 
@@ -223,7 +221,7 @@ class Inset:
     def size(self) -> Point:
         """Width and height in the finished picture, pixels."""
         height, width = self.pixels.shape[:2]
-        return width / FINE, height / FINE
+        return width / N_SUBSAMPLES, height / N_SUBSAMPLES
 
     def svg(self) -> Iterator[str]:
         """Yield the picture as SVG."""
@@ -248,4 +246,4 @@ def _png_base64(pixels: Pixels) -> str:
 
     data = BytesIO()
     Image.fromarray(pixels).save(data, "PNG", optimize=True)
-    return b64encode(data.getvalue()).decode("ascii")
+    return base64_of(data.getvalue())

@@ -1,9 +1,9 @@
 """A variation on its attractor: both trajectories, the sites of postures, and their cells.
 
 A point of the flow belongs to the site that is nearest in all coordinates, or that Dabby's mapping gives. The Voronoi
-diagram of the sites projected to the page is a different partition, in which a point seen in one cell may belong to
-another. So cells are drawn where the map is used: on the attractor itself. It lies in thin sheets; as with any surface,
-the one nearest to the viewer is seen.
+diagram of the sites projected to the page is a different partition: a point in one of its cells may belong to another
+site. So the picture shows the cells where the map applies, on the attractor. Of its thin sheets, the one nearest to the
+viewer shows.
 """
 
 from __future__ import annotations
@@ -25,12 +25,9 @@ from motionmind.variation.course import Course
 from motionmind.variation.review import Cut, Seam
 from motionmind.variation.variation import Variation
 
-MOST = 10_000  # postures of a piece or of a variation, at most: a picture has no room for more cells
-MOST_STEPS = 200_000  # steps of a trajectory, at most: each is a line
-SHEETS = 2_000_000  # steps of the trajectory that fills the attractor
-_USUAL = {"lorenz": ("x", "z"), "chua": ("x", "z")}  # coordinates that show a flow best, if not its first two
-_SOFT = 4.0  # pixels: finer details of the attractor's outline are chance
-_GAP = 3  # pixels: narrower gaps (half widths) between strands of the trajectory are none of the attractor's
+MAX_CELLS = 10_000  # postures of a piece or of a variation: a picture has no room for more
+MAX_STEPS = 200_000  # of a trajectory: each is a line
+N_SHEET_STEPS = 2_000_000  # of the trajectory that fills the attractor
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +35,7 @@ class Portrait:
     """A variation on its attractor.
 
     Attributes:
-        variation: the variation, with those edits only that come before any that moved postures.
+        variation: the variation, with its edits up to the first that moves postures.
         course: the course of its trajectories.
         flow: the flow.
         every: integration steps from one posture to the next.
@@ -65,7 +62,7 @@ class Portrait:
 
     @property
     def order(self) -> Ints:
-        """The posture of the piece at each point [L]: that of its cell, or under limits one that is near."""
+        """The posture of the piece at each point [L]: that of its cell or, under limits, of a cell nearby."""
         return self.variation.first_order
 
     def postures_at(self, points: Floats) -> Ints:
@@ -74,8 +71,7 @@ class Portrait:
 
     @property
     def parting(self) -> int | None:
-        """The first point at which it jumps while the piece continues, 0 if it begins elsewhere; None if it follows the
-        piece to its end."""
+        """The first point at which the variation leaves the piece, 0 if it begins elsewhere; None if it never does."""
         first = 0 if self.order[0] else min(self.jumps, default=len(self.sites))
         return first if first < len(self.sites) else None
 
@@ -88,7 +84,8 @@ class Portrait:
     def axes(self) -> tuple[int, int, tuple[int, ...]]:
         """Indices of the coordinates shown to the right and up, and of those left out, at least one."""
         names = list(self.flow.dimensions)
-        across, up = (names.index(name) for name in _USUAL.get(self.flow.name, names[:2]))
+        best = {"lorenz": ("x", "z"), "chua": ("x", "z")}.get(self.flow.name, names[:2])
+        across, up = (names.index(name) for name in best)
         return across, up, tuple(i for i in range(len(names)) if i not in (across, up))
 
     def seen(self, points: Floats) -> Floats:
@@ -101,8 +98,8 @@ class Portrait:
 
     @cached_property
     def sheets(self) -> Floats:
-        """Points all over the attractor, along one trajectory [SHEETS, d]."""
-        return trajectory(self.flow, self.piece[-1], count=SHEETS, every=1, step=self.course.step, transient=0)
+        """Points all over the attractor, along one trajectory [N_SHEET_STEPS, d]."""
+        return trajectory(self.flow, self.piece[-1], count=N_SHEET_STEPS, every=1, step=self.course.step, transient=0)
 
     def cells(self, corner: Floats, scale: float, width: int, height: int) -> Int16s:
         """Find the posture whose cell each pixel is in.
@@ -120,13 +117,14 @@ class Portrait:
         across, up, left_out = self.axes
         along = self.sheets[:, [across, up, *left_out]]
         along[:, :2] = (along[:, :2] - corner) * [scale, -scale]
-        y, x = np.mgrid[-_GAP : _GAP + 1, -_GAP : _GAP + 1]
-        disc = y * y + x * x <= _GAP * _GAP
+        gap = 3  # pixels: half the width of the widest gap between strands that belongs to the attractor
+        y, x = np.mgrid[-gap : gap + 1, -gap : gap + 1]
+        disc = y * y + x * x <= gap * gap
         hidden = _nearest(along, self._towards, width, height)
-        hidden = _spread(hidden, self._towards, np.argwhere(disc) - _GAP)
+        hidden = _spread(hidden, self._towards, np.argwhere(disc) - gap)
         covered = binary_erosion(~np.isnan(hidden[..., 0]), disc)
-        # Few strands of the trajectory reach the fringe, which is smoothed to look like the attractor's.
-        covered = (gaussian_filter(covered.astype(np.float32), _SOFT) > 0.5) & ~np.isnan(hidden[..., 0])
+        # Few strands of the trajectory reach the fringe; details of its outline below 4 pixels are chance.
+        covered = (gaussian_filter(covered.astype(np.float32), 4.0) > 0.5) & ~np.isnan(hidden[..., 0])
         rows, columns = np.nonzero(covered)
         at = np.empty((len(rows), along.shape[1]))
         at[:, across], at[:, up] = (corner + (np.stack([columns, rows], axis=1) + 0.5) / [scale, -scale]).T
@@ -145,34 +143,32 @@ class Portrait:
 def portrait_of(variation: Variation) -> Portrait:
     """Compute a variation's trajectories again from its course.
 
-    The first edit that moves postures and all later ones are left out, since they follow no trajectory.
+    The first edit that moves postures, and all later ones, are left out: they follow no trajectory.
 
     Args:
         variation: the variation.
 
     Raises:
-        MotionMindError: it follows no trajectory, its flow is not one of `motionmind.chaos.flows`, its course is
-            invalid, its trajectories give a different order on this machine, or it has too many postures to draw.
+        MotionMindError: it follows no trajectory, its flow is unknown (see `motionmind.chaos.flows`), its course is
+            invalid, its trajectories give another order on this machine, or it has too many postures to draw.
     """
     course = variation.course
     if course is None or (variation.control is not None and variation.control.is_random):
-        raise MotionMindError(
-            f"the order of a variation by {variation.by} is random, and follows no trajectory that could be drawn"
-        )
+        raise MotionMindError(f"a variation by {variation.by} is random, and has no trajectory to draw")
     most = max(len(variation.piece), len(variation.order))
-    if most > MOST:
-        raise MotionMindError(f"a picture of an attractor shows {MOST} postures at most, not {most}")
-    if most * (course.skip + 1) > MOST_STEPS:
+    if most > MAX_CELLS:
+        raise MotionMindError(f"a picture of an attractor shows {MAX_CELLS} postures at most, not {most}")
+    if most * (course.skip + 1) > MAX_STEPS:
         raise MotionMindError(
-            f"a picture of an attractor shows {MOST_STEPS} steps at most, not {most * (course.skip + 1)}: "
+            f"a picture of an attractor shows {MAX_STEPS} steps at most, not {most * (course.skip + 1)}: "
             f"{most} postures, {course.skip + 1} steps each"
         )
     variation = replace(variation, edits=tuple(takewhile(lambda edit: not isinstance(edit, Cut), variation.edits)))
     flow, every = find_flow(course.flow, **course.parameters), course.skip + 1
     if course.skip < 0 or len(course.nudge) != len(flow.start):
         raise MotionMindError(
-            f"a course of {flow.name} has a nudge of {len(flow.start)} numbers and skips 0 points or more, "
-            f"not {len(course.nudge)} numbers and {course.skip} points"
+            f"a course of {flow.name} needs a nudge of {len(flow.start)} numbers and a skip of 0 or more, "
+            f"not {len(course.nudge)} numbers and {course.skip}"
         )
     piece = trajectory(
         flow,
@@ -189,8 +185,8 @@ def portrait_of(variation: Variation) -> Portrait:
     portrait = Portrait(variation, course, flow, every, piece, other)
     if not np.array_equal(portrait.postures_at(portrait.points), variation.order):
         raise MotionMindError(
-            f"the trajectories of {flow.label} give another order here than this variation has: it was made by another "
-            "flow of that name, or where numbers round otherwise; vary the piece anew to see it"
+            f"the trajectories of {flow.label} give another order here than this variation has: it comes from another "
+            "flow of that name, or from a machine that rounds otherwise; vary the piece again to draw it"
         )
     return portrait
 

@@ -1,4 +1,4 @@
-"""The shape of any skeleton's body: a person's, or limbs that taper."""
+"""The body of any skeleton: a person's, or tapered limbs."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import numpy as np
 from motionmind.body.human import human23
 from motionmind.body.mirror import MIDDLE, sides_of
 from motionmind.body.skeleton import Skeleton
-from motionmind.render.body_solids import BodyShape, Cone, extent, joint_frames, place_of
+from motionmind.render.body_solids import BodyShape, Cone, as_point, extent, joint_frames
 from motionmind.render.person import PersonShape
 
 
 def shape_of(skeleton: Skeleton) -> BodyShape:
     """Build the body of any skeleton.
 
-    It is a person's if the skeleton contains human23's tree, whatever joints lie between and beyond; otherwise each
-    bone becomes a tapered limb.
+    A skeleton that contains human23's tree, with or without further joints, gets a person's body; any other gets a
+    tapered limb for each bone.
 
     Args:
-        skeleton: the skeleton; its lengths, metres, set those of the body.
+        skeleton: the skeleton, in metres.
     """
     return PersonShape(skeleton).build() if _is_person(skeleton) else _creature(skeleton)
 
@@ -45,7 +45,7 @@ def _creature(skeleton: Skeleton) -> BodyShape:
         levels[parent] = max(levels[parent], levels[joint] + 1)
     paints, centre = sides_of(skeleton), (0.0, 0.0, 0.0)
     radii = size * (0.008 + 0.006 * np.minimum(levels, 4))
-    radii[[paint == MIDDLE for paint in paints]] *= 1.5  # a trunk is thicker than its legs
+    radii[[paint == MIDDLE for paint in paints]] *= 1.5  # a thicker trunk
     cones = [
         Cone(skeleton.names[parent], paints[joint], parent, centre, radii[joint], joint, centre, radii[joint])
         for joint, parent in enumerate(skeleton.parents)
@@ -53,7 +53,7 @@ def _creature(skeleton: Skeleton) -> BodyShape:
     ]
     cones += [
         Cone(
-            skeleton.names[joint], paints[joint], joint, centre, radii[joint], joint, place_of(tip), 0.6 * radii[joint]
+            skeleton.names[joint], paints[joint], joint, centre, radii[joint], joint, as_point(tip), 0.6 * radii[joint]
         )
         for joint, tip in enumerate(skeleton.tips)
         if tip.any() or len(skeleton) == 1

@@ -1,4 +1,4 @@
-"""The volume of a body as solids: round cones and ellipsoids fixed to its joints. It knows no pixels."""
+"""The volume of a body as solids: round cones and ellipsoids fixed to its joints; no pixels."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.render.solids import Cones, Ellipsoids
 
-Place = tuple[float, float, float]
+Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Cone:
     """A round cone from one frame to another.
 
     Attributes:
-        part: the part of the body, as "left_foot"; no line is drawn between solids of one part.
+        part: the body part, such as "left_foot"; no line separates solids of one part.
         paint: a key of `palette.COLOURS`.
         a_frame, b_frame: indices of the frames that carry its ends.
         a, b: centres of its end balls, metres, in those frames' axes.
@@ -45,10 +45,10 @@ class Cone:
     part: str
     paint: str
     a_frame: int
-    a: Place
+    a: Point
     a_radius: float
     b_frame: int
-    b: Place
+    b: Point
     b_radius: float
 
 
@@ -66,8 +66,8 @@ class Ball:
     part: str
     paint: str
     frame: int
-    centre: Place
-    radii: Place
+    centre: Point
+    radii: Point
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ class BodyShape:
         frames: the axes that carry the solids.
         cones, balls: the solids.
         size: the body's scale; 1 for a person 1.70 m tall.
-        masses: each part's share of the body's mass; empty where unknown.
+        masses: share of the body's mass, by body part; empty if unknown.
     """
 
     skeleton: Skeleton
@@ -96,7 +96,7 @@ class BodyShape:
 
     @cached_property
     def parts(self) -> tuple[str, ...]:
-        """The part that each solid belongs to [N]."""
+        """The body part of each solid [N]."""
         return tuple([cone.part for cone in self.cones] + [ball.part for ball in self.balls])
 
     @cached_property
@@ -105,7 +105,7 @@ class BodyShape:
         return tuple([cone.paint for cone in self.cones] + [ball.paint for ball in self.balls])
 
     def solids(self, rotations: Floats, root: Floats) -> tuple[Cones, Ellipsoids]:
-        """Place the solids in the world.
+        """Point the solids in the world.
 
         Args:
             rotations: unit quaternions x, y, z, w, local to the parent [..., J, 4].
@@ -120,7 +120,7 @@ class BodyShape:
         origin = joints[..., places, :].mean(axis=-2)
         axes = rot.slerp(orientations[..., turns[:, 0], :], orientations[..., turns[:, 1], :], 0.5)
 
-        def to_world(frames: list[int], points: list[Place]) -> Floats:
+        def to_world(frames: list[int], points: list[Point]) -> Floats:
             local = np.array(points).reshape(-1, 3)
             return np.asarray(origin[..., frames, :] + rot.mul_vec(axes[..., frames, :], local))
 
@@ -140,7 +140,7 @@ class BodyShape:
     def centre_of_mass(self, cones: Cones, balls: Ellipsoids) -> Floats:
         """Compute the centre of mass [..., 3] of a body whose solids `solids` placed, metres.
 
-        A person's parts have the masses of people's, each part of even density; any other body is of even density.
+        A person's body parts have human masses, each of uniform density; any other body has uniform density.
 
         Args:
             cones, balls: the body's solids in the world, metres.
@@ -154,16 +154,16 @@ class BodyShape:
 
 
 def joint_frames(skeleton: Skeleton) -> tuple[Frame, ...]:
-    """Return one frame a joint, in the order of the joints [J]."""
+    """Return the frame of each joint [J]."""
     return tuple(Frame((joint, joint), (joint, joint)) for joint in range(len(skeleton)))
 
 
 def extent(skeleton: Skeleton) -> float:
-    """Return the greatest side of the skeleton's bounding box at rest, metres; 1 if all joints coincide."""
+    """Return the longest side of the skeleton's bounding box at rest, metres; 1 if all joints coincide."""
     return float(np.ptp(skeleton.rest, axis=0).max()) or 1.0
 
 
-def place_of(point: Floats) -> Place:
+def as_point(point: Floats) -> Point:
     """Return a point [3] as a tuple."""
     x, y, z = (float(number) for number in point)
     return x, y, z

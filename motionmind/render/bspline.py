@@ -1,7 +1,7 @@
 """Smooth lines as quadratic B-splines with few control points, and as the data of SVG paths.
 
-SVG can write such a spline as the middles of its control polygon's sides alone: each control point is the one before
-mirrored at the middle between them, as the command `t` means.
+SVG needs only the midpoints of the control polygon's sides: its command `t` mirrors the previous control point at the
+midpoint to get the next one.
 """
 
 from __future__ import annotations
@@ -13,10 +13,9 @@ from motionmind._typing import Bools, Floats, Indices
 from motionmind.jit import jit
 from motionmind.render.trace import Lines
 
-_STRAIGHT = 40.0  # samples between a spline's points where it is straight
-_CURVED, _BENT = 0.06, 0.2  # squared points a sample where it bends, per curvature and per its square
-_AROUND = 6  # samples before and after a point from which its bend is measured
-_SWEEPS = 4  # after which the control points are right to a hundredth
+UNITS_PER_PX = 10  # of the whole numbers in the paths of files
+
+_N_AROUND = 6  # points before and after a point, from which its bend is measured
 
 
 def path(lines: Lines, scale: float, start: NDArray[np.integer] | tuple[int, int] = (0, 0)) -> str:
@@ -44,28 +43,30 @@ def path(lines: Lines, scale: float, start: NDArray[np.integer] | tuple[int, int
 
 @jit
 def _knots(points: Floats, starts: Indices, closed: Bools) -> tuple[Floats, Indices]:
-    """Fit quadratic B-splines to lines; return control points [M, 2] and the first one of each line, and M [K + 1].
+    """Fit quadratic B-splines to lines, with more control points where a line bends more.
 
-    The more a line bends, the denser they are.
+    Returns:
+        Control points [M, 2]; the index of the first one of each line, and M [K + 1].
     """
     knots = np.empty((2 * len(points) + 6 * len(closed), 2))
     firsts = np.zeros(len(starts), dtype=np.intp)
     for line in range(len(closed)):
         one = points[starts[line] : starts[line + 1]]
         whole = closed[line]
-        spread = _spread(one, whole)
-        intervals = max(int(np.ceil(spread[-1])), 6 if whole else 1)
+        needed = _points_needed(one, whole)
+        intervals = max(int(np.ceil(needed[-1])), 6 if whole else 1)
         count = intervals if whole else intervals + 1
         through = np.empty((count, 2))
         at = 0
         for number in range(count):
-            target = spread[-1] * number / intervals
-            while at + 2 < len(spread) and spread[at + 1] < target:
+            target = needed[-1] * number / intervals
+            while at + 2 < len(needed) and needed[at + 1] < target:
                 at += 1
-            share = min((target - spread[at]) / max(spread[at + 1] - spread[at], 1e-12), 1.0)
+            share = min((target - needed[at]) / max(needed[at + 1] - needed[at], 1e-12), 1.0)
             through[number] = one[at] + share * (one[(at + 1) % len(one)] - one[at])
         control = through.copy()
-        for _ in range(_SWEEPS):  # solves (before + 6 control + after) / 8 = through, where the spline passes
+        # Solves (before + 6 control + after) / 8 = through, where the spline passes: 4 sweeps, to 1 % of a sample.
+        for _ in range(4):
             for number in range(0 if whole else 1, count if whole else count - 1):
                 before, after = control[number - 1], control[(number + 1) % count]
                 control[number] = (8.0 * through[number] - before - after) / 6.0
@@ -75,13 +76,16 @@ def _knots(points: Floats, starts: Indices, closed: Bools) -> tuple[Floats, Indi
 
 
 @jit
-def _spread(one: Floats, whole: bool) -> Floats:
-    """Count the spline points that a line needs from its start to each of its points, and to its end, as fractions."""
+def _points_needed(one: Floats, whole: bool) -> Floats:
+    """Return how many spline points (not whole) a line needs from its start to each of its points, and to its end.
+
+    `whole` tells whether the line [N, 2] is closed.
+    """
     count = len(one)
     sides = count if whole else count - 1
     bends = np.empty(sides)
     for at in range(sides):
-        a, b, c = at - _AROUND, at, at + _AROUND
+        a, b, c = at - _N_AROUND, at, at + _N_AROUND
         if whole:
             a, c = a % count, c % count
         else:
@@ -90,12 +94,13 @@ def _spread(one: Floats, whole: bool) -> Floats:
         turn = abs(np.arctan2(first[0] * second[1] - first[1] * second[0], first[0] * second[0] + first[1] * second[1]))
         length = 0.5 * (np.hypot(first[0], first[1]) + np.hypot(second[0], second[1]))
         bend = turn / max(length, 1e-12)
-        bends[at] = np.sqrt(_BENT * bend * bend + _CURVED * bend + 1.0 / _STRAIGHT**2)
-    spread = np.zeros(sides + 1)
+        # Spline points a sample: one in 40 where the line is straight; their square grows with the bend.
+        bends[at] = np.sqrt(0.2 * bend * bend + 0.06 * bend + 1.0 / 40.0**2)
+    needed = np.zeros(sides + 1)
     for at in range(sides):
         density = 0.0
-        for near in range(at - _AROUND, at + _AROUND + 1):
-            density += bends[near % sides if whole else min(max(near, 0), sides - 1)] / (2 * _AROUND + 1)
+        for near in range(at - _N_AROUND, at + _N_AROUND + 1):
+            density += bends[near % sides if whole else min(max(near, 0), sides - 1)] / (2 * _N_AROUND + 1)
         ahead = one[(at + 1) % count] - one[at]
-        spread[at + 1] = spread[at] + density * np.hypot(ahead[0], ahead[1])
-    return spread
+        needed[at + 1] = needed[at] + density * np.hypot(ahead[0], ahead[1])
+    return needed

@@ -1,4 +1,4 @@
-"""The camera of a film: parallel projection, and a picture that takes in all of a path."""
+"""The camera of a film: parallel projection, and a picture that shows a whole path."""
 
 from __future__ import annotations
 
@@ -10,22 +10,17 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.render.depth_buffer import DepthBuffer
-from motionmind.render.solids import Cones, Ellipsoids
+from motionmind.render.solids import Cones, Ellipsoids, bounding_box
 from motionmind.render.view import View, to_view
 
 Corner = tuple[int, int]
 
-SMOOTH = 2  # samples a pixel, each way
-# Shares of the picture's height:
-_MARGIN = 0.06  # the free edge around the body
-_TALL = 0.80  # the largest extent of a body, which leaves room for its path
-_FLAT = 0.6  # the least height of a picture, by the height that `aim` is given
-_WIDE = 2.0  # the greatest width of a picture
+SAMPLES_PER_PX = 2  # along each side
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A view of the world and the picture taken of it.
+    """A view of the world, and the extent of its picture.
 
     Attributes:
         view: the direction it looks from.
@@ -62,7 +57,7 @@ class Camera:
 
         Args:
             cones, balls: solids [..., N, 3] in the world, metres.
-            middle: the point of the world [3] whose z becomes 0, from which haze counts.
+            middle: the point of the world [3], metres, that gets z = 0: the origin of haze.
         """
         towards = np.array(self.view.towards)
         return to_view(cones, balls, self.view, self.origin + towards * (towards @ (middle - self.origin)))
@@ -75,19 +70,18 @@ class Camera:
             around: margin, pixels of the picture.
 
         Returns:
-            The buffer's upper left corner in the picture, x and y in pixels; and the buffer, `SMOOTH` samples a pixel.
+            The buffer's upper left corner in the picture, x and y in pixels; and the buffer, with `SAMPLES_PER_PX`.
         """
-        low, high = np.concatenate([cones.reach(), balls.reach()], axis=-2)[..., :2]
-        (left, bottom), (right, top) = low.min(axis=0), high.max(axis=0)
+        (left, bottom), (right, top) = bounding_box(cones, balls)[:, :2]
         x, y = (floor(edge * self.scale) - around for edge in (left - self.left, self.top - top))
         after_x, after_y = (ceil(edge * self.scale) + around for edge in (right - self.left, self.top - bottom))
-        width, height = SMOOTH * (after_x - x), SMOOTH * (after_y - y)
+        width, height = SAMPLES_PER_PX * (after_x - x), SAMPLES_PER_PX * (after_y - y)
         place = self.left + x / self.scale, self.top - y / self.scale
-        return (x, y), DepthBuffer(*place, width, height, SMOOTH * self.scale)
+        return (x, y), DepthBuffer(*place, width, height, SAMPLES_PER_PX * self.scale)
 
 
 def aim(view: View, origin: Floats, boxes: Floats, points: Floats, least: float, size: int, strip: int) -> Camera:
-    """Aim a camera so that the picture takes in all of a path, at the largest scale that fits.
+    """Aim a camera at a whole path, at the largest scale that fits.
 
     A long path first widens the picture, up to twice its height, and only then shrinks the body.
 
@@ -95,19 +89,20 @@ def aim(view: View, origin: Floats, boxes: Floats, points: Floats, least: float,
         view: the direction to look from.
         origin: a point of the world on the floor [3], metres.
         boxes: least and greatest x and y of the body in each frame [F, 2, 2] in the view's axes, metres.
-        points: further points to take in [P, 2], in the same axes.
-        least: extent that a body is scaled as if it had, if it is smaller, metres.
+        points: further points to show [P, 2], in the same axes.
+        least: extent at least assumed of the body, metres.
         size: height of the picture, pixels; a flat path makes it lower.
-        strip: height at its lower edge reserved for words, pixels.
+        strip: height of the strip for text at the lower edge, pixels.
     """
     corners = np.concatenate([boxes.reshape(-1, 2), points])
     low, high = corners.min(axis=0), corners.max(axis=0)
     body = max(float((boxes[:, 1] - boxes[:, 0]).max()), least)
-    margin, (wide, tall) = round(_MARGIN * size), high - low
-    room, widest = size - strip - 2 * margin, _WIDE * size - 2 * margin
-    scale = float(min(_TALL * size / body, room / tall, widest / wide))
-    width = min(max(ceil(wide * scale) + 2 * margin, round(_TALL * size)), round(_WIDE * size))
-    height = min(max(ceil(tall * scale) + 2 * margin + strip, round(_FLAT * size)), size)
+    margin, (wide, tall) = round(0.06 * size), high - low
+    body_size, max_width = 0.80 * size, 2.0 * size  # a body of 80 % of the height leaves room for its path
+    room, widest = size - strip - 2 * margin, max_width - 2 * margin
+    scale = float(min(body_size / body, room / tall, widest / wide))
+    width = min(max(ceil(wide * scale) + 2 * margin, round(body_size)), round(max_width))
+    height = min(max(ceil(tall * scale) + 2 * margin + strip, round(0.6 * size)), size)
     width, height = width + width % 2, height + height % 2  # films store colours at half the resolution
     x, y = 0.5 * (low + high)
     left, top = float(x - 0.5 * width / scale), float(y + 0.5 * (height - strip) / scale)

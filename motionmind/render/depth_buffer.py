@@ -1,7 +1,7 @@
-"""The depth buffer: which solid each pixel shows. It knows no bodies.
+"""The depth buffer: which solid each pixel shows; no bodies.
 
-Solids are not painted one over another from the farthest on: limbs that cross or pass through each other have no
-order, so the nearest is decided pixel by pixel.
+Solids cannot be painted back to front: limbs that cross or pass through each other have no order, so the nearest is
+found pixel by pixel.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class DepthBuffer:
         self._place = float(left), float(top), float(scale)
 
     def clear(self) -> None:
-        """Empty the buffer for the next picture, which is faster than to allocate another."""
+        """Empty the buffer for the next picture; faster than a new one."""
         self.solid.fill(EMPTY)
         self.depth.fill(-np.inf)
 

@@ -14,11 +14,7 @@ from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.palette import BRIDGED, COLOURS, INK, INSERTED
 from motionmind.render.solids import Cones, Ellipsoids
 
-STEP = 0.016  # metres a part must stand before another for a line between them, on a body 1.70 m tall
-_HAZE = 0.30  # share of white at the farthest
-_DEEP = 0.45  # metres before and behind the root over which haze grows, on a body 1.70 m tall
-_STANDS_OUT = 1.2  # radius of a bridged joint's ball, by the body's own radius there
-_LEAST_BALL = 0.050  # its least radius, metres, on a body 1.70 m tall
+DEPTH_STEP_M = 0.016  # how far a part stands before another with a line between them, on a body 1.70 m tall
 
 
 def draw(buffer: DepthBuffer, cones: Cones, balls: Ellipsoids, only: frozenset[int] | None = None) -> None:
@@ -52,8 +48,8 @@ def inserted_colours(body: BodyShape) -> Floats:
 def bridge_balls(body: BodyShape, joints: Floats, which: Bools) -> Ellipsoids:
     """Build the balls that mark bridged joints, larger than the body is there.
 
-    Drawn after the body's own balls, as `balls.joined(bridge_balls(...))`, they have the numbers after those of
-    `BodyShape.parts`, by which `colour` knows them.
+    Append them to the body's own balls, `balls.joined(bridge_balls(...))`: `colour` knows them by their numbers, which
+    follow those of `BodyShape.parts`.
 
     Args:
         body: the body.
@@ -66,7 +62,7 @@ def bridge_balls(body: BodyShape, joints: Floats, which: Bools) -> Ellipsoids:
 
 @lru_cache(maxsize=8)
 def _girths(body: BodyShape) -> Floats:
-    """Compute the radii [J], metres, of balls that stand out from the solids around the joints."""
+    """Compute the radii [J], metres, of balls that stand out from the solids around the joints: 5 cm at least."""
     skeleton, rest = body.skeleton, np.tile(rot.IDENTITY, (len(body.skeleton), 1))
     cones, balls = body.solids(rest, np.zeros(3))
     joints = skeleton.positions(rest, np.zeros(3))[:, None]
@@ -78,12 +74,13 @@ def _girths(body: BodyShape) -> Floats:
     in_balls = np.linalg.norm(np.linalg.inv(balls.axes) @ (joints - balls.centre)[..., None], axis=(-2, -1)) < 1.0
     thin = np.linalg.norm(balls.axes, axis=-2).min(axis=-1)
     radii = np.concatenate([in_cones * thick, in_balls * thin], axis=-1).max(axis=-1)
-    return np.asarray(np.maximum(_STANDS_OUT * radii, _LEAST_BALL * body.size))
+    return np.asarray(np.maximum(1.2 * radii, 0.050 * body.size))
 
 
 def haze(body: BodyShape) -> tuple[float, float, float]:
     """Return the depths where haze begins and is full, metres in the viewer's axes, and its share of white there."""
-    return _DEEP * body.size, -_DEEP * body.size, _HAZE
+    depth = 0.45 * body.size  # metres, before and behind the root
+    return depth, -depth, 0.30
 
 
 def colour(
@@ -91,13 +88,13 @@ def colour(
 ) -> Pixels:
     """Paint a depth buffer before a background.
 
-    Farther surfaces are paler. A line runs around each part where it stands before another, and lies on the farther
-    one, so that the nearer keeps its shape. Solids numbered beyond the body's are balls around bridged joints.
+    Farther surfaces are paler. Where a body part stands before another, a line around it lies on the farther one, so
+    the nearer keeps its shape. Solids numbered beyond the body's are balls around bridged joints.
 
     Args:
         buffer: the depth buffer [H, W].
         body: the body drawn in it.
-        background: the picture behind it [H, W, 3], RGB; left as it is.
+        background: the picture behind it [H, W, 3], RGB; unchanged.
         line: width of the lines, pixels.
         paints: RGB of the body's solids [N, 3], 0 to 255; `given_colours(body)` by default.
 
@@ -113,10 +110,12 @@ def colour(
     picture = background.copy()
     ink = np.array(INK, dtype=np.uint8)
     arrays = buffer.solid, buffer.depth, buffer.shade
-    raster.colour(picture, *arrays, colours, parts, haze(body), STEP * body.size, line, ink)
+    raster.colour(picture, *arrays, colours, parts, haze(body), DEPTH_STEP_M * body.size, line, ink)
     return picture
 
 
 def halved(picture: Pixels) -> Pixels:
     """Return a picture [H, W, 3] at half its width and height [H // 2, W // 2, 3], each pixel the mean of four."""
-    return raster.halved(picture)
+    height, width = len(picture) // 2, picture.shape[1] // 2
+    four = picture[: 2 * height, : 2 * width].reshape(height, 2, width, 2, 3).sum(axis=(1, 3), dtype=np.uint16)
+    return np.asarray((four + 2) // 4, dtype=np.uint8)  # 2, to round and not truncate

@@ -1,6 +1,6 @@
 """Films and stills of movement: `.gif` and `.mp4`, and one posture as `.png`.
 
-Frames are drawn as they are encoded, and at most two are held in memory.
+Frames are drawn as they are encoded; memory holds two at most.
 """
 
 from __future__ import annotations
@@ -22,18 +22,11 @@ from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.jit import jit
 from motionmind.render.stage import Stage
-from motionmind.render.timing import HOLD, SLOWEST, USUAL_FRAMES, film_rate, frame_rate, frame_times
+from motionmind.render.timing import HOLD_S, MIN_FPS, N_USUAL_FRAMES, film_rate, frame_rate, frame_times
 
-_GIF_RATE, _GIF_MOST = 25.0, 50.0  # frames a second: at most by default; at most of all, as browsers play it
-_MP4_RATE, _MP4_MOST = 60.0, 120.0
-# Frames times joints of the motion for each frame that an MP4 has besides the usual ones: films of people have as many
-# frames as were recorded, however long.
-_OF_PLACES = 16
-_COLOURS = 255  # of a GIF's palette; one more stands for unchanged pixels
-_SAMPLES = 10  # frames from which the palette is chosen
-_CELLS = 64  # levels of each of red, green and blue that are told apart when the palette is looked up
-_SHIFT = 2  # bits of a byte below such a level
-_QUALITY = 17  # x264's constant rate factor, at which drawn figures show no blocks
+_N_COLOURS = 255  # of a GIF's palette; one more index stands for unchanged pixels
+_SHIFT_BITS = 2  # of each channel that the lookup in the palette drops
+_N_LEVELS = 256 >> _SHIFT_BITS  # of each channel that the lookup tells apart
 
 
 def write_film(
@@ -41,31 +34,33 @@ def write_film(
 ) -> None:
     """Film a motion as `.gif`, which loops and holds its last posture for 0.8 s, or as `.mp4` (H.264).
 
-    The frames include the first and the last posture. A GIF lasts as long as the motion to a hundredth of a second, the
-    hold aside, an MP4 to a frame.
+    The frames include the first and the last posture. The film lasts as long as the motion, a GIF to a hundredth of a
+    second (and the hold), an MP4 to a frame.
 
     Args:
         path: the file.
         motion: the motion, on any skeleton.
         fps: frames a second, from 0.01 to 50 in a GIF, to 120 in an MP4; by default the motion's own (25 if fewer than
-            12), at most 25 in a GIF and 60 in an MP4, or so few that a GIF has 1,000 in all, and an MP4 no more than
-            that and a sixteenth of the motion's frames times joints.
+            12), at most 25 in a GIF and 60 in an MP4, and lower if a GIF would have more than 1,000 frames, or an MP4
+            more than that plus a sixteenth of the motion's frames times joints.
         view: the name of one of `view.VIEWS`.
         size: height of the picture, pixels, from 120 to 2160; a flat movement makes it lower.
         first: number of the motion's first frame in the longer motion that it is a part of.
 
     Raises:
-        MotionMindError: the suffix is another, a number is out of range, there would be more than four times as many
+        MotionMindError: the suffix is neither, a number is out of range, there would be more than four times that many
             frames, the extra for MP4 is not installed, or the file cannot be written.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in {".gif", ".mp4"}:
-        raise MotionMindError(f"{path}: a film is a .gif or an .mp4, not {suffix or 'a name without suffix'}")
-    usual, most = (_GIF_RATE, _GIF_MOST) if suffix == ".gif" else (_MP4_RATE, _MP4_MOST)
-    if fps is not None and not SLOWEST <= fps <= most:
-        raise MotionMindError(f"{path}: a {suffix} has from {SLOWEST:g} to {most:g} frames a second, not {fps:g}")
-    frames = USUAL_FRAMES if suffix == ".gif" else USUAL_FRAMES + len(motion) * len(motion.skeleton) // _OF_PLACES
-    rate = film_rate(motion, min(frame_rate(motion), usual), fps, frames)
+        raise MotionMindError(f"{path}: a film is a .gif or an .mp4, not {suffix or 'a file without suffix'}")
+    # Frames a second, by default and at most: browsers play no GIF faster than 50.
+    usual, most = (25.0, 50.0) if suffix == ".gif" else (60.0, 120.0)
+    if fps is not None and not MIN_FPS <= fps <= most:
+        raise MotionMindError(f"{path}: a {suffix} has from {MIN_FPS:g} to {most:g} frames a second, not {fps:g}")
+    # An MP4 has more, so that a film of a person (23 joints) keeps all recorded frames, however many.
+    more = 0 if suffix == ".gif" else len(motion) * len(motion.skeleton) // 16
+    rate = film_rate(motion, min(frame_rate(motion), usual), fps, N_USUAL_FRAMES + more)
     stage = Stage(motion, frame_times(motion, rate), view=view, size=size, first=first)
     write_atomically(path, gif(stage) if suffix == ".gif" else mp4(stage, rate))
 
@@ -85,10 +80,10 @@ def write_still(path: FilePath, motion: Motion, *, view: str = "quarter", size: 
 def gif(stage: Stage) -> bytes:
     """Encode the film of a stage as a GIF; each frame holds only the box that changed, and in it the changed pixels."""
     palette, height, width = _palette(stage), stage.camera.height, stage.camera.width
-    table = np.full(_CELLS**3, -1, dtype=np.int16)
-    shown = np.full((height, width), _COLOURS, dtype=np.uint8)
+    table = np.full(_N_LEVELS**3, -1, dtype=np.int16)
+    shown = np.full((height, width), _N_COLOURS, dtype=np.uint8)
     parts = [
-        b"GIF89a" + _short(width) + _short(height) + b"\xf7\x00\x00",  # 0xf7: one palette of 256 colours
+        b"GIF89a" + _uint16(width) + _uint16(height) + b"\xf7\x00\x00",  # 0xf7: one palette of 256 colours
         palette.tobytes(),
         b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00",  # loops forever
     ]
@@ -97,15 +92,15 @@ def gif(stage: Stage) -> bytes:
         top, bottom, left, right = _index(picture, palette, table, shown, changed)
         box = Image.fromarray(changed[top:bottom, left:right])
         # Unchanged pixels are transparent, and show the frame before.
-        parts.append(b"\x21\xf9\x04\x05" + _short(hold) + bytes([_COLOURS, 0]))
+        parts.append(b"\x21\xf9\x04\x05" + _uint16(hold) + bytes([_N_COLOURS, 0]))
         parts += GifImagePlugin.getdata(box, (left, top))
     return b"".join([*parts, b";"])
 
 
 def _delays(stage: Stage) -> list[int]:
-    """Return how long each frame is shown, in hundredths of a second; rounding errors do not add up."""
+    """Return how long to show each frame, in hundredths of a second; rounding errors do not add up."""
     marks = np.round(100.0 * (stage.motion.times - stage.motion.times[0])).astype(int)
-    return [*np.diff(marks).tolist(), round(100.0 * HOLD)]
+    return [*np.diff(marks).tolist(), round(100.0 * HOLD_S)]
 
 
 def _palette(stage: Stage) -> Pixels:
@@ -114,19 +109,19 @@ def _palette(stage: Stage) -> Pixels:
     A colour counts by the root of its frequency; otherwise paper and floor would leave no colours for small details.
     """
     special = [np.flatnonzero(kind)[:1] for kind in (stage.motion.inserted(), stage.motion.bridged().any(axis=1))]
-    even = np.linspace(0, len(stage) - 1, _SAMPLES).astype(int)
-    tally = np.zeros((_CELLS**3, 4))
+    even = np.linspace(0, len(stage) - 1, 10).astype(int)
+    tally = np.zeros((_N_LEVELS**3, 4))
     for picture in stage.frames(np.unique(np.concatenate([even, *special])).tolist()):
         _count(picture, tally)
     cells = tally[tally[:, 3] > 0.0]
     colours = np.round(cells[:, :3] / cells[:, 3:]).astype(np.uint8)
     sample = np.repeat(colours, np.ceil(np.sqrt(cells[:, 3])).astype(int), axis=0)
-    quantised = Image.fromarray(sample[None]).quantize(_COLOURS, Image.Quantize.MEDIANCUT, kmeans=1)
-    chosen = np.array(quantised.getpalette(), dtype=np.uint8).reshape(-1, 3)[:_COLOURS]
-    return np.concatenate([chosen, np.zeros((_COLOURS + 1 - len(chosen), 3), dtype=np.uint8)])
+    quantised = Image.fromarray(sample[None]).quantize(_N_COLOURS, Image.Quantize.MEDIANCUT, kmeans=1)
+    chosen = np.array(quantised.getpalette(), dtype=np.uint8).reshape(-1, 3)[:_N_COLOURS]
+    return np.concatenate([chosen, np.zeros((_N_COLOURS + 1 - len(chosen), 3), dtype=np.uint8)])
 
 
-def _short(number: int) -> bytes:
+def _uint16(number: int) -> bytes:
     return number.to_bytes(2, "little")
 
 
@@ -135,7 +130,7 @@ def _count(picture: Pixels, tally: Floats) -> None:
     """Add a picture's pixels [H, W, 3] to the sums of red, green and blue, and the counts, of their cells [C, 4]."""
     for row in picture:
         for r, g, b in row:
-            cell = ((r >> _SHIFT) * _CELLS + (g >> _SHIFT)) * _CELLS + (b >> _SHIFT)
+            cell = ((r >> _SHIFT_BITS) * _N_LEVELS + (g >> _SHIFT_BITS)) * _N_LEVELS + (b >> _SHIFT_BITS)
             tally[cell, 0] += r
             tally[cell, 1] += g
             tally[cell, 2] += b
@@ -162,19 +157,19 @@ def _index(
     top, bottom, left, right = height, 0, width, 0
     for y in range(height):
         for x in range(width):
-            r, g, b = picture[y, x, 0] >> _SHIFT, picture[y, x, 1] >> _SHIFT, picture[y, x, 2] >> _SHIFT
-            cell = (r * _CELLS + g) * _CELLS + b
+            r, g, b = picture[y, x, 0] >> _SHIFT_BITS, picture[y, x, 1] >> _SHIFT_BITS, picture[y, x, 2] >> _SHIFT_BITS
+            cell = (r * _N_LEVELS + g) * _N_LEVELS + b
             if table[cell] < 0:
-                middle = 1 << (_SHIFT - 1)
+                middle = 1 << (_SHIFT_BITS - 1)
                 best = 1 << 30
-                for colour in range(_COLOURS):
-                    dr = palette[colour, 0] - ((r << _SHIFT) + middle)
-                    dg = palette[colour, 1] - ((g << _SHIFT) + middle)
-                    db = palette[colour, 2] - ((b << _SHIFT) + middle)
+                for colour in range(_N_COLOURS):
+                    dr = palette[colour, 0] - ((r << _SHIFT_BITS) + middle)
+                    dg = palette[colour, 1] - ((g << _SHIFT_BITS) + middle)
+                    db = palette[colour, 2] - ((b << _SHIFT_BITS) + middle)
                     apart = dr * dr + dg * dg + db * db
                     if apart < best:
                         best, table[cell] = apart, colour
-            changed[y, x] = _COLOURS
+            changed[y, x] = _N_COLOURS
             if table[cell] != shown[y, x]:
                 shown[y, x] = changed[y, x] = table[cell]
                 top, bottom, left, right = min(top, y), y + 1, min(left, x), max(right, x + 1)
@@ -209,7 +204,7 @@ def mp4(stage: Stage, rate: float) -> bytes:
         except (RuntimeError, OSError) as error:
             raise MotionMindError(f"the MP4 encoder cannot be run: {error}") from error
         if encoder.returncode != 0:
-            lines = log.read_text(errors="replace").strip().splitlines() or ["it says nothing"]
+            lines = log.read_text(errors="replace").strip().splitlines() or ["no message"]
             raise MotionMindError(f"the MP4 encoder failed: {lines[0]}")
         return file.read_bytes()
 
@@ -217,12 +212,12 @@ def mp4(stage: Stage, rate: float) -> bytes:
 def _arguments(stage: Stage, rate: float) -> list[str]:
     """Return the encoder's arguments.
 
-    Colours are converted to BT.709 and declared so; otherwise players guess, and reds turn orange. The number of
-    threads is fixed because the bytes depend on it.
+    Colours are converted to BT.709 and declared so; otherwise players guess, and reds turn orange. A constant rate
+    factor of 17 shows no blocks in drawn figures. The bytes depend on the number of threads, so it is fixed.
     """
     size = f"{stage.camera.width}x{stage.camera.height}"
     raw = f"-f rawvideo -pix_fmt rgb24 -s {size} -r {Fraction(rate).limit_denominator(1001)}"
-    video = f"-c:v libx264 -preset medium -crf {_QUALITY} -tune animation -threads 2"
+    video = "-c:v libx264 -preset medium -crf 17 -tune animation -threads 2"
     colour = "-colorspace bt709 -color_primaries bt709 -color_trc bt709 -color_range tv"
     convert = "-vf scale=out_color_matrix=bt709:out_range=tv,format=yuv420p"
     whole = "-an -movflags +faststart -fflags +bitexact -flags:v +bitexact"
@@ -230,11 +225,11 @@ def _arguments(stage: Stage, rate: float) -> list[str]:
 
 
 def _feed(pipe: IO[bytes] | None, pictures: Iterator[Pixels]) -> None:
-    """Write pictures to the encoder, until it gives up."""
+    """Write pictures to the encoder, until it closes its pipe."""
     assert pipe is not None
     try:
         for picture in pictures:
             pipe.write(picture.tobytes())
         pipe.close()
-    except BrokenPipeError:  # the encoder has given up, and its log says why
+    except BrokenPipeError:  # the encoder failed, and its log says why
         pass

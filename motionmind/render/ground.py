@@ -13,16 +13,14 @@ from motionmind.body.human import human23
 from motionmind.render.camera import Camera, Corner
 from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.figure import draw
-from motionmind.render.palette import GRID, GROUND, PAPER, SHADOW
-from motionmind.render.solids import Cones, Ellipsoids
+from motionmind.render.palette import PAPER, STAGE
+from motionmind.render.solids import Cones, Ellipsoids, bounding_box
 from motionmind.render.view import View, to_view
 
-_APRON = 1.1  # width over which the floor around the path fades into the paper, by the body's height
 # Layers of a shadow: darkness on the floor; then, by the body's height, the height over which it falls by e, and the
-# width of its soft edge. The first layer shows what touches the floor, the second where the body is.
-_LAYERS = ((0.40, 0.06, 0.011), (0.32, 0.40, 0.035))
-_FINE = 110.0  # samples of a shadow over a body's height
-_UNDER = View("from under the floor", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
+# width of its soft edge. The first layer shows contact with the floor, the second where the body is.
+_SHADOW_LAYERS = ((0.40, 0.06, 0.011), (0.32, 0.40, 0.035))
+_FROM_BELOW = View("from under the floor", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +56,7 @@ class Ground:
         """
         self.camera, self.low, self.high = camera, low, high
         self._height = height
-        self.apron = _APRON * height
+        self.apron = 1.1 * height
         self.step = 10.0 ** round(log10(height / human23().height))
 
     def picture(self, line: float) -> Pixels:
@@ -75,23 +73,23 @@ class Ground:
             steps = place / self.step
             off = np.abs(steps - np.round(steps)) * self.step / np.hypot(row[0], row[1])  # pixels from a line's middle
             lines = np.maximum(lines, np.clip(0.5 * line + 0.5 - off, 0.0, 1.0))
-        for ink, share in ((GROUND, opacity), (GRID, opacity * lines)):
+        for ink, share in ((STAGE.ground, opacity), (STAGE.grid, opacity * lines)):
             picture += share[..., None] * (np.array(ink, dtype=np.float32) - picture)
         return np.round(picture).astype(np.uint8)
 
     def shadow(self, cones: Cones, balls: Ellipsoids) -> Shadow:
         """Cast the shadow of solids [N, 3] in the world, metres: darker under what is lower.
 
-        A depth buffer seen from under the floor is softened and mapped onto the floor by an affine map.
+        A depth buffer seen from under the floor is blurred, and an affine map lays it on the floor.
         """
-        camera, soft = self.camera, self._height * max(soft for _, _, soft in _LAYERS)
-        fine = _FINE / self._height
-        cones, balls = to_view(cones, balls, _UNDER, camera.origin)
-        low, high = np.concatenate([cones.reach(), balls.reach()], axis=-2)[..., :2]
-        (left, near), (right, far) = low.min(axis=0) - 3.0 * soft, high.max(axis=0) + 3.0 * soft
+        camera, soft = self.camera, self._height * max(soft for _, _, soft in _SHADOW_LAYERS)
+        fine = 110.0 / self._height  # samples a metre
+        cones, balls = to_view(cones, balls, _FROM_BELOW, camera.origin)
+        low, high = bounding_box(cones, balls)[:, :2]
+        (left, near), (right, far) = low - 3.0 * soft, high + 3.0 * soft
         buffer = DepthBuffer(left, far, ceil((right - left) * fine), ceil((far - near) * fine), fine)
         draw(buffer, cones, balls)
-        touching, over = (self._layer(buffer, fine, *layer) for layer in _LAYERS)
+        touching, over = (self._layer(buffer, fine, *layer) for layer in _SHADOW_LAYERS)
 
         corners = camera.to_pixels(camera.origin + [(x, 0.0, z) for x in (left, right) for z in (near, far)])
         x, y = (max(floor(edge), 0) for edge in corners.min(axis=0))
@@ -105,7 +103,7 @@ class Ground:
         return Shadow((x, y), np.asarray(laid, dtype=np.float32) / 255.0)
 
     def _layer(self, buffer: DepthBuffer, fine: float, dark: float, fall: float, soft: float) -> Image.Image:
-        """Draw one of `_LAYERS`, 255 for black, from a depth buffer under the floor, `fine` samples to a metre."""
+        """Draw one of `_SHADOW_LAYERS`, 255 for black; `buffer`, under the floor, has `fine` samples a metre."""
         cast = dark * np.exp(np.minimum(buffer.depth, 0.0) / np.float32(fall * self._height))  # depth is -height
         image = Image.fromarray(np.round(255.0 * cast).astype(np.uint8))
         return image.filter(ImageFilter.GaussianBlur(soft * self._height * fine))
@@ -117,9 +115,9 @@ def darken(picture: Pixels, shadow: Shadow, bare: Singles) -> None:
     Args:
         picture: RGB [H, W, 3].
         shadow: the shadow.
-        bare: how far the floor shows at each pixel [H, W], 0 to 1.
+        bare: how much of the floor each pixel shows [H, W], 0 to 1.
     """
     (x, y), (height, width) = shadow.corner, shadow.dark.shape
     box = slice(y, y + height), slice(x, x + width)
     dark = (shadow.dark * bare[box])[..., None]
-    picture[box] = picture[box] + dark * (np.array(SHADOW, dtype=np.float32) - picture[box])
+    picture[box] = picture[box] + dark * (np.array(STAGE.shadow, dtype=np.float32) - picture[box])

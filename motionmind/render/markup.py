@@ -1,7 +1,8 @@
-"""Colours and text as SVG writes them."""
+"""Colours, text and bytes as SVG and HTML write them."""
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Iterable
 from xml.sax.saxutils import escape
 
@@ -14,5 +15,10 @@ def hexadecimal(rgb: Iterable[float]) -> str:
 
 
 def xml_text(text: str) -> str:
-    """Escape text for XML, and as it is displayed (`printable`); ends of lines stay."""
+    """Escape text for XML, and make it `printable`; line breaks stay."""
     return escape(printable(text))
+
+
+def base64_of(data: bytes) -> str:
+    """Encode bytes as base64 text."""
+    return b64encode(data).decode("ascii")

@@ -1,14 +1,13 @@
 """A motion as a page: one HTML file that plays it in any browser, from disk, without a network.
 
-The player's modules are in `player/`, three.js in `player/vendor/`, as written; there is no build step. A page opened
-from disk may not load files, so each module goes into the page as a data: URL, and an import map gives it its name. The
-page's content security policy forbids every request.
+The player's modules are in `player/`, three.js in `player/vendor/`; there is no build step. A page opened from disk may
+not load files, so the page holds each module as a data: URL, and an import map names it. The page's content security
+policy forbids every request.
 """
 
 from __future__ import annotations
 
 import html
-from base64 import b64encode
 from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cache
@@ -30,16 +29,10 @@ from motionmind.files import FilePath, write_atomically
 from motionmind.render.body_shape import shape_of
 from motionmind.render.body_solids import BodyShape
 from motionmind.render.figure import bridge_balls
+from motionmind.render.markup import base64_of
 from motionmind.render.palette import BRIDGED, COLOURS, INK, INSERTED
 
-_PLAYER = Path(__file__).parent / "player"
-_THREE = {"three": "three.module.min.js", "three/core": "three.core.min.js", "three/OrbitControls": "OrbitControls.js"}
-_CORE = b'from"./three.core.min.js"'  # a module in a data: URL cannot import by path
-# Characters that may stand in a data: URL, in JSON and in a script element as they are.
-_PLAIN = "".join(chr(code) for code in range(33, 127) if chr(code) not in '%#"<\\')
-_BITS = 20  # of each of the three coefficients that are written of a quaternion
-# Indices of the coefficients that are written, by the index of the one left out.
-_OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
+_PLAYER_DIR = Path(__file__).parent / "player"
 
 
 def page(motion: Motion, first: int = 0) -> str:
@@ -49,7 +42,7 @@ def page(motion: Motion, first: int = 0) -> str:
         motion: the motion, on any skeleton.
         first: number of the motion's first frame in the longer motion that it is a part of.
     """
-    return _filled(motion, player_data(motion, first), "main")
+    return _fill(motion, player_data(motion, first), "main")
 
 
 def page_beside(motion: Motion, folder: str, data: Mapping[str, Any]) -> str:
@@ -61,11 +54,11 @@ def page_beside(motion: Motion, folder: str, data: Mapping[str, Any]) -> str:
         data: the data that this module reads, as `beside` in the page's data.
     """
     style, beside = (_text(f"{folder}/beside.{suffix}") for suffix in ("css", "html"))
-    return _filled(motion, {**player_data(motion), "beside": data}, f"{folder}/beside", style, beside)
+    return _fill(motion, {**player_data(motion), "beside": data}, f"{folder}/beside", style, beside)
 
 
-def _filled(motion: Motion, data: Mapping[str, Any], start: str, style: str = "", beside: str = "") -> str:
-    """Fill in the template of the page."""
+def _fill(motion: Motion, data: Mapping[str, Any], start: str, style: str = "", beside: str = "") -> str:
+    """Fill the template of the page."""
     is_known = bool(motion.insertions or motion.recorded)
     data = {"credits": sections_of(ledger_of(motion.credits)) if is_known else {}, **data}
     return Template(_text("page.html")).substitute(
@@ -91,14 +84,17 @@ def write_page(path: FilePath, motion: Motion, first: int = 0) -> None:
 @cache
 def _modules(start: str) -> str:
     """Build the import map, including the module that the page starts with."""
-    sources = {f"motionmind/{file.stem}": file.read_bytes() for file in sorted(_PLAYER.glob("*.js"))}
-    sources[f"motionmind/{start}"] = (_PLAYER / f"{start}.js").read_bytes()
-    for name, file in _THREE.items():
-        sources[name] = (_PLAYER / "vendor" / file).read_bytes().replace(_CORE, b'from"three/core"')
-    # Not in base64: a page is a tenth smaller so, and packs to two thirds.
-    urls = {
-        name: f"data:text/javascript;charset=utf-8,{quote(source, safe=_PLAIN)}" for name, source in sources.items()
-    }
+    sources = {f"motionmind/{file.stem}": file.read_bytes() for file in sorted(_PLAYER_DIR.glob("*.js"))}
+    sources[f"motionmind/{start}"] = (_PLAYER_DIR / f"{start}.js").read_bytes()
+    vendored = ("three", "three.module.min"), ("three/core", "three.core.min"), ("three/OrbitControls", "OrbitControls")
+    for name, file in vendored:
+        source = (_PLAYER_DIR / "vendor" / f"{file}.js").read_bytes()
+        # A module in a data: URL cannot import by path.
+        sources[name] = source.replace(b'from"./three.core.min.js"', b'from"three/core"')
+    # Percent-encoded text makes a page a tenth smaller than base64, and packs to two thirds. These characters may
+    # stand unquoted in a data: URL, in JSON and in a script element.
+    plain = "".join(chr(code) for code in range(33, 127) if chr(code) not in '%#"<\\')
+    urls = {name: f"data:text/javascript;charset=utf-8,{quote(source, safe=plain)}" for name, source in sources.items()}
     return msgspec.json.encode({"imports": urls}).decode()
 
 
@@ -154,8 +150,8 @@ def _body_data(body: BodyShape) -> dict[str, Any]:
 def packed(rotations: Floats) -> NDArray[np.uint64]:
     """Pack unit quaternions into 64 bits each, to 1e-6 a coefficient.
 
-    The coefficient of largest magnitude follows from the others and is left out; as `q` and `-q` are the same rotation,
-    it is taken as positive. From the highest bit: its index (4 bits), then the other three in order, 20 bits each, as
+    The coefficient of largest magnitude follows from the others and is left out; `q` and `-q` are the same rotation, so
+    it is made positive. From the highest bit: its index (4 bits), then the other three in order, 20 bits each, as
     whole numbers from 0 to 2^20 - 2 for -1 / sqrt(2) to 1 / sqrt(2). Source: Fiedler, "Snapshot compression"
     (gafferongames.com, 2015), "smallest three".
 
@@ -167,19 +163,16 @@ def packed(rotations: Floats) -> NDArray[np.uint64]:
     """
     largest = np.argmax(np.abs(rotations), axis=-1)
     sign = np.where(np.take_along_axis(rotations, largest[..., None], axis=-1) < 0.0, -1.0, 1.0)
-    others = sign * np.take_along_axis(rotations, _OTHERS[largest], axis=-1)
-    most = 2 ** (_BITS - 1) - 1
+    kept = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])[largest]
+    others = sign * np.take_along_axis(rotations, kept, axis=-1)
+    bits = 20
+    most = 2 ** (bits - 1) - 1
     levels = np.rint((np.sqrt(2.0) * others).clip(-1.0, 1.0) * most + most).astype("<u8")
     word = largest.astype("<u8")
     for i in range(3):
-        word = word << np.uint64(_BITS) | levels[..., i]
+        word = word << np.uint64(bits) | levels[..., i]
     return np.asarray(word.astype("<u8"))
 
 
 def _text(name: str) -> str:
-    return (_PLAYER / name).read_text(encoding="utf-8")
-
-
-def base64_of(data: bytes) -> str:
-    """Encode bytes as base64 text, as pages hold them."""
-    return b64encode(data).decode("ascii")
+    return (_PLAYER_DIR / name).read_text(encoding="utf-8")

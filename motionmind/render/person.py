@@ -1,6 +1,6 @@
-"""A person's body as solids, part by part, on any skeleton that contains human23's tree.
+"""A person's body as solids, on any skeleton that contains human23's tree.
 
-Thicknesses are those of a body 1.70 m tall and scale with it; lengths are the skeleton's own.
+Thicknesses are those of a body 1.70 m tall, scaled; lengths are the skeleton's own.
 """
 
 from __future__ import annotations
@@ -15,26 +15,28 @@ from motionmind.body.anatomy_file import anatomy_named
 from motionmind.body.human import human23
 from motionmind.body.mirror import LEFT, MIDDLE, RIGHT, sides_of
 from motionmind.body.skeleton import Skeleton
-from motionmind.render.body_solids import Ball, BodyShape, Cone, Frame, Place, extent, joint_frames, place_of
+from motionmind.render.body_solids import Ball, BodyShape, Cone, Frame, Point, as_point, extent, joint_frames
 from motionmind.render.palette import FACE, HAIR, MARK
 
-# Radii of a person's limbs at the joints, metres.
-_RADII = {"hip": 0.080, "knee": 0.051, "ankle": 0.032, "shoulder": 0.046, "elbow": 0.036, "wrist": 0.025}
-# The joints of human23 whose segments make up a part.
-_SEGMENTS = {"head": ("atlantal",), "trunk": ("pelvis", "lumbar", "thorax")}
-_SEGMENTS |= {"upper_arm": ("shoulder",), "forearm": ("elbow",), "hand": ("wrist",)}
-_SEGMENTS |= {"thigh": ("hip",), "shank": ("knee",), "foot": ("ankle",)}
+# Radii of a person's limbs at the joints.
+_RADII_M = {"hip": 0.080, "knee": 0.051, "ankle": 0.032, "shoulder": 0.046, "elbow": 0.036, "wrist": 0.025}
+# The joints of human23 whose segments make up a body part.
+_SEGMENTS = {
+    **{"head": ("atlantal",), "trunk": ("pelvis", "lumbar", "thorax")},
+    **{"upper_arm": ("shoulder",), "forearm": ("elbow",), "hand": ("wrist",)},
+    **{"thigh": ("hip",), "shank": ("knee",), "foot": ("ankle",)},
+}
 
 
 class PersonShape:
-    """Builds a person's solids, part by part, from metres on a body 1.70 m tall times `size`.
+    """Builds a person's solids from lengths in metres on a body 1.70 m tall, times `size`.
 
     Attributes:
         skeleton: the skeleton.
         size: the body's scale; 1 for 1.70 m.
         rest: positions of the joints at rest [J, 3], metres, the root in the origin.
         frames: the axes that carry the solids, so far.
-        drawn: indices of joints that a finger, a toe or a longer ray goes through, so far.
+        drawn: indices of the joints within fingers and toes, so far.
         thumbs: whether the skeleton has thumbs of its own.
     """
 
@@ -75,7 +77,7 @@ class PersonShape:
             "trunk", MIDDLE, self._joint("pelvis"), (0.0, 0.4 * hips / self.size, 0.0), (0.140, 0.105, 0.105)
         )
         yield self._ball("trunk", MIDDLE, between, (0.0, -0.01, 0.0), (0.116, 0.5 * waist + 0.09, 0.086))
-        yield self._ball("trunk", MIDDLE, ribs, place_of(-0.08 * chest), (0.138, 0.5 * tall + 0.035, 0.100))
+        yield self._ball("trunk", MIDDLE, ribs, as_point(-0.08 * chest), (0.138, 0.5 * tall + 0.035, 0.100))
         # Breastbone and navel distinguish the front of the trunk from its back.
         top, bottom = (0.0, 0.17 * tall, 0.086), (0.0, -0.28 * tall, 0.093)
         yield self._cone("trunk", MARK, ribs, top, 0.011, ribs, bottom, 0.011)
@@ -95,8 +97,8 @@ class PersonShape:
 
     def _leg(self, side: str, outward: float) -> Iterator[Cone | Ball]:
         hip, knee, ankle = (self._joint(f"{side}_{joint}") for joint in ("hip", "knee", "ankle"))
-        yield from self._limb(f"{side}_thigh", side, (hip, knee), (_RADII["hip"], _RADII["knee"]))
-        yield from self._limb(f"{side}_shank", side, (knee, ankle), (_RADII["knee"], _RADII["ankle"]))
+        yield from self._limb(f"{side}_thigh", side, (hip, knee), (_RADII_M["hip"], _RADII_M["knee"]))
+        yield from self._limb(f"{side}_shank", side, (knee, ankle), (_RADII_M["knee"], _RADII_M["ankle"]))
         length = float(np.linalg.norm(self._offset(f"{side}_knee", f"{side}_ankle"))) / self.size
         yield self._ball(
             f"{side}_shank",
@@ -110,11 +112,11 @@ class PersonShape:
         yield self._cone(f"{side}_kneecap", MARK, bend, (0.0, 0.0, 0.030), 0.036, bend, (0.0, 0.0, 0.064), 0.022)
 
     def _foot(self, side: str, outward: float) -> Iterator[Cone | Ball]:
-        """Yield a foot, its sole level with the joints at its ball and with the tips, which stand on the floor."""
+        """Yield a foot whose sole is level with the joints at its ball and with the tips, which are on the floor."""
         part, ankle, toes = f"{side}_foot", self._joint(f"{side}_ankle"), self._joint(f"{side}_toes")
         sole = self._offset(f"{side}_ankle", f"{side}_toes") / self.size
         heel = (0.0, float(sole[1]) + 0.026, -0.28 * max(float(sole[2]), 0.08))
-        yield self._cone(part, side, ankle, (0.0, 0.0, 0.0), _RADII["ankle"], ankle, heel, 0.026)
+        yield self._cone(part, side, ankle, (0.0, 0.0, 0.0), _RADII_M["ankle"], ankle, heel, 0.026)
         yield self._cone(part, side, ankle, (0.0, 0.0, 0.012), 0.030, toes, (0.0, 0.022, 0.0), 0.022)
         for x, share in ((-0.024, 1.0), (0.002, 0.85), (0.026, 0.65)):  # from the great toe to the little one
             ball = (x * outward, 0.020, 0.0)
@@ -123,8 +125,8 @@ class PersonShape:
 
     def _arm(self, side: str) -> Iterator[Cone | Ball]:
         shoulder, elbow, wrist = (self._joint(f"{side}_{joint}") for joint in ("shoulder", "elbow", "wrist"))
-        yield from self._limb(f"{side}_upper_arm", side, (shoulder, elbow), (_RADII["shoulder"], _RADII["elbow"]))
-        yield from self._limb(f"{side}_forearm", side, (elbow, wrist), (_RADII["elbow"], _RADII["wrist"]))
+        yield from self._limb(f"{side}_upper_arm", side, (shoulder, elbow), (_RADII_M["shoulder"], _RADII_M["elbow"]))
+        yield from self._limb(f"{side}_forearm", side, (elbow, wrist), (_RADII_M["elbow"], _RADII_M["wrist"]))
 
     def _hand(self, side: str, outward: float) -> Iterator[Cone | Ball]:
         """Yield a flat hand with a thumb, to show which way the palm faces: down at rest, the thumb ahead."""
@@ -143,15 +145,15 @@ class PersonShape:
         part: str,
         paint: str,
         root: int,
-        beside: Place,
+        beside: Point,
         radii: tuple[float, float],
         least: Floats,
         share: float = 1.0,
     ) -> Iterator[Cone]:
         """Yield a finger or toe from the joint `root` through the joints below it to the tip; metres on 1.70 m.
 
-        It starts `beside` the joint and approaches the line of the joints. Where the skeleton has no tip, or one
-        nearer than `least` (recordings may mark the knuckles only), it ends at `least`. `share` shortens the last bone.
+        It starts `beside` the joint and approaches the line of the joints. If the skeleton has no tip, or one nearer
+        than `least` (some recordings mark only the knuckles), it ends at `least`. `share` shortens the last bone.
         """
         chain = [root]
         while len(below := self.skeleton.children(chain[-1])) == 1:
@@ -171,10 +173,10 @@ class PersonShape:
         for i in range(len(chain)):
             end = chain[min(i + 1, len(chain) - 1)]
             last = points[i + 1] + (end_step if i == len(chain) - 1 else 0.0)
-            yield self._cone(part, paint, chain[i], place_of(points[i]), widths[i], end, place_of(last), widths[i + 1])
+            yield self._cone(part, paint, chain[i], as_point(points[i]), widths[i], end, as_point(last), widths[i + 1])
 
     def _further_joints(self) -> Iterator[Cone]:
-        """Yield thin limbs for joints beyond human23's at the body's ends, such as those of single fingers."""
+        """Yield thin limbs for joints beyond human23's at the ends of the body, such as those of single fingers."""
         known = set(human23().names)
         inner = {-1, *self.drawn}  # joints drawn already, or above one of human23's
         for joint in range(len(self.skeleton) - 1, -1, -1):
@@ -183,12 +185,12 @@ class PersonShape:
         paints, centre = sides_of(self.skeleton), (0.0, 0.0, 0.0)
         for joint in sorted(set(range(len(self.skeleton))) - inner):
             part, parent = self.skeleton.names[joint], self.skeleton.parents[joint]
-            tip = place_of(self.skeleton.tips[joint] / self.size)
+            tip = as_point(self.skeleton.tips[joint] / self.size)
             yield self._cone(part, paints[joint], parent, centre, 0.013, joint, centre, 0.012)
             yield self._cone(part, paints[joint], joint, centre, 0.012, joint, tip, 0.009)
 
     def _limb(self, part: str, paint: str, ends: tuple[int, int], radii: tuple[float, float]) -> Iterator[Cone]:
-        """Yield a limb from one joint to another, through the joints between them, if any."""
+        """Yield a limb from one joint to another, through all joints between them."""
         chain = [ends[1]]
         while chain[-1] != ends[0]:
             chain.append(self.skeleton.parents[chain[-1]])
@@ -212,19 +214,19 @@ class PersonShape:
         return len(self.frames) - 1
 
     def _cone(
-        self, part: str, paint: str, a_frame: int, a: Place, a_radius: float, b_frame: int, b: Place, b_radius: float
+        self, part: str, paint: str, a_frame: int, a: Point, a_radius: float, b_frame: int, b: Point, b_radius: float
     ) -> Cone:
         size = self.size
         return Cone(
             part,
             paint,
             a_frame,
-            place_of(size * np.array(a)),
+            as_point(size * np.array(a)),
             size * a_radius,
             b_frame,
-            place_of(size * np.array(b)),
+            as_point(size * np.array(b)),
             size * b_radius,
         )
 
-    def _ball(self, part: str, paint: str, frame: int, centre: Place, radii: Place) -> Ball:
-        return Ball(part, paint, frame, place_of(self.size * np.array(centre)), place_of(self.size * np.array(radii)))
+    def _ball(self, part: str, paint: str, frame: int, centre: Point, radii: Point) -> Ball:
+        return Ball(part, paint, frame, as_point(self.size * np.array(centre)), as_point(self.size * np.array(radii)))

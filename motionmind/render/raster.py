@@ -1,4 +1,4 @@
-"""Compiled inner loops: from solids to a depth buffer, from the buffer to colours. They know no bodies and no views.
+"""Compiled inner loops: from solids to a depth buffer, and from the buffer to colours; no bodies, no views.
 
 Lengths are metres in the viewer's axes, x to the right, y up, z towards the viewer; parallel projection. A depth buffer
 is passed as its arrays `solid`, `depth` and `shade` [H, W], and its `place`.
@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from math import ceil, hypot, sqrt
 
-import numpy as np
-
 from motionmind._typing import Floats, Indices, Int16s, Pixels, Singles
 from motionmind.jit import jit
 from motionmind.render.solids import EMPTY
@@ -17,18 +15,12 @@ from motionmind.render.solids import EMPTY
 Place = tuple[float, float, float]  # x and y of a buffer's upper left corner, metres, and pixels to a metre
 Buffers = tuple[Int16s, Singles, Singles, Place]
 
-# The light comes from above the viewer, and from neither side: a mirrored body looks mirrored.
-_UP, _TOWARDS = 0.6, 0.8
-_SHADE = 0.62  # brightness where the light does not reach
-_HAIR = 0.001  # pixels: surfaces closer than this coincide, but for rounding
-_END_ON = 1e-3  # a cone is drawn as two balls if its ends lie closer in the picture, by its thickness
-
 
 @jit
 def draw(
     solid: Int16s, depth: Singles, shade: Singles, place: Place, cones: Floats, balls: Floats, numbers: Int16s
 ) -> None:
-    """Draw solids into a depth buffer: the nearest wins, and of solids that touch, as in a joint, the higher number.
+    """Draw solids into a depth buffer: the nearest wins; where solids touch, as in a joint, the higher number wins.
 
     Args:
         solid, depth, shade, place: the buffer; its arrays are updated.
@@ -39,9 +31,10 @@ def draw(
     buffer = solid, depth, shade, place
     for i in range(len(cones)):
         ax, ay, az, bx, by, bz, a, b = cones[i]
-        if (bx - ax) ** 2 + (by - ay) ** 2 - (b - a) ** 2 >= _END_ON * max(a, b) ** 2:
+        # Seen from an end, a cone is two balls: one hides the other up to its rim.
+        if (bx - ax) ** 2 + (by - ay) ** 2 - (b - a) ** 2 >= 1e-3 * max(a, b) ** 2:
             _cone(buffer, (ax, ay, az, a), (bx, by, bz, b), numbers[i])
-        else:  # seen from an end: one ball hides the other up to its rim
+        else:
             _ellipsoid(buffer, (ax, ay, az), (a * a, 0.0, 0.0, a * a, 0.0, a * a), numbers[i])
             _ellipsoid(buffer, (bx, by, bz), (b * b, 0.0, 0.0, b * b, 0.0, b * b), numbers[i])
     for i in range(len(balls)):
@@ -84,8 +77,7 @@ def _cone(
             if square > 0.0:
                 towards = sqrt(Q * square)
                 if _shows(buffer, row, column, az + t * dz + towards, number):
-                    bright = (_UP * (y - t * dy) + _TOWARDS * towards) / (radius + t * widening)
-                    shade[row, column] = _SHADE + (1.0 - _SHADE) * max(bright, 0.0)
+                    shade[row, column] = _brightness(y - t * dy, towards, radius + t * widening)
 
 
 @jit
@@ -121,8 +113,17 @@ def _ellipsoid(
                 if _shows(buffer, row, column, centre[2] + kx * x + ky * y + towards, number):
                     nz = towards / d
                     nx, ny = px - kx * nz, py - ky * nz
-                    bright = (_UP * ny + _TOWARDS * nz) / sqrt(nx * nx + ny * ny + nz * nz)
-                    shade[row, column] = _SHADE + (1.0 - _SHADE) * max(bright, 0.0)
+                    shade[row, column] = _brightness(ny, nz, sqrt(nx * nx + ny * ny + nz * nz))
+
+
+@jit
+def _brightness(up: float, towards: float, length: float) -> float:
+    """Return a surface's brightness from its normal's components up and towards the viewer, and the normal's length.
+
+    The light comes from above the viewer, and from neither side, so a mirrored body looks mirrored. Where it does not
+    reach, the brightness is 0.62.
+    """
+    return 0.62 + (1.0 - 0.62) * max((0.6 * up + 0.8 * towards) / length, 0.0)
 
 
 @jit
@@ -136,7 +137,7 @@ def _between(low: float, high: float, origin: float, scale: float, count: int) -
 def _shows(buffer: Buffers, row: int, column: int, z: float, number: int) -> bool:
     """Put a solid's surface at depth z into a pixel; return whether the pixel shows it."""
     solid, depth, _, place = buffer
-    ahead, hair = z - depth[row, column], _HAIR / place[2]
+    ahead, hair = z - depth[row, column], 0.001 / place[2]  # within 0.001 pixels, surfaces coincide but for rounding
     depth[row, column] = max(depth[row, column], z)
     if ahead <= hair and (ahead < -hair or number < solid[row, column]):
         return False
@@ -159,15 +160,15 @@ def colour(
 ) -> None:
     """Paint the solids in a depth buffer over a picture.
 
-    Lines run around the body, and where one part stands before another, on the farther one.
+    Lines run around the body and, where one body part stands before another, on the farther one.
 
     Args:
         picture: the background [H, W, 3], RGB; painted over.
         solid, depth, shade: the buffer.
         paints: RGB of the solids [N, 3], 0 to 255.
-        parts: the part that each solid belongs to [N].
-        haze: the depths, metres, where haze begins and where it is full, and its share of white there.
-        step: how far a part must stand before another for a line between them, metres.
+        parts: the body part of each solid [N].
+        haze: the depths where haze begins and where it is full, metres, and its share of white there.
+        step: least depth from one body part to another for a line between them, metres.
         line: width of the lines, pixels.
         ink: RGB of the lines [3].
     """
@@ -196,10 +197,3 @@ def colour(
                 lit = (1.0 - far) * shade[row, column]
                 for channel in range(3):
                     picture[row, column, channel] = int(paints[number, channel] * lit + 255.0 * far)
-
-
-def halved(picture: Pixels) -> Pixels:
-    """Return a picture [H, W, 3] at half its width and height [H // 2, W // 2, 3], each pixel the mean of four."""
-    height, width = len(picture) // 2, picture.shape[1] // 2
-    four = picture[: 2 * height, : 2 * width].reshape(height, 2, width, 2, 3).sum(axis=(1, 3), dtype=np.uint16)
-    return np.asarray((four + 2) // 4, dtype=np.uint8)  # 2, to round and not truncate

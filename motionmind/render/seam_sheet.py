@@ -1,4 +1,4 @@
-"""A sheet of a variation's seams: each with the posture before it, what is inserted, and the posture after it."""
+"""A sheet of a variation's seams: each with the posture before it, the insertion, and the posture after it."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from motionmind.render.sheet import Row, evenly, row_sheet
 from motionmind.variation.review import Seam
 from motionmind.variation.variation import Variation
 
-MOST = 250  # seams on a sheet
-_INSERTED = 3  # postures of an insertion that are drawn
+MAX_SEAMS = 250  # on a sheet
 
 
 def seam_sheet(variation: Variation, names: Sequence[str]) -> Image.Image:
@@ -28,18 +27,18 @@ def seam_sheet(variation: Variation, names: Sequence[str]) -> Image.Image:
     seams = variation.seams
     if not seams:
         raise MotionMindError("there is no seam to draw: the variation does not leave the piece's order")
-    if len(seams) > MOST:
-        raise MotionMindError(f"a sheet shows {MOST} seams at most, not {len(seams)}; --play draws one of them")
+    if len(seams) > MAX_SEAMS:
+        raise MotionMindError(f"a sheet shows {MAX_SEAMS} seams at most, not {len(seams)}; --play draws one of them")
     motion, frames = variation.arrange()
-    rows = []
+    rows, most = [], 3  # postures of an insertion
     for seam in seams:
         first, last = int(frames[seam.at]), int(frames[seam.at + 1])
-        inner = evenly(range(first, last + 1), _INSERTED + 2)[1:-1] if seam.insertion else []
+        inner = evenly(range(first, last + 1), most + 2)[1:-1] if seam.insertion else []
         captions = [f"{motion.times[frame] - motion.times[first]:.2f} s" for frame in inner]
-        blanks = _INSERTED - len(inner)
+        blanks = most - len(inner)
         rows.append(
             Row(
-                f"seam {seam.number}, after posture {seam.at}: {_told(seam)}",
+                f"seam {seam.number}, after posture {seam.at}: {_describe(seam)}",
                 [first, *inner, *[None] * blanks, last],
                 [names[seam.start], *captions, *[""] * blanks, names[seam.end]],
             )
@@ -47,8 +46,8 @@ def seam_sheet(variation: Variation, names: Sequence[str]) -> Image.Image:
     return row_sheet(motion, rows)
 
 
-def _told(seam: Seam) -> str:
-    """Say in a few words what is at a seam."""
+def _describe(seam: Seam) -> str:
+    """Return the state of a seam in a few words."""
     transition = seam.transition
     if transition is None:
         return "not judged"

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
 from io import BytesIO
 from math import ceil, sqrt
 from numbers import Integral
 from typing import Literal, NamedTuple
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
 from motionmind._typing import Floats, Pixels
 from motionmind.arguments import check_integer, check_items, check_text, check_type
@@ -20,38 +19,21 @@ from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.render.body_shape import shape_of
 from motionmind.render.body_solids import BodyShape
-from motionmind.render.camera import SMOOTH
+from motionmind.render.camera import SAMPLES_PER_PX
 from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.figure import bridge_balls, colour, draw, given_colours, halved, inserted_colours
-from motionmind.render.palette import (
-    BRIDGED,
-    COLOURS,
-    PLUMB,
-    SHEET_FRAME,
-    SHEET_GROUND,
-    SHEET_PALE,
-    SHEET_PAPER,
-    SUNK,
-    TEXT,
-    VIOLET,
-)
+from motionmind.render.lettering import font
+from motionmind.render.palette import BRIDGED, COLOURS, SHEET, VIOLET
 from motionmind.render.sheet_window import Window, window_around
 from motionmind.render.solids import EMPTY, Cones, Ellipsoids, posture_solids
 from motionmind.render.view import ABOVE, FRONT, STAGE_LEFT, STAGE_RIGHT, View, to_view
 
 Side = Literal["right", "left"]
 
-MOST = 400  # postures on a sheet, at most
-_PIXELS = 60e6  # pixels of a sheet, at most: viewers refuse larger pictures
-_NARROW = 100.0  # least width of the side view, pixels, for the words under it
-_TALL = 200.0  # height of a body, pixels
-_LARGEST = 480.0  # greatest width or height of a view, pixels, where a body leaps or lies
-_HEADING = 120  # characters of a heading that fit a row
-_LONGEST = 16  # characters of a caption that fit the narrowest view
-_CAPTION, _LINE = 24, 17  # heights of a caption and of a line of the legend, pixels
-_Phrase = tuple[float, str, Colour]  # x in pixels, words, colour
-_STANDS = 0.03  # a foot lower than this stands on the floor, by the body's height
-_SINKS = 0.006  # depth under the floor that is not yet marked, by the body's height
+MAX_POSTURES = 400  # on a sheet
+_MAX_PIXELS = 60e6  # of a sheet: viewers refuse larger pictures
+_CAPTION_PX, _LINE_PX = 24, 17  # heights of a caption and of a line of the legend
+_Phrase = tuple[float, str, Colour]  # x in pixels, text, colour
 
 
 def draw_sheet(
@@ -100,18 +82,20 @@ def draw_sheet(
         check_items("frames", frames, "whole numbers", Integral)
     if captions is not None:
         check_items("captions", captions, "words", str)
-    if side not in ("right", "left") or (columns is not None and columns < 1):
-        raise MotionMindError(f"a sheet has one column at least, and is seen from the right or left, not {side!r}")
+    if side not in ("right", "left"):
+        raise MotionMindError(f"side must be 'right' or 'left', not {side!r}")
+    if columns is not None and columns < 1:
+        raise MotionMindError(f"columns must be 1 or more, not {columns}")
     chosen = list(range(len(motion))) if frames is None else list(frames)
     check_frames(motion, chosen)
     if captions is not None and len(captions) != len(chosen):
-        raise MotionMindError(f"a sheet of {len(chosen)} postures has as many captions, not {len(captions)}")
+        raise MotionMindError(f"a sheet of {len(chosen)} postures needs as many captions, not {len(captions)}")
     sheet = _Sheet(motion, chosen, STAGE_RIGHT if side == "right" else STAGE_LEFT, first, captions)
     return sheet.picture(columns)
 
 
 class Row(NamedTuple):
-    """A row of a sheet: a heading, the numbers of frames, None where nothing is to be drawn, and a caption for each."""
+    """A row of a sheet: a heading, the numbers of frames (None leaves a gap), and a caption for each."""
 
     heading: str
     frames: Sequence[int | None]
@@ -133,9 +117,9 @@ def row_sheet(motion: Motion, rows: Sequence[Row]) -> Image.Image:
 def png(picture: Image.Image) -> bytes:
     """Encode a contact sheet as PNG, in 256 colours."""
     data = BytesIO()
-    # 256 colours take a third of the bytes and look the same. Of the methods to choose them, median cut loses rare
-    # ones, as of feet under the floor, and maximum coverage tints the ground; an octree keeps both. A quarter of
-    # the pixels suffices to choose by.
+    # 256 colours take a third of the bytes and look the same. Median cut loses rare colours, such as those of feet
+    # under the floor, and maximum coverage tints the ground; an octree keeps both. A quarter of the pixels suffices
+    # to choose the colours.
     quarter = picture.resize((ceil(picture.width / 2), ceil(picture.height / 2)), Image.Resampling.NEAREST)
     palette = quarter.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     picture.quantize(palette=palette, dither=Image.Dither.NONE).save(data, "PNG", compress_level=4)
@@ -158,10 +142,10 @@ def check_frames(motion: Motion, frames: Sequence[int]) -> None:
     name = motion.name or "the motion"
     if not frames:
         raise MotionMindError(f"{name}: no frame to draw")
-    if len(frames) > MOST:
-        every = ceil(len(frames) / MOST)
+    if len(frames) > MAX_POSTURES:
+        every = ceil(len(frames) / MAX_POSTURES)
         raise MotionMindError(
-            f"{name}: a sheet holds {MOST} postures, not {len(frames)}; take fewer, as with --every {every}"
+            f"{name}: a sheet holds {MAX_POSTURES} postures, not {len(frames)}; take fewer, as with --every {every}"
         )
     for frame in frames:
         if not 0 <= frame < len(motion):
@@ -169,16 +153,16 @@ def check_frames(motion: Motion, frames: Sequence[int]) -> None:
 
 
 class _Sheet:
-    """The postures to draw, placed in the world, and the windows through which all of them are seen."""
+    """The postures to draw, placed in the world, and the windows that they share."""
 
     def __init__(
         self, motion: Motion, frames: list[int], side: View, first: int = 0, captions: Sequence[str] | None = None
     ) -> None:
         self.motion, self.frames = motion, frames
-        # Of each posture, what stands on the left and on the right.
+        # The captions of each posture, on the left and on the right.
         self.notes = [(f"{first + frame}", f"{motion.times[frame]:.2f} s") for frame in frames]
         if captions is not None:
-            self.notes = [(displayed(caption, _LONGEST), "") for caption in captions]
+            self.notes = [(displayed(caption, 16), "") for caption in captions]
         self.body: BodyShape = shape_of(motion.skeleton)
         root = motion.root[frames]
         self.cones, self.balls = self.body.solids(motion.rotations[frames], root)
@@ -189,18 +173,18 @@ class _Sheet:
         self.origin = root * [1.0, 0.0, 1.0]  # the floor under the root
         self.standing = self._standing()
 
-        front, beside = self._reach(FRONT), self._reach(side)
+        front, beside = self._bounds(FRONT), self._bounds(side)
         low, high = float(front[0, ..., 1].min()), float(front[1, ..., 1].max())
-        if abs(low) < high - low:  # otherwise the floor is so far away that it would leave no room for the body
+        if abs(low) < high - low:  # a floor farther away would leave no room for the body
             low, high = min(low, 0.0), max(high, 0.0)
-        halves = [float(np.abs(reach[..., 0]).max()) for reach in (front, beside)]
-        near, far = self._feet_reach()
+        halves = [float(np.abs(bounds[..., 0]).max()) for bounds in (front, beside)]
+        near, far = self._feet_bounds()
         scale = min(
-            _TALL / self.body.height,
-            _LARGEST / max(high - low, *(2.0 * half for half in halves)),
-            sqrt(_PIXELS / len(frames) / (2.0 * sum(halves) * (high - low + far - near))),
+            200.0 / self.body.height,  # pixels; less where a body leaps or lies
+            480.0 / max(high - low, *(2.0 * half for half in halves)),
+            sqrt(_MAX_PIXELS / len(frames) / (2.0 * sum(halves) * (high - low + far - near))),
         )
-        halves[1] = max(halves[1], 0.5 * _NARROW / scale)
+        halves[1] = max(halves[1], 0.5 * 100.0 / scale)  # 100 pixels at least, for the caption
         views = zip((FRONT, side), halves, strict=True)
         self.windows = [window_around(view, half, low, high, scale) for view, half in views]
         self.backdrops: dict[Window, tuple[DepthBuffer, Pixels]] = {}
@@ -215,61 +199,61 @@ class _Sheet:
         for at in range(count):
             corner = at % columns * wide, header + at // columns * tall
             self._tile(sheet, pen, at, corner)
-            pen.rectangle((*corner, corner[0] + wide, corner[1] + tall), outline=SHEET_FRAME)
+            pen.rectangle((*corner, corner[0] + wide, corner[1] + tall), outline=SHEET.frame)
         return sheet
 
     def rows(self, rows: Sequence[Row]) -> Image.Image:
         """Draw the sheet in rows with headings, side by side so that it has about a screen's shape."""
         wide, tall = self._size()
-        width, height = len(rows[0].frames) * wide, tall + _CAPTION
+        width, height = len(rows[0].frames) * wide, tall + _CAPTION_PX
         columns = min(max(1, round(sqrt(1.5 * len(rows) * height / width))), len(rows))
         sheet, pen, header = self._paper(columns * width, ceil(len(rows) / columns) * height)
         at = 0
         for number, row in enumerate(rows):
             x, y = number % columns * width, header + number // columns * height
-            heading, large = displayed(row.heading, _HEADING), ImageFont.load_default(15)
+            heading, large = displayed(row.heading, 120), font(15)
             is_long = large.getlength(heading) > width - 9
-            pen.text((x + 6, y + 4), heading, TEXT, _small() if is_long else large)
+            pen.text((x + 6, y + 4), heading, SHEET.text, font(12) if is_long else large)
             for place, frame in enumerate(row.frames):
                 if frame is not None:
-                    self._tile(sheet, pen, at, (x + place * wide, y + _CAPTION))
+                    self._tile(sheet, pen, at, (x + place * wide, y + _CAPTION_PX))
                     at += 1
-            pen.rectangle((x, y, x + width, y + height), outline=SHEET_FRAME)
+            pen.rectangle((x, y, x + width, y + height), outline=SHEET.frame)
         return sheet
 
     def _size(self) -> tuple[int, int]:
         """Return the width and the height of a posture's views, pixels."""
-        tall = self.windows[0].height + max(self.plan.height if self.plan else 0, _CAPTION)
+        tall = self.windows[0].height + max(self.plan.height if self.plan else 0, _CAPTION_PX)
         return sum(window.width for window in self.windows), tall
 
     def _paper(self, width: int, height: int) -> tuple[Image.Image, ImageDraw.ImageDraw, int]:
-        """Return a sheet with so many pixels below its title and its legend, its pen, and the height of these."""
+        """Return a sheet with this room below its title and legend, its pen, and the height of title and legend."""
         lines = self._legend(width)
-        header = _LINE * (len(lines) + 2)
-        sheet = Image.new("RGB", (width + 1, header + height + 1), SHEET_PAPER)
+        header = _LINE_PX * (len(lines) + 2)
+        sheet = Image.new("RGB", (width + 1, header + height + 1), SHEET.paper)
         pen = ImageDraw.Draw(sheet)
-        pen.text((6, 4), displayed(self.motion.name or self.motion.skeleton.name), TEXT, ImageFont.load_default(15))
+        pen.text((6, 4), displayed(self.motion.name or self.motion.skeleton.name), SHEET.text, font(15))
         for number, line in enumerate(lines):
             for x, words, ink in line:
-                pen.text((x, _LINE * (number + 1) + 9), words, ink, _small())
+                pen.text((x, _LINE_PX * (number + 1) + 9), words, ink, font(12))
         return sheet, pen, header
 
     def _tile(self, sheet: Image.Image, pen: ImageDraw.ImageDraw, at: int, corner: tuple[int, int]) -> None:
-        """Draw one posture, its views and its caption, from an upper left corner on, pixels."""
+        """Draw one posture, its views and its caption; `corner` is the upper left one, pixels."""
         x, y = corner
         for window in self.windows:
             sheet.paste(self._view(at, window), (x, y))
             x += window.width
         y += self.windows[0].height
         if self.plan:
-            pen.rectangle((corner[0], y, x, y + self.plan.height), SHEET_GROUND)
+            pen.rectangle((corner[0], y, x, y + self.plan.height), SHEET.ground)
             sheet.paste(self._above(at, self.plan), (corner[0], y))
         x = corner[0] + self.windows[0].width
         caption, time = self.notes[at]
-        large = ImageFont.load_default(15)
+        large = font(15)
         is_long = large.getlength(caption) > self.windows[1].width - 9
-        pen.text((x + 4, y + 3), caption, TEXT, _small() if is_long else large)
-        pen.text((x + self.windows[1].width - 5, y + 6), time, SHEET_PALE, _small(), anchor="ra")
+        pen.text((x + 4, y + 3), caption, SHEET.text, font(12) if is_long else large)
+        pen.text((x + self.windows[1].width - 5, y + 6), time, SHEET.pale, font(12), anchor="ra")
 
     def _view(self, at: int, window: Window) -> Image.Image:
         """Draw one posture from the front or from the side, on the floor."""
@@ -277,30 +261,30 @@ class _Sheet:
         draw(buffer, *self._solids(at, window.view))
         picture = self._colour(buffer, at, background)
         floor = window.floor
-        sunk = floor + ceil(_SINKS * self.body.height * window.scale * SMOOTH)
+        sunk = floor + ceil(0.006 * self.body.height * window.scale * SAMPLES_PER_PX)  # less than 1 cm is not marked
         under = buffer.solid[sunk:]
-        picture[sunk:][(under != EMPTY) & (under < len(self.body.parts))] = SUNK  # but no bridge balls
+        picture[sunk:][(under != EMPTY) & (under < len(self.body.parts))] = SHEET.sunk  # but no bridge balls
         image = Image.fromarray(picture)
         self._plumb(ImageDraw.Draw(image), at, window, floor)
         return _smooth(image)
 
     def _above(self, at: int, window: Window) -> Image.Image:
-        """Draw the feet of one posture that are on the floor, and its centre of mass, from above."""
+        """Draw one posture's feet on the floor, and its centre of mass, from above."""
         buffer, background = self._backdrop(window)
         draw(buffer, *self._solids(at, ABOVE), self.standing[at])
         image = Image.fromarray(self._colour(buffer, at, background))
         pen = ImageDraw.Draw(image)
         x, y = window.to_samples(*self._middle(at, ABOVE))
-        arm = 4 * SMOOTH
-        pen.line((x - arm, y, x + arm, y), PLUMB, SMOOTH)
-        pen.line((x, y - arm, x, y + arm), PLUMB, SMOOTH)
+        arm = 4 * SAMPLES_PER_PX
+        pen.line((x - arm, y, x + arm, y), SHEET.plumb, SAMPLES_PER_PX)
+        pen.line((x, y - arm, x, y + arm), SHEET.plumb, SAMPLES_PER_PX)
         return _smooth(image)
 
     def _colour(self, buffer: DepthBuffer, at: int, background: Pixels) -> Pixels:
         return colour(buffer, self.body, background, paints=self.paints[int(self.inserted[at])])
 
     def _backdrop(self, window: Window) -> tuple[DepthBuffer, Pixels]:
-        """Return a window's depth buffer, emptied, and its background; both are shared by all postures."""
+        """Return a window's depth buffer, emptied, and its background; all postures share both."""
         if window not in self.backdrops:
             self.backdrops[window] = window.buffer(), window.background()
         buffer, background = self.backdrops[window]
@@ -310,24 +294,24 @@ class _Sheet:
     def _plumb(self, pen: ImageDraw.ImageDraw, at: int, window: Window, floor: int) -> None:
         """Draw the centre of mass, and a dashed line from it down to the floor."""
         x, y = window.to_samples(*self._middle(at, window.view))
-        dash = 4 * SMOOTH
+        dash = 4 * SAMPLES_PER_PX
         for start in np.arange(y, floor, 2 * dash):
-            pen.line((x, start, x, min(start + dash, floor)), PLUMB, SMOOTH)
-        dot = 2.5 * SMOOTH
-        pen.ellipse((x - dot, y - dot, x + dot, y + dot), PLUMB, SHEET_PAPER, 1)
+            pen.line((x, start, x, min(start + dash, floor)), SHEET.plumb, SAMPLES_PER_PX)
+        dot = 2.5 * SAMPLES_PER_PX
+        pen.ellipse((x - dot, y - dot, x + dot, y + dot), SHEET.plumb, SHEET.paper, 1)
 
     def _legend(self, width: int) -> list[list[_Phrase]]:
         """Break the legend into lines that fit a width in pixels."""
-        words = [(window.view.name, SHEET_PALE) for window in self.windows]
-        words += [("below: feet on the floor, from above, the audience below", SHEET_PALE)] * bool(self.plan)
+        words = [(window.view.name, SHEET.pale) for window in self.windows]
+        words += [("below: feet on the floor, from above, the audience below", SHEET.pale)] * bool(self.plan)
         words += [("performer's left", COLOURS["left"]), ("performer's right", COLOURS["right"])]
-        words += [("dot: centre of mass", PLUMB), ("under the floor", SUNK)]
+        words += [("dot: centre of mass", SHEET.plumb), ("under the floor", SHEET.sunk)]
         words += [("violet: inserted", VIOLET)] * bool(self.inserted.any())
         words += [("ball: bridged, no corpus has this move", BRIDGED)] * bool(self.bridged.any())
         lines: list[list[_Phrase]] = [[]]
         x = 6.0
         for phrase, ink in words:
-            length = _small().getlength(phrase)
+            length = font(12).getlength(phrase)
             if lines[-1] and x + length > width:
                 lines.append([])
                 x = 6.0
@@ -335,12 +319,12 @@ class _Sheet:
             x += length + 14.0
         return lines
 
-    def _reach(self, view: View) -> Floats:
+    def _bounds(self, view: View) -> Floats:
         """Compute the least and greatest coordinates [2, F, N, 3] in a view's axes, metres, bridge balls included."""
         bridges = bridge_balls(self.body, self.joints, np.asarray(self.bridged.any(axis=0)))
         cones, balls = to_view(self.cones, self.balls, view, self.origin)
         return np.concatenate(
-            [cones.reach(), balls.reach(), to_view(cones, bridges, view, self.origin)[1].reach()], axis=-2
+            [cones.bounds(), balls.bounds(), to_view(cones, bridges, view, self.origin)[1].bounds()], axis=-2
         )
 
     def _solids(self, at: int, view: View) -> tuple[Cones, Ellipsoids]:
@@ -356,19 +340,19 @@ class _Sheet:
 
     def _standing(self) -> list[frozenset[int]]:
         """Find, for each posture, the solids of the feet on the floor."""
-        low = self._reach(FRONT)[0, ..., 1]
+        low = self._bounds(FRONT)[0, ..., 1]
         feet: dict[str, list[int]] = {}
         for solid, part in enumerate(self.body.parts):
             if part.endswith("_foot"):
                 feet.setdefault(part, []).append(solid)
-        limit = _STANDS * self.body.height
+        limit = 0.03 * self.body.height  # 5 cm on a person
         return [frozenset(i for foot in feet.values() if row[foot].min() < limit for i in foot) for row in low]
 
-    def _feet_reach(self) -> tuple[float, float]:
-        """Return the least and greatest y, seen from above, metres, of standing feet and centres of mass."""
+    def _feet_bounds(self) -> tuple[float, float]:
+        """Return the least and greatest y, seen from above, metres, of feet on the floor and of centres of mass."""
         if not any(self.standing):
             return 0.0, 0.0
-        low, high = self._reach(ABOVE)[..., 1]
+        low, high = self._bounds(ABOVE)[..., 1]
         ys = [(low[at, solid], high[at, solid]) for at, solids in enumerate(self.standing) for solid in solids]
         ys += [(y, y) for _, y in (self._middle(at, ABOVE) for at in range(len(self.frames)))]
         return float(np.min(ys)), float(np.max(ys))
@@ -377,8 +361,3 @@ class _Sheet:
 def _smooth(image: Image.Image) -> Image.Image:
     """Average a picture's samples to pixels."""
     return Image.fromarray(halved(np.array(image)))
-
-
-@cache
-def _small() -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    return ImageFont.load_default(12)

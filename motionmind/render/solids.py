@@ -1,4 +1,4 @@
-"""Round cones and ellipsoids: their extents and volumes. They know no bodies and no pixels."""
+"""Round cones and ellipsoids, their bounds and volumes; no bodies, no pixels."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 from motionmind._typing import Floats
 
-EMPTY = -1  # the number of a pixel that shows no solid
+EMPTY = -1  # the number in a pixel without a solid
 
 
 @dataclass(frozen=True, eq=False)
 class Cones:
-    """Round cones, as of a limb: the union of all balls whose centres and radii lie between those of two end balls.
+    """Round cones: each is the union of all balls whose centres and radii lie between those of two end balls.
 
     Attributes:
         a, b: centres of the end balls [..., N, 3], metres.
@@ -25,13 +25,13 @@ class Cones:
     a_radius: Floats
     b_radius: Floats
 
-    def reach(self) -> Floats:
+    def bounds(self) -> Floats:
         """Compute the least and greatest coordinates of each [2, ..., N, 3], metres."""
         a, b = self.a_radius[:, None], self.b_radius[:, None]
         return np.stack([np.minimum(self.a - a, self.b - b), np.maximum(self.a + a, self.b + b)])
 
     def volumes(self) -> Floats:
-        """Approximate the volumes [..., N], cubic metres, by the cone between the centres and half of each ball."""
+        """Approximate the volumes [..., N], cubic metres: the cone between the centres, and half of each end ball."""
         a, b = self.a_radius, self.b_radius
         length = np.linalg.norm(self.b - self.a, axis=-1)
         return np.asarray(np.pi / 3.0 * (a * a + a * b + b * b) * length + 2.0 / 3.0 * np.pi * (a**3 + b**3))
@@ -49,7 +49,7 @@ class Ellipsoids:
     centre: Floats
     axes: Floats
 
-    def reach(self) -> Floats:
+    def bounds(self) -> Floats:
         """Compute the least and greatest coordinates of each [2, ..., N, 3], metres."""
         half = np.linalg.norm(self.axes, axis=-1)
         return np.stack([self.centre - half, self.centre + half])
@@ -63,6 +63,12 @@ class Ellipsoids:
     def volumes(self) -> Floats:
         """Compute the volumes [..., N], cubic metres."""
         return np.asarray(4.0 / 3.0 * np.pi * np.abs(np.linalg.det(self.axes)))
+
+
+def bounding_box(cones: Cones, balls: Ellipsoids) -> Floats:
+    """Compute the least and greatest coordinates of solids [..., N, 3] taken together [..., 2, 3], metres."""
+    low, high = np.concatenate([cones.bounds(), balls.bounds()], axis=-2)
+    return np.stack([low.min(axis=-2), high.max(axis=-2)], axis=-2)
 
 
 def posture_solids(cones: Cones, balls: Ellipsoids, posture: int) -> tuple[Cones, Ellipsoids]:

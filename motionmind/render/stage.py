@@ -1,17 +1,17 @@
 """The stage of a film: a whole motion before one camera, with floor, shadow, ghosts and a caption.
 
-A frame has three layers: the backdrop (paper, floor, ghosts), which is kept; the shadow on the floor; the body. Body
-and shadow are drawn in their own boxes only, so a frame costs as much as the body covers, not as the picture does.
+A frame has three layers: the backdrop (paper, floor, ghosts), which is cached; the shadow on the floor; the body. Only
+the boxes of body and shadow are drawn, so the cost of a frame depends on the size of the body, not of the picture.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
 from motionmind._typing import Floats, Pixels, Singles
 from motionmind.body.motion import Insertion, Motion
@@ -19,30 +19,29 @@ from motionmind.body.palette import Colour
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.render.body_shape import shape_of
-from motionmind.render.camera import SMOOTH, Camera, Corner, aim
+from motionmind.render.camera import SAMPLES_PER_PX, Camera, Corner, aim
 from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.figure import bridge_balls, colour, draw, given_colours, halved, inserted_colours
 from motionmind.render.ground import Ground, Shadow, darken
-from motionmind.render.palette import BRIDGED, FILM_PALE, PAPER, TEXT, TRACK, VIOLET
-from motionmind.render.solids import EMPTY, Cones, Ellipsoids, posture_solids
+from motionmind.render.lettering import font
+from motionmind.render.palette import BRIDGED, PAPER, STAGE, VIOLET
+from motionmind.render.solids import EMPTY, Cones, Ellipsoids, bounding_box, posture_solids
+from motionmind.render.timing import SAME_TIME_S
 from motionmind.render.view import VIEWS, to_view
 
-SMALLEST, LARGEST = 120, 2160  # height of a picture, pixels
-GHOST = 0.22  # opacity of ghosts
-_STRIP = 3.4  # height of the caption, by its letters'
-_SMALL_BODY = 0.6  # a body curled up smaller than this, by its height, is not magnified
-_MOMENT = 1e-6  # seconds: closer times are equal
-_BLOCK = 64  # frames whose solids are placed at once
+MIN_HEIGHT_PX, MAX_HEIGHT_PX = 120, 2160  # of a picture
+GHOST_OPACITY = 0.22
+_BLOCK_FRAMES = 64  # whose solids are placed at once
 
 
 @dataclass(frozen=True, eq=False)
 class FigurePlate:
-    """A body on the stage, before it is coloured.
+    """A body on the stage, without its colours.
 
     Attributes:
         corner: x and y of the buffer's upper left corner in the picture, pixels.
-        buffer: its depth buffer, `SMOOTH` samples a pixel each way; solids are numbered as in `BodyShape.parts`, and
-            after them the balls at bridged joints.
+        buffer: its depth buffer, with `SAMPLES_PER_PX`; solids are numbered as in `BodyShape.parts`, and after them the
+            balls at bridged joints.
         paints: RGB of the body's solids [N, 3], 0 to 255.
     """
 
@@ -54,12 +53,12 @@ class FigurePlate:
     def box(self) -> tuple[slice, slice]:
         """The rows and columns of the picture that the buffer covers."""
         (x, y), (height, width) = self.corner, self.buffer.solid.shape
-        return slice(y, y + height // SMOOTH), slice(x, x + width // SMOOTH)
+        return slice(y, y + height // SAMPLES_PER_PX), slice(x, x + width // SAMPLES_PER_PX)
 
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """The layers that stay during an insertion: backdrop [H, W, 3], where no ghost covers it [H, W], and ghosts."""
+    """What stays during an insertion: the backdrop [H, W, 3], where no ghost covers it [H, W], and the ghosts."""
 
     insertion: Insertion | None
     backdrop: Pixels
@@ -71,24 +70,24 @@ class Stage:
     """The scene of a motion on any skeleton.
 
     Attributes:
-        motion: the motion at the moments to draw, one posture each.
+        motion: the motion at the times to draw, one posture each: the frames of the film.
         body: the body.
         camera: the camera, which sets the size of the picture.
-        ground: the floor; None if it is so far from the body that it would leave no room for it.
+        ground: the floor; None if it is too far away to leave room for the body.
         line: width of the lines around a body's parts, samples.
-        strip: height of the caption at the lower edge, with words and the timeline, pixels; 0 without one.
-        letters: size of the words, pixels.
+        strip: height of the caption at the lower edge, with text and timeline, pixels; 0 without one.
+        letters: size of the text, pixels.
         thick: thickness of the timeline, pixels.
     """
 
     def __init__(
         self, motion: Motion, times: Floats | None = None, *, view: str = "quarter", size: int = 480, first: int = 0
     ) -> None:
-        """The stage for a motion, or for some moments of it.
+        """Set the stage for a motion.
 
         Args:
             motion: the motion.
-            times: the moments to draw [T], seconds, increasing, as from `frame_times`; its own times by default.
+            times: the times to draw [T], seconds, increasing, as from `frame_times`; its own times by default.
             view: the name of one of `view.VIEWS`.
             size: height of the picture, pixels, from 120 to 2160; a flat movement makes it lower.
             first: number of the motion's first frame in the longer motion that it is a part of.
@@ -98,8 +97,10 @@ class Stage:
         """
         if view not in VIEWS:
             raise MotionMindError(f"no view {view!r}; there are {', '.join(VIEWS)}")
-        if not SMALLEST <= size <= LARGEST or size != int(size):
-            raise MotionMindError(f"a picture is from {SMALLEST} to {LARGEST} whole pixels high, not {size}")
+        if not MIN_HEIGHT_PX <= size <= MAX_HEIGHT_PX or size != int(size):
+            raise MotionMindError(
+                f"size must be a whole number of pixels from {MIN_HEIGHT_PX} to {MAX_HEIGHT_PX}, not {size}"
+            )
         self._given, self._first = motion, first
         self.motion = motion if times is None else motion.at(times)
         self.body = shape_of(motion.skeleton)
@@ -111,9 +112,9 @@ class Stage:
         self._block: tuple[int, tuple[Cones, Ellipsoids]] | None = None  # the last block of frames, and its solids
         self._last_scene: _Scene | None = None  # of the last insertion
 
-        self.line = max(SMOOTH, round(SMOOTH * size / 480))
+        self.line = max(SAMPLES_PER_PX, round(SAMPLES_PER_PX * size / 480))
         self.letters, self.thick = max(10, round(0.026 * size)), max(2, round(size / 160))
-        self.strip = round(_STRIP * self.letters) if len(self) > 1 or self.words(0) else 0
+        self.strip = round(3.4 * self.letters) if len(self) > 1 or self.words(0) else 0
         self.camera, self.ground = self._look(view, size)
 
     def __len__(self) -> int:
@@ -122,12 +123,12 @@ class Stage:
     # --- pictures ---------------------------------------------------------------------------------------------------
 
     def frames(self, numbers: Iterable[int] | None = None) -> Iterator[Pixels]:
-        """Yield pictures [H, W, 3], RGB, of the moments with these numbers, all by default; none is kept."""
+        """Yield the pictures [H, W, 3], RGB, of the frames with these numbers, by default of all."""
         for number in range(len(self)) if numbers is None else numbers:
             yield self.picture(number)
 
     def picture(self, number: int) -> Pixels:
-        """Draw the picture [H, W, 3], RGB, of one moment."""
+        """Draw the picture [H, W, 3], RGB, of a frame."""
         scene, shadow = self._scene(number), self.shadow(number)
         picture = scene.backdrop.copy()
         if shadow is not None:
@@ -137,34 +138,36 @@ class Stage:
         return picture
 
     def backdrop(self, number: int) -> Pixels:
-        """Return paper, floor and ghosts at a moment [H, W, 3], RGB; shared, so do not write to it."""
+        """Return paper, floor and ghosts of a frame [H, W, 3], RGB; shared, so do not write to it."""
         return self._scene(number).backdrop
 
     def drawing(self, number: int) -> FigurePlate:
-        """Draw the body at a moment, in violet if the engine inserted it."""
+        """Draw the body of a frame, in violet if the engine inserted it."""
         inserted = bool(self._inserted[number])
         return self._draw(*self._solids(number), self.motion.root[number], self._paints[inserted])
 
     def shadow(self, number: int) -> Shadow | None:
-        """Cast the body's shadow on the floor at a moment; None without a floor."""
+        """Cast the body's shadow on the floor in a frame; None without a floor."""
         return self.ground.shadow(*self._solids(number)) if self.ground else None
 
     def ghosts(self, number: int) -> list[FigurePlate]:
-        """Return the insertion's end postures A and B at a moment; empty outside insertions."""
+        """Return the end postures A and B of a frame's insertion; empty outside insertions."""
         return self._scene(number).ghosts
 
     def insertion(self, number: int) -> Insertion | None:
-        """Return the insertion at a moment, its A and B included; None if there is none."""
+        """Return the insertion of a frame, its A and B included; None if there is none."""
         time = self.motion.times[number]
-        current = (one for one in self._given.insertions if one.times[0] - _MOMENT <= time <= one.times[-1] + _MOMENT)
+        current = (
+            one for one in self._given.insertions if one.times[0] - SAME_TIME_S <= time <= one.times[-1] + SAME_TIME_S
+        )
         return next(current, None)
 
     def words(self, number: int) -> list[tuple[str, Colour]]:
-        """Return the phrases of a moment's caption and their colours: time, frame, and what the engine did."""
+        """Return the phrases of a frame's caption and their colours: time, number, and what the engine did."""
         time, words = self.motion.times[number], list[tuple[str, Colour]]()
         if len(self) > 1:
             frame = int(np.argmin(np.abs(self._given.times - time)))
-            words += [(f"{time:.2f} s", TEXT), (f"frame {self._first + frame}", FILM_PALE)]
+            words += [(f"{time:.2f} s", STAGE.text), (f"frame {self._first + frame}", STAGE.pale)]
         if self._inserted[number]:
             words.append(("inserted", VIOLET))
         if self._bridged[number].any():
@@ -174,7 +177,7 @@ class Stage:
 
     @property
     def line_of_words(self) -> float:
-        """The y of the middle of the words, pixels from the top."""
+        """The y of the middle of the text, pixels from the top."""
         return self.camera.height - 0.66 * self.strip
 
     @property
@@ -191,37 +194,37 @@ class Stage:
     # --- the body ---------------------------------------------------------------------------------------------------
 
     def _look(self, view: str, size: int) -> tuple[Camera, Ground | None]:
-        """Aim the camera at all of the movement, ghosts and balls included; return it and the floor, if visible."""
+        """Aim the camera at the whole movement, ghosts and balls included; return it and the floor, if visible."""
         motions = [self.motion, *self._ends.values()]
         roots = np.concatenate([motion.root for motion in motions])
         origin = 0.5 * (roots.min(axis=0) + roots.max(axis=0)) * [1.0, 0.0, 1.0]
         world, boxes = [], []
 
-        def take_in(cones: Cones, balls: Ellipsoids) -> None:
-            world.append(_reach(cones, balls).reshape(-1, 2, 3))
-            boxes.append(_reach(*to_view(cones, balls, VIEWS[view], origin)).reshape(-1, 2, 3)[..., :2])
+        def include(cones: Cones, balls: Ellipsoids) -> None:
+            world.append(bounding_box(cones, balls).reshape(-1, 2, 3))
+            boxes.append(bounding_box(*to_view(cones, balls, VIEWS[view], origin)).reshape(-1, 2, 3)[..., :2])
 
         for motion in motions:
-            for start in range(0, len(motion), _BLOCK):
-                block = slice(start, start + _BLOCK)
-                take_in(*self.body.solids(motion.rotations[block], motion.root[block]))
+            for start in range(0, len(motion), _BLOCK_FRAMES):
+                block = slice(start, start + _BLOCK_FRAMES)
+                include(*self.body.solids(motion.rotations[block], motion.root[block]))
         for number in np.flatnonzero(self._bridged.any(axis=1)).tolist():
-            take_in(*self._solids(number))
+            include(*self._solids(number))
         reach = np.concatenate(world)
         low, high = reach[:, 0].min(axis=0), reach[:, 1].max(axis=0)
         floor = bool(abs(low[1]) < high[1] - low[1])
         under = ((roots * [1.0, 0.0, 1.0] - origin) @ VIEWS[view].axes.T)[:, :2] if floor else np.empty((0, 2))
-        least = _SMALL_BODY * self.body.height
+        least = 0.6 * self.body.height  # a body that curls up smaller is not magnified
         camera = aim(VIEWS[view], origin, np.concatenate(boxes), under, least, size, self.strip)
         return camera, Ground(camera, low[[0, 2]], high[[0, 2]], self.body.height) if floor else None
 
     def _solids(self, number: int) -> tuple[Cones, Ellipsoids]:
-        """Place the solids of a moment in the world, balls at bridged joints after the body's own."""
-        block = number // _BLOCK
+        """Place the solids of a frame in the world, balls at bridged joints after the body's own."""
+        block = number // _BLOCK_FRAMES
         if self._block is None or self._block[0] != block:
-            part = slice(block * _BLOCK, (block + 1) * _BLOCK)
+            part = slice(block * _BLOCK_FRAMES, (block + 1) * _BLOCK_FRAMES)
             self._block = block, self.body.solids(self.motion.rotations[part], self.motion.root[part])
-        cones, balls = posture_solids(*self._block[1], number % _BLOCK)
+        cones, balls = posture_solids(*self._block[1], number % _BLOCK_FRAMES)
         if self._bridged[number].any():
             joints = self.body.skeleton.positions(self.motion.rotations[number], self.motion.root[number])
             balls = balls.joined(bridge_balls(self.body, joints, self._bridged[number]))
@@ -229,14 +232,14 @@ class Stage:
 
     def _draw(self, cones: Cones, balls: Ellipsoids, root: Floats, paints: Floats) -> FigurePlate:
         cones, balls = self.camera.solids(cones, balls, root)
-        corner, buffer = self.camera.buffer(cones, balls, self.line // SMOOTH + 1)  # room for the outline
+        corner, buffer = self.camera.buffer(cones, balls, self.line // SAMPLES_PER_PX + 1)  # room for the outline
         draw(buffer, cones, balls)
         return FigurePlate(corner, buffer, paints)
 
     def _paint(self, picture: Pixels, drawing: FigurePlate, share: float = 1.0) -> None:
-        """Lay a drawing over a picture, with opacity `share`."""
+        """Paint a drawing over a picture, with opacity `share`."""
         behind = picture[drawing.box]
-        samples = behind.repeat(SMOOTH, axis=0).repeat(SMOOTH, axis=1)
+        samples = behind.repeat(SAMPLES_PER_PX, axis=0).repeat(SAMPLES_PER_PX, axis=1)
         coloured = colour(drawing.buffer, self.body, samples, self.line, drawing.paints)
         image = halved(coloured)
         picture[drawing.box] = image if share == 1.0 else behind + share * (image.astype(np.float32) - behind)
@@ -261,28 +264,28 @@ class Stage:
             solids = self.body.solids(ends.rotations, ends.root)
             for end, root in enumerate(ends.root):
                 ghosts.append(ghost := self._draw(*posture_solids(*solids, end), root, self._paints[0]))
-                self._paint(backdrop, ghost, GHOST)
-                bare[ghost.box][ghost.buffer.solid[::SMOOTH, ::SMOOTH] != EMPTY] = 0.0
+                self._paint(backdrop, ghost, GHOST_OPACITY)
+                bare[ghost.box][ghost.buffer.solid[::SAMPLES_PER_PX, ::SAMPLES_PER_PX] != EMPTY] = 0.0
             self._last_scene = _Scene(insertion, backdrop, bare, ghosts)
         return self._last_scene
 
     # --- the caption ------------------------------------------------------------------------------------------------
 
     def _write(self, picture: Pixels, number: int) -> None:
-        """Write the words, and for several moments the timeline, into the strip."""
+        """Write the text and, for a film, the timeline into the strip."""
         if not self.strip:
             return
         image, above = Image.fromarray(picture[-self.strip :]), self.camera.height - self.strip
-        pen, font, x = ImageDraw.Draw(image), _font(self.letters), float(self.camera.margin)
+        pen, letters, x = ImageDraw.Draw(image), font(self.letters), float(self.camera.margin)
         # Times and frames keep their columns as their digits grow.
         last = f"{self.motion.times[-1]:.2f} s", f"frame {self._first + len(self._given) - 1}"
-        columns = [font.getlength(words) for words in last]
+        columns = [letters.getlength(words) for words in last]
         for place, (phrase, ink) in enumerate(self.words(number)):
             text = phrase
-            while text and x + font.getlength(text) > self.camera.width - self.camera.margin:
+            while text and x + letters.getlength(text) > self.camera.width - self.camera.margin:
                 text = text[:-2] + "…" if len(text) > 2 else ""
-            pen.text((x, self.line_of_words - above), text, ink, font, anchor="lm")
-            x += font.getlength(text) if len(self) == 1 or place > 1 else columns[place]
+            pen.text((x, self.line_of_words - above), text, ink, letters, anchor="lm")
+            x += letters.getlength(text) if len(self) == 1 or place > 1 else columns[place]
             x += 1.2 * self.letters
         if len(self) > 1:
             self._timeline(pen, self.motion.times[number], self.track - above)
@@ -290,32 +293,21 @@ class Stage:
 
     def _timeline(self, pen: ImageDraw.ImageDraw, time: float, top: int) -> None:
         """Draw the timeline with its insertions, and a cursor at `time`, seconds."""
-        spans = [(*self.motion.times[[0, -1]], TRACK)]
+        spans = [(*self.motion.times[[0, -1]], STAGE.timeline)]
         spans += [(*one.times[[0, -1]], VIOLET) for one in self._given.insertions]
         for start, end, ink in spans:
             edges = round(self.on_track(start)), top, round(self.on_track(end)), top + self.thick - 1
             pen.rectangle(edges, ink)
         left = round(self.on_track(time)) - self.thick // 2
-        pen.rectangle((left, top - self.thick, left + self.thick - 1, top + 2 * self.thick - 1), TEXT)
+        pen.rectangle((left, top - self.thick, left + self.thick - 1, top + 2 * self.thick - 1), STAGE.text)
 
 
 def _ends(motion: Motion, insertion: Insertion) -> Motion | None:
-    """Return the end postures A and B of an insertion, those within the motion; None without any to show."""
+    """Return the end postures A and B of an insertion that the motion includes; None if there are none to show."""
     first, last = motion.times[[0, -1]]
-    times = [time for time in insertion.times[[0, -1]] if first - _MOMENT <= time <= last + _MOMENT]
+    times = [time for time in insertion.times[[0, -1]] if first - SAME_TIME_S <= time <= last + SAME_TIME_S]
     return (
         replace(motion, insertions=()).at(np.array(times))
         if len(motion) > 1 and len(insertion.times) > 1 and times
         else None
     )
-
-
-def _reach(cones: Cones, balls: Ellipsoids) -> Floats:
-    """Compute the least and greatest coordinates [..., 2, 3], metres, of postures' solids [..., N]."""
-    low, high = np.concatenate([cones.reach(), balls.reach()], axis=-2)
-    return np.stack([low.min(axis=-2), high.max(axis=-2)], axis=-2)
-
-
-@cache
-def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    return ImageFont.load_default(size)

@@ -1,4 +1,4 @@
-"""The times at which the frames of a film are drawn."""
+"""The frame rate of a film, and the times of its frames."""
 
 from __future__ import annotations
 
@@ -10,31 +10,29 @@ from motionmind._typing import Floats
 from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 
-HOLD = 0.8  # seconds that a film shows its last frame before it starts again
-SLOWEST = 0.01  # frames a second, the least of a film
-USUAL_FRAMES = 1_000  # of a film whose rate nobody chose: 40 s of a GIF, and 12 MB of one of a person
-_TIMES = 4  # as many may be asked for
-_LEAST_RATE, _RATE = 12.0, 25.0  # frames a second: motions with fewer than the first are drawn at the second
-
-
-def frame_rate(motion: Motion) -> float:
-    """Return the default frames a second of a film: the motion's own, or 25 if it has fewer than 12."""
-    return motion.fps if motion.fps >= _LEAST_RATE else _RATE
-
+HOLD_S = 0.8  # how long a film shows its last frame before it starts again
+MIN_FPS = 0.01  # of a film
+N_USUAL_FRAMES = 1_000  # at most at the default rate: 40 s of a GIF, and 12 MB of one of a person
+SAME_TIME_S = 1e-6  # times no farther apart count as equal
 
 _log = logging.getLogger(__name__)
 
 
-def film_rate(motion: Motion, usual: float, fps: float | None, frames: int = USUAL_FRAMES) -> float:
-    """Return a film's frames a second; where it would have very many, those of a rate that nobody chose are fewer.
+def frame_rate(motion: Motion) -> float:
+    """Return the default frames a second of a film: the motion's own, or 25 if it has fewer than 12."""
+    return motion.fps if motion.fps >= 12.0 else 25.0
 
-    A log entry says so (logger "motionmind.render.timing", level INFO).
+
+def film_rate(motion: Motion, usual: float, fps: float | None, frames: int = N_USUAL_FRAMES) -> float:
+    """Return a film's frames a second: the given rate, or the usual one, lowered for long motions.
+
+    A log entry reports a lowered rate (logger "motionmind.render.timing", level INFO).
 
     Args:
         motion: the motion.
-        usual: frames a second, unless they are too many or others are asked for.
-        fps: those asked for.
-        frames: how many there may be at the usual rate, about; four times as many may be asked for.
+        usual: the default rate, frames a second.
+        fps: the rate that the caller chose; None for the default.
+        frames: number of frames at the default rate, at most; a chosen rate may give four times as many.
 
     Raises:
         MotionMindError: there would be too many frames.
@@ -42,11 +40,11 @@ def film_rate(motion: Motion, usual: float, fps: float | None, frames: int = USU
     seconds = float(motion.times[-1] - motion.times[0])
     rate = fps
     if rate is None:
-        rate = usual if seconds * usual <= frames else max((frames - 1) / seconds, SLOWEST)
+        rate = usual if seconds * usual <= frames else max((frames - 1) / seconds, MIN_FPS)
     name, count = motion.name or "motion", seconds * rate + 1.0
-    if count > _TIMES * frames:
+    if count > 4 * frames:
         raise MotionMindError(
-            f"{name}: {count:.0f} frames are more than a film of it may have, {_TIMES * frames} (a lower rate or a "
+            f"{name}: {count:.0f} frames are more than a film of it may have, {4 * frames} (a lower rate or a "
             "shorter part makes fewer)"
         )
     if fps is None and rate < usual:
@@ -55,11 +53,11 @@ def film_rate(motion: Motion, usual: float, fps: float | None, frames: int = USU
 
 
 def frame_times(motion: Motion, rate: float) -> Floats:
-    """Choose when to draw a motion, at even times from its first posture to its last, both included.
+    """Return the times of a film's frames: even, and the first and the last posture included.
 
     Args:
         motion: the motion.
-        rate: frames a second, at most; a little less if the last posture is off that beat.
+        rate: frames a second; the actual rate is a little lower if the last posture falls between two frames.
 
     Returns:
         Times [T], seconds, increasing.

@@ -1,8 +1,8 @@
 """From samples to lines: outlines of regions and ridges of depth, smoothed.
 
-A line first runs exactly along the edges of samples. An edge only tells that the line passes between two samples; so a
-smooth line is chosen among those that pass within half a sample of each edge (the constraint of Gibson, "Constrained
-elastic surface nets", MICCAI 1998).
+A line first runs exactly along the edges of samples. An edge shows only that the line passes between two samples, so
+the smooth line passes within half a sample of each edge (the constraint of Gibson, "Constrained elastic surface nets",
+MICCAI 1998).
 
 Points are x, y in samples, y down. A region lies to the right of its outline, so areas of regions are positive.
 """
@@ -17,9 +17,8 @@ from motionmind._typing import Bools, Floats, Indices, Int16s, Singles
 from motionmind.jit import jit
 from motionmind.render.solids import EMPTY
 
-_FAINT = 0.5  # a ridge ends where it stands out by less, by the step at which it begins
-_SLACK = 0.5  # greatest distance of a smooth line from the middle of an edge, samples
-_PASSES = 30  # of smoothing
+_FAINT_RATIO = 0.5  # of the step at which a ridge begins: it ends where it stands out by less
+_SLACK_SAMPLES = 0.5  # greatest distance of a smooth line from the middle of an edge
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +68,13 @@ def outlines(labels: Int16s) -> Lines:
 
 
 def ridges(parts: Int16s, depth: Singles, step: float) -> Lines:
-    """Trace the edges where samples stand before those of another part by more than `step`.
+    """Trace the edges where samples stand before those of another body part by more than `step`.
 
-    A line continues where they stand out by as little as half of that, so that it does not break up where a limb comes
-    out of a body. Its label is the part with which it begins.
+    A line continues where they stand out by half of that, so it does not break up where a limb leaves the trunk. Its
+    label is the body part at its start.
 
     Args:
-        parts: the part that each sample shows [H, W]; EMPTY where none, before which all parts stand.
+        parts: the body part that each sample shows [H, W]; EMPTY where none, behind all parts.
         depth: how near each sample is [H, W].
         step: a difference of `depth`.
     """
@@ -93,9 +92,9 @@ def smooth(lines: Lines) -> Lines:
     middles[loose] = lines.points[loose]
     points = middles.copy()
     _relax(points, lines.starts, lines.closed)
-    shrinkage = middles - points  # the stairs, and the shrinkage of round shapes; smoothed, the latter alone
+    shrinkage = middles - points  # the stairs, and the shrinkage of round shapes; smoothing leaves the latter
     _relax(shrinkage, lines.starts, lines.closed)
-    return replace(lines, points=np.clip(points + shrinkage, middles - _SLACK, middles + _SLACK))
+    return replace(lines, points=np.clip(points + shrinkage, middles - _SLACK_SAMPLES, middles + _SLACK_SAMPLES))
 
 
 # Directions are 0 right, 1 down, 2 left, 3 up. Side `to` of a sample is the edge that runs in that direction with the
@@ -104,7 +103,7 @@ _X, _Y = np.array([1, 0, -1, 0]), np.array([0, 1, 0, -1])  # a step in each dire
 _CORNER_X, _CORNER_Y = np.array([0, 1, 1, 0]), np.array([0, 0, 1, 1])  # where each side begins, in its sample
 
 
-# The kernels take samples with a border of one sample around them, so that all of them have neighbours.
+# The kernels take samples with a border of one sample, so all have neighbours.
 
 
 @jit
@@ -138,7 +137,7 @@ def _outlines(labels: Int16s) -> tuple[Floats, Indices, Indices, Bools]:
 
 @jit
 def _ridges(parts: Int16s, depth: Singles, step: float) -> tuple[Floats, Indices, Indices, Bools]:
-    """Return the fields of Lines. A line continues along its own part where it can, otherwise along any."""
+    """Return the fields of Lines. A line continues along its own body part if it can, otherwise along any."""
     height, width = parts.shape
     rises = np.zeros((height, width, 4), dtype=np.float32)  # how far each side's sample stands before its neighbour
     number = np.empty((height, width, 4), dtype=np.int32)  # of each side that may be part of a line
@@ -149,7 +148,7 @@ def _ridges(parts: Int16s, depth: Singles, step: float) -> tuple[Floats, Indices
                 other = y - _X[to], x + _Y[to]
                 if parts[y, x] != parts[other]:
                     rises[y, x, to] = depth[y, x] - depth[other]
-                    if rises[y, x, to] > _FAINT * step:
+                    if rises[y, x, to] > _FAINT_RATIO * step:
                         number[y, x, to] = len(sides)
                         sides.append((x, y, to))
     before, after, best = np.full(len(sides), -1), np.full(len(sides), -1), np.zeros(len(sides))
@@ -193,12 +192,12 @@ def _ridges(parts: Int16s, depth: Singles, step: float) -> tuple[Floats, Indices
 
 @jit
 def _next(parts: Int16s, rises: Singles, x: int, y: int, to: int, step: float) -> tuple[int, int, int]:
-    """Find the side that continues a side, or direction -1; of the same part, unless only that one is faint."""
+    """Find the side that continues a side, or direction -1: one of the same body part, unless only that is faint."""
     following, best, left = (x, y, -1), 0, (to + 3) % 4
     ahead_x, ahead_y = x + _X[to], y + _Y[to]
     for then in ((x, y, (to + 1) % 4), (ahead_x, ahead_y, to), (ahead_x + _X[left], ahead_y + _Y[left], left)):
         rise = rises[then[1], then[0], then[2]]
-        if rise > _FAINT * step:
+        if rise > _FAINT_RATIO * step:
             score = 1 + 2 * int(rise > step) + int(parts[then[1], then[0]] == parts[y, x])
             if score > best:
                 following, best = then, score
@@ -207,14 +206,16 @@ def _next(parts: Int16s, rises: Singles, x: int, y: int, to: int, step: float) -
 
 @jit
 def _relax(points: Floats, starts: Indices, closed: Bools) -> None:
-    """Move each point repeatedly towards the middle of its neighbours, in place, by _SLACK at most in all."""
+    """Move each point repeatedly towards the middle of its neighbours, in place, by _SLACK_SAMPLES at most in all."""
     anchors = points.copy()
     for line in range(len(closed)):
         first, end = starts[line], starts[line + 1]
         loose = 0 if closed[line] else 1
-        for _ in range(_PASSES):
+        for _ in range(30):
             for at in range(first + loose, end - loose):
                 before, after = at - 1 if at > first else end - 1, at + 1 if at + 1 < end else first
                 for axis in range(2):
                     target = 0.25 * (points[before, axis] + points[after, axis]) + 0.5 * points[at, axis]
-                    points[at, axis] = min(max(target, anchors[at, axis] - _SLACK), anchors[at, axis] + _SLACK)
+                    points[at, axis] = min(
+                        max(target, anchors[at, axis] - _SLACK_SAMPLES), anchors[at, axis] + _SLACK_SAMPLES
+                    )

@@ -1,4 +1,4 @@
-"""Directions to look from, and the change from the world's axes to a viewer's. Projection is parallel."""
+"""Viewing directions, and the change from world axes to a viewer's. Projection is parallel."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from motionmind.render.solids import Cones, Ellipsoids
 
 @dataclass(frozen=True)
 class View:
-    """A direction to look from, as the world's directions in the picture: unit vectors at right angles.
+    """A viewing direction, as orthonormal vectors in the world.
 
     Attributes:
         name: the view in words.
-        right, up: the directions of the picture's right and upper edges.
-        towards: the direction of the viewer.
+        right, up: right and up in the picture.
+        towards: towards the viewer.
     """
 
     name: str

@@ -13,10 +13,10 @@ from motionmind._typing import Floats, Pixels
 from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 from motionmind.render.body_shape import shape_of
-from motionmind.render.camera import SMOOTH
+from motionmind.render.camera import SAMPLES_PER_PX
 from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.figure import colour, draw, given_colours, halved, inserted_colours
-from motionmind.render.solids import posture_solids
+from motionmind.render.solids import bounding_box, posture_solids
 from motionmind.render.view import VIEWS, to_view
 
 SMALLEST, LARGEST = 32, 480  # pixels of a picture's height
@@ -66,21 +66,20 @@ def thumbnail(motion: Motion, frame: int, height: int) -> bytes:
     root = motion.root[frame]
     cones, balls = posture_solids(*body.solids(motion.rotations[frame][None], root[None]), 0)
     cones, balls = to_view(cones, balls, view, root * [1.0, 0.0, 1.0])
-    low, high = np.concatenate([cones.reach(), balls.reach()], axis=-2)
-    (left, bottom), (right, top) = low.min(axis=0)[:2], high.max(axis=0)[:2]
+    (left, bottom), (right, top) = bounding_box(cones, balls)[:, :2]
     tall = max(_ROOM * body.height, 1.08 * (top - bottom), 1.08 * (right - left) / _WIDE)
     wide = ceil(_WIDE * height)
     scale = height / tall
     # A standing body stands at the bottom of the picture; a leaping body is above it.
     floor = min(bottom, max(0.0, top - 0.96 * tall)) - 0.04 * tall
     corner = 0.5 * (left + right) - 0.5 * wide / scale, floor + tall
-    buffer = DepthBuffer(*corner, SMOOTH * wide, SMOOTH * height, SMOOTH * scale)
+    buffer = DepthBuffer(*corner, SAMPLES_PER_PX * wide, SAMPLES_PER_PX * height, SAMPLES_PER_PX * scale)
     draw(buffer, cones, balls)
     paints = inserted_colours(body) if motion.inserted()[frame] else given_colours(body)
 
     def on(paper: int) -> Floats:
-        background: Pixels = np.full((SMOOTH * height, SMOOTH * wide, 3), paper, dtype=np.uint8)
-        return halved(colour(buffer, body, background, SMOOTH, paints)).astype(float)
+        background: Pixels = np.full((SAMPLES_PER_PX * height, SAMPLES_PER_PX * wide, 3), paper, dtype=np.uint8)
+        return halved(colour(buffer, body, background, SAMPLES_PER_PX, paints)).astype(float)
 
     black, white = on(0), on(255)
     opacity = 1.0 - (white - black).mean(axis=-1, keepdims=True) / 255.0  # paper shows through where it is not covered

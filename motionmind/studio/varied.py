@@ -18,7 +18,7 @@ from motionmind.body.rates import FILM_RATE
 from motionmind.corpus import store
 from motionmind.corpus.recordings import RECORDED_RATE
 from motionmind.errors import MotionMindError
-from motionmind.render.page import base64_of
+from motionmind.render.markup import base64_of
 from motionmind.studio import api
 from motionmind.studio.attractor_map import drawn, map_of
 from motionmind.studio.edits import Arrange, Block

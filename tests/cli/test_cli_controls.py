@@ -19,7 +19,7 @@ MADE = {
     "quadrants": "by quadrants, seed 5",
     "dabby": "by dabby, along rossler (a 0.2, b 0.2, c 5.7), nudge ",
 }
-RANDOM = "error: the order of a variation by {} is random, and follows no trajectory that could be drawn\n"
+RANDOM = "error: a variation by {} is random, and has no trajectory to draw\n"
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def test_every_control_has_words() -> None:
 def test_a_control_is_made_printed_reviewed_and_drawn(
     by: str, clip: str, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(portrait, "SHEETS", 20_000)  # fewer strands, which are drawn quickly
+    monkeypatch.setattr(portrait, "N_SHEET_STEPS", 20_000)  # fewer strands, which are drawn quickly
     along = ("--attractor", "rossler", "--depart", 0.5) if "along" in MADE[by] else ()
     random = () if by == "dabby" else ("--seed", 5)
     asked = ("vary", clip, "--corpus", "ballet", "--alternatives", 1, "--by", by, *along, *random)

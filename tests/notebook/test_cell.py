@@ -17,7 +17,7 @@ from bundled_clips import ballet_clip
 from pages import Tabs
 
 from motionmind import Engine, Motion, Piece, vary
-from motionmind.notebook.cell import MOST_PLACES, html_of
+from motionmind.notebook.cell import MAX_ROTATIONS, html_of
 from motionmind.render.page import page
 
 ADAGIO = ballet_clip("adagio")
@@ -128,7 +128,7 @@ def test_a_cell_is_the_same_each_time_and_a_fraction_of_the_page(kind: str) -> N
 
 
 def test_movement_that_is_too_long_is_said_to_be() -> None:
-    frames = MOST_PLACES // 23 + 1
+    frames = MAX_ROTATIONS // 23 + 1
     rest = np.tile([0.0, 0.0, 0.0, 1.0], (frames, 23, 1))
     motion = Motion(ADAGIO.skeleton, rest, np.zeros((frames, 3)), np.arange(frames) / 30.0, "<long>")
     html = html_of(motion)

@@ -18,7 +18,7 @@ from bundled_clips import ballet_clip
 from pages import RESTING, Tabs
 
 from motionmind import Motion, MotionMindError, Posture, WrongTypeError, vary
-from motionmind.notebook.cell import MOST_PLACES
+from motionmind.notebook.cell import MAX_ROTATIONS
 
 pytest.importorskip("anywidget", reason="anywidget is not installed")
 
@@ -82,8 +82,8 @@ def refuse_words(player: Player) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (refuse_time, "time: the motion goes from 0 to 2 s, not to 2.5"),
-        (refuse_selection, "selection: the motion goes from 0 to 2 s, not to 3"),
+        (refuse_time, "time: the motion lasts from 0 to 2 s; 2.5 is outside"),
+        (refuse_selection, "selection: the motion lasts from 0 to 2 s; 3 is outside"),
         (refuse_backwards, "an earlier and a later time"),
         (refuse_words, "selection must be an array of numbers"),
     ],
@@ -98,7 +98,7 @@ def test_what_is_not_within_the_motion_is_refused(change: Callable[[Player], Non
 def test_what_does_not_move_or_is_too_long_is_refused() -> None:
     with pytest.raises(WrongTypeError, match="movement must be"):
         Player("clip.bvh")
-    frames = MOST_PLACES // 23 + 1
+    frames = MAX_ROTATIONS // 23 + 1
     rest = np.tile([0.0, 0.0, 0.0, 1.0], (frames, 23, 1))
     with pytest.raises(MotionMindError, match="too long"):
         Player(Motion(ADAGIO.skeleton, rest, np.zeros((frames, 3)), np.arange(frames) / 30.0))

@@ -20,7 +20,7 @@ from motionmind.plots import draw_angles
 from motionmind.plots.canvas import png
 from motionmind.plots.marks import Line
 from motionmind.render.markup import hexadecimal
-from motionmind.render.palette import BRIDGED, PIECE, VIOLET
+from motionmind.render.palette import BRIDGED, PLOT, VIOLET
 
 ARM = Skeleton("arm", ("shoulder", "elbow"), (-1, 0), np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]]))
 
@@ -34,7 +34,7 @@ def swinging(*insertions: Insertion) -> Motion:
 
 def curves(motion: Motion, *joints: str) -> list[Line]:
     plate = draw_angles(motion, joints or None)
-    return [mark for mark in plate.marks if isinstance(mark, Line) and mark.ink in (PIECE, VIOLET, BRIDGED)]
+    return [mark for mark in plate.marks if isinstance(mark, Line) and mark.ink in (PLOT.piece, VIOLET, BRIDGED)]
 
 
 def test_equal_turns_are_equally_high_and_equal_times_equally_wide() -> None:
@@ -50,7 +50,7 @@ def test_equal_turns_are_equally_high_and_equal_times_equally_wide() -> None:
 def test_inserted_and_bridged_movement_have_their_colours() -> None:
     motion = swinging(Insertion(np.array([0.3, 0.5, 0.7]), bridged=(("elbow", 1),)))
     found = [(line.ink, len(line.points)) for line in curves(motion, "elbow") if line.title]
-    assert found == [(PIECE, 4), (PIECE, 4), (VIOLET, 5), (BRIDGED, 4)]
+    assert found == [(PLOT.piece, 4), (PLOT.piece, 4), (VIOLET, 5), (BRIDGED, 4)]
     assert [line for line in curves(motion, "shoulder") if line.ink == BRIDGED and line.title] == []
 
 
@@ -77,7 +77,7 @@ def test_the_picture_is_whole_whatever_turns(tmp_path: Path) -> None:
         points = np.array([pair.split(",") for pair in line.attrib["points"].split()], float)
         assert (points >= 0.0).all()
         assert (points <= [plate.width, plate.height]).all()
-    assert hexadecimal(PIECE) in (tmp_path / "chart.svg").read_text()
+    assert hexadecimal(PLOT.piece) in (tmp_path / "chart.svg").read_text()
     assert Image.open(BytesIO(png(plate))).size == (plate.width, plate.height)
     assert plate._repr_svg_().startswith("<svg")
     assert len(repr(plate)) < 200
@@ -88,7 +88,7 @@ def test_the_picture_is_whole_whatever_turns(tmp_path: Path) -> None:
     [
         (lambda: draw_angles(swinging().slice(0, 1)), MotionMindError, "swing has one frame"),
         (lambda: draw_angles(swinging(), ["tail"]), SkeletonError, "no joint 'tail'"),
-        (lambda: draw_angles(swinging(), []), MotionMindError, "one joint at least"),
+        (lambda: draw_angles(swinging(), []), MotionMindError, "one joint or more"),
         (lambda: draw_angles(swinging(), "elbow"), MotionMindError, re.escape("write ['elbow']")),
         (lambda: draw_angles(swinging()).save("chart.gif"), MotionMindError, "chart.gif: suffix '.gif' is unknown"),
     ],

@@ -35,7 +35,7 @@ from motionmind.plots.marks import Dot, Inset, Line, Region, Words
 from motionmind.plots.portrait import Portrait, portrait_of
 from motionmind.plots.scene import Room
 from motionmind.plots.symbols import round_numbers
-from motionmind.render.palette import PIECE, VARIATION
+from motionmind.render.palette import PLOT
 from motionmind.render.solids import EMPTY
 from motionmind.variation.piece import Piece
 from motionmind.variation.variation import Variation, vary
@@ -59,7 +59,7 @@ def macarena() -> Motion:
 @pytest.fixture(scope="module", params=["lorenz", "rossler"])
 def portrait(request: pytest.FixtureRequest) -> Portrait:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(portraits, "SHEETS", 500_000)  # which fill the attractor, too
+        patch.setattr(portraits, "N_SHEET_STEPS", 500_000)  # which fill the attractor, too
         found = portrait_of(varied(request.param, length=180))
         assert len(found.sheets) == 500_000
     return found
@@ -73,7 +73,7 @@ def plate(portrait: Portrait) -> Plate:
 @pytest.fixture
 def sketchy(monkeypatch: pytest.MonkeyPatch) -> None:
     """Attractors of few strands, which are drawn quickly."""
-    monkeypatch.setattr(portraits, "SHEETS", 20_000)
+    monkeypatch.setattr(portraits, "N_SHEET_STEPS", 20_000)
 
 
 def lines(plate: Plate, ink: tuple[int, int, int]) -> list[Line]:
@@ -173,7 +173,7 @@ def test_sites_and_points_are_drawn_where_the_axes_say(portrait: Portrait, plate
 
 
 def test_every_step_of_both_trajectories_is_drawn_and_passes_its_sites(portrait: Portrait, plate: Plate) -> None:
-    for ink, title, count in ((PIECE, "posture", 131), (VARIATION, "at", 180)):
+    for ink, title, count in ((PLOT.piece, "posture", 131), (PLOT.variation, "at", 180)):
         points = lines(plate, ink)[0].points
         assert len(points) == (count - 1) * portrait.every + 1
         places = np.array([dots(plate, title)[n].at for n in range(count)])
@@ -189,13 +189,15 @@ def test_both_itineraries_are_drawn_and_every_jump(portrait: Portrait, plate: Pl
     assert jumps == sorted(2 * [(seam.start, seam.end, seam.number) for seam in seams])
 
     top = max(mark.at[1] for mark in dots(plate, "at").values())
-    below = [m for m in plate.marks if isinstance(m, Dot) and m.at[1] > top + 50.0 and VARIATION in (m.fill, m.rim)]
+    below = [
+        m for m in plate.marks if isinstance(m, Dot) and m.at[1] > top + 50.0 and PLOT.variation in (m.fill, m.rim)
+    ]
     places = {round(mark.at[0], 6): mark.at[1] for mark in below}  # a parting lies on a jump
     heights = [places[x] for x in sorted(places)]
     assert len(heights) == len(portrait.order)
     slope, start = np.polyfit(portrait.order, heights, 1)
     np.testing.assert_allclose(heights, start + slope * portrait.order, atol=1e-6)
-    piece = next(line for line in lines(plate, PIECE) if len(line.points) == 2 and line.points[:, 1].min() > top)
+    piece = next(line for line in lines(plate, PLOT.piece) if len(line.points) == 2 and line.points[:, 1].min() > top)
     np.testing.assert_allclose(piece.points[:, 1], [start, start + slope * 130], atol=1e-6)
 
 
@@ -266,7 +268,7 @@ def test_png_shows_what_svg_does(plate: Plate) -> None:
     image = Image.open(BytesIO(png(plate))).convert("RGB")
     assert image.size == (plate.width, plate.height)
     found, places = 0, np.array([mark.at for mark in plate.marks if isinstance(mark, Dot)])
-    for title, ink in (("posture", PIECE), ("at", VARIATION)):
+    for title, ink in (("posture", PLOT.piece), ("at", PLOT.variation)):
         for dot in dots(plate, title).values():
             around = np.hypot(*(places - dot.at).T) < 8.0
             if around.sum() == 1 and dot.fill == ink:
@@ -436,7 +438,7 @@ def test_the_page_follows_the_variation_on_its_attractor(show: Callable[..., Any
         assert tab.inner_text("#site") == str(variation.order[n])
         assert f"posture {variation.order[n]}, at {n} of 59" in tab.inner_text("#reading")
     shot = np.array(Image.open(BytesIO(tab.locator("#space").screenshot())).convert("RGB")).astype(int)
-    for ink in (PIECE, VARIATION):
+    for ink in (PLOT.piece, PLOT.variation):
         assert (np.abs(shot - ink).max(axis=-1) < 40).sum() > 50
 
 
@@ -522,6 +524,6 @@ def test_a_variation_that_is_longer_than_its_piece_stays_with_it_to_its_end(sket
 
 
 def test_more_steps_than_a_picture_has_lines_for_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(portraits, "MOST_STEPS", 100)
+    monkeypatch.setattr(portraits, "MAX_STEPS", 100)
     with pytest.raises(MotionMindError, match="shows 100 steps at most, not 220: 20 postures, 11 steps each"):
         portrait_of(vary(Piece.of(ballet_clip("jump")), length=20))

@@ -26,12 +26,12 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 from motionmind.render import film
-from motionmind.render.camera import SMOOTH
+from motionmind.render.camera import SAMPLES_PER_PX
 from motionmind.render.film import write_film, write_still
 from motionmind.render.palette import BRIDGED, COLOURS, INSERTED
 from motionmind.render.solids import EMPTY
-from motionmind.render.stage import LARGEST, SMALLEST, FigurePlate, Stage
-from motionmind.render.timing import HOLD, frame_times
+from motionmind.render.stage import MAX_HEIGHT_PX, MIN_HEIGHT_PX, FigurePlate, Stage
+from motionmind.render.timing import HOLD_S, frame_times
 from motionmind.render.view import VIEWS
 
 SMALL = 200  # pixels: pictures for tests
@@ -120,7 +120,7 @@ def touched(drawing: FigurePlate, stage: Stage) -> tuple[Floats, Floats]:
     """The rows and columns of the picture, pixels, that a body covers."""
     rows, columns = np.nonzero(drawing.buffer.solid != EMPTY)
     x, y = drawing.corner
-    return rows / SMOOTH + y, columns / SMOOTH + x
+    return rows / SAMPLES_PER_PX + y, columns / SAMPLES_PER_PX + x
 
 
 def near(picture: Pixels, colour: tuple[int, int, int]) -> Bools:
@@ -212,7 +212,7 @@ def test_shadows_darken_the_floor_and_no_ghost() -> None:
         dark[stage.drawing(number).box] = 0.0
         haunted = np.zeros(dark.shape, dtype=bool)
         for ghost in stage.ghosts(number):
-            haunted[ghost.box] = ghost.buffer.solid[::SMOOTH, ::SMOOTH] != EMPTY
+            haunted[ghost.box] = ghost.buffer.solid[::SAMPLES_PER_PX, ::SAMPLES_PER_PX] != EMPTY
         fallen = behind.astype(float).sum(axis=-1) - picture.sum(axis=-1)
         clear = dark > 0.05
         assert (fallen[clear & ~haunted] > 10.0).all()
@@ -228,8 +228,10 @@ def test_a_mirrored_motion_has_a_mirrored_picture() -> None:
     for number in range(4):
         bodies = []
         for stage in stages:
-            picture = np.zeros((SMOOTH * stage.camera.height, SMOOTH * stage.camera.width), dtype=bool)
-            rows, columns = (slice(SMOOTH * box.start, SMOOTH * box.stop) for box in stage.drawing(number).box)
+            picture = np.zeros((SAMPLES_PER_PX * stage.camera.height, SAMPLES_PER_PX * stage.camera.width), dtype=bool)
+            rows, columns = (
+                slice(SAMPLES_PER_PX * box.start, SAMPLES_PER_PX * box.stop) for box in stage.drawing(number).box
+            )
             picture[rows, columns] = stage.drawing(number).buffer.solid != EMPTY
             bodies.append(picture)
         assert (bodies[0] != bodies[1][:, ::-1]).sum() < 0.01 * bodies[0].sum()
@@ -314,7 +316,7 @@ def test_a_stage_shows_the_motion_at_its_moments() -> None:
 
 
 def test_words_that_do_not_fit_are_cut_short() -> None:
-    stage = Stage(bridged(movement(), *human23().names), size=SMALLEST)
+    stage = Stage(bridged(movement(), *human23().names), size=MIN_HEIGHT_PX)
     picture, margin = stage.picture(3), stage.camera.margin
     strip = np.abs(picture.astype(int) - stage.backdrop(3))[-stage.strip :].sum(axis=-1)
     assert strip[:, margin:-margin].any()
@@ -323,7 +325,7 @@ def test_words_that_do_not_fit_are_cut_short() -> None:
 
 @pytest.mark.parametrize(
     ("view", "size", "words"),
-    [("behind", 480, "quarter"), ("front", SMALLEST - 1, "120"), ("front", LARGEST + 1, "2160")],
+    [("behind", 480, "quarter"), ("front", MIN_HEIGHT_PX - 1, "120"), ("front", MAX_HEIGHT_PX + 1, "2160")],
 )
 def test_what_cannot_be_staged_is_refused(view: str, size: int, words: str) -> None:
     with pytest.raises(MotionMindError, match=words):
@@ -345,10 +347,10 @@ def opened(path: Path) -> Iterator[tuple[Ints, int]]:
 @pytest.mark.parametrize(("fps", "frames", "rate"), [(10.0, 12, None), (30.0, 20, None), (7.3, 9, 50.0), (60, 9, 7.0)])
 def test_a_gif_lasts_as_long_as_the_motion(tmp_path: Path, fps: float, frames: int, rate: float | None) -> None:
     motion = movement(frames=frames, fps=fps)
-    write_film(tmp_path / "a.gif", motion, fps=rate, size=SMALLEST)
+    write_film(tmp_path / "a.gif", motion, fps=rate, size=MIN_HEIGHT_PX)
     times = [time for _, time in opened(tmp_path / "a.gif")]
     length = 1000.0 * motion.times[-1]
-    assert abs(sum(times) - length - 1000 * HOLD) <= 10.0
+    assert abs(sum(times) - length - 1000 * HOLD_S) <= 10.0
     assert max(times[:-1]) - min(times[:-1]) <= 10
     begins = np.cumsum([0, *times[:-1]])
     assert np.abs(begins - np.linspace(0.0, length, len(times))).max() <= 5.0 + 1e-6
@@ -396,7 +398,7 @@ def test_frames_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
         return picture
 
     monkeypatch.setattr(Stage, "picture", counted)
-    film.gif(Stage(movement(frames=30), size=SMALLEST))
+    film.gif(Stage(movement(frames=30), size=MIN_HEIGHT_PX))
     assert len(alive) > 30
     assert most <= 2
 

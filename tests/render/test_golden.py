@@ -47,7 +47,7 @@ def standing(**turns: tuple[float, float, float]) -> Posture:
     """human23, bent, with its lowest solid on the floor."""
     posture = bent(human23(), **turns)
     cones, balls = shape_of(human23()).solids(posture.rotations, posture.root)
-    lowest = min(cones.reach()[0, :, 1].min(), balls.reach()[0, :, 1].min())
+    lowest = min(cones.bounds()[0, :, 1].min(), balls.bounds()[0, :, 1].min())
     return replace(posture, root=np.array([0.0, -lowest, 0.0]))
 
 

@@ -29,11 +29,11 @@ from motionmind.geometry import rotations as rot
 from motionmind.render import sheet as sheets
 from motionmind.render.body_shape import shape_of
 from motionmind.render.body_solids import BodyShape
-from motionmind.render.camera import SMOOTH
+from motionmind.render.camera import SAMPLES_PER_PX
 from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.figure import bridge_balls, colour, draw, given_colours, halved, inserted_colours
-from motionmind.render.palette import COLOURS, FACE, INK, INSERTED, SHEET_FLOOR, SHEET_PAPER, SUNK
-from motionmind.render.sheet import MOST, draw_sheet
+from motionmind.render.palette import COLOURS, FACE, INK, INSERTED, SHEET
+from motionmind.render.sheet import MAX_POSTURES, draw_sheet
 from motionmind.render.solids import EMPTY, Cones, Ellipsoids
 from motionmind.render.view import ABOVE, FRONT, STAGE_LEFT, STAGE_RIGHT, View, to_view
 
@@ -239,14 +239,14 @@ def test_sizes_grow_with_the_body() -> None:
     for whole, half in zip(
         shape_of(human23()).solids(rotations, np.zeros(3)), shape_of(small).solids(rotations, np.zeros(3)), strict=True
     ):
-        assert np.allclose(whole.reach(), 2.0 * half.reach())
+        assert np.allclose(whole.bounds(), 2.0 * half.bounds())
 
 
 def test_the_soles_stand_on_the_floor() -> None:
     posture = standing()
     floor = human23().positions_and_tips(posture.rotations, posture.root)[:, 1].min()
     cones, balls = shape_of(human23()).solids(posture.rotations, posture.root)
-    assert min(cones.reach()[0, :, 1].min(), balls.reach()[0, :, 1].min()) == pytest.approx(floor, abs=0.004)
+    assert min(cones.bounds()[0, :, 1].min(), balls.bounds()[0, :, 1].min()) == pytest.approx(floor, abs=0.004)
 
 
 def test_sides_are_told_by_the_words_of_the_names() -> None:
@@ -521,9 +521,9 @@ def test_one_floor_and_one_scale_for_the_whole_sheet() -> None:
         pictures = [np.asarray(sheet._view(at, window)).astype(int) for at in (0, 1)]
         tops = []
         for pixels in pictures:
-            floor = round(window.to_samples(0.0, 0.0)[1]) // SMOOTH
-            assert (pixels[floor, [0, -1]] == SHEET_FLOOR).all()
-            assert (pixels[floor - 1, [0, -1]] == SHEET_PAPER).all()
+            floor = round(window.to_samples(0.0, 0.0)[1]) // SAMPLES_PER_PX
+            assert (pixels[floor, [0, -1]] == SHEET.floor).all()
+            assert (pixels[floor - 1, [0, -1]] == SHEET.paper).all()
             assert (np.ptp(pixels[floor - 5 : floor], axis=-1) > 60).any()  # feet on it
             tops.append(np.flatnonzero((pixels < 128).any(axis=(1, 2)))[0])
         assert tops[0] > tops[1] + 20  # who stands on the toes is taller than who bends
@@ -546,7 +546,7 @@ def test_what_is_under_the_floor_is_marked() -> None:
     def marked(sinks: float) -> int:
         sheet = sheets._Sheet(moved(motion, 0.0, -sinks, 0.0), [0], STAGE_RIGHT)
         pixels = np.asarray(sheet._view(0, sheet.windows[0])).astype(int)
-        return int((np.abs(pixels - SUNK).max(axis=-1) < 30).sum())
+        return int((np.abs(pixels - SHEET.sunk).max(axis=-1) < 30).sum())
 
     assert marked(0.0) == 0
     assert marked(0.05) > 50
@@ -592,16 +592,22 @@ def test_an_insect_has_six_legs_in_two_colours() -> None:
 
 def test_a_sheet_has_bounds() -> None:
     many = clip(1, ant())
-    times = np.arange(MOST + 1.0)
-    many = Motion(many.skeleton, many.rotations[np.zeros(MOST + 1, dtype=int)], np.zeros((MOST + 1, 3)), times, "long")
+    times = np.arange(MAX_POSTURES + 1.0)
+    many = Motion(
+        many.skeleton,
+        many.rotations[np.zeros(MAX_POSTURES + 1, dtype=int)],
+        np.zeros((MAX_POSTURES + 1, 3)),
+        times,
+        "long",
+    )
     with pytest.raises(MotionMindError, match=r"^long: a sheet holds 400 postures, not 401; .* --every 2$"):
         draw_sheet(many)
     with pytest.raises(MotionMindError, match="no frame to draw"):
         draw_sheet(many, [])
     with pytest.raises(MotionMindError, match="frames 0 to 400, no frame 401"):
         draw_sheet(many, [401])
-    full = draw_sheet(many, range(MOST))
-    assert full.width * full.height < 1.3 * sheets._PIXELS
+    full = draw_sheet(many, range(MAX_POSTURES))
+    assert full.width * full.height < 1.3 * sheets._MAX_PIXELS
     leaps = replace(clip(2), root=np.array([[0.0, 1.0, 0.0], [0.0, 1e6, 0.0]]))
     picture = draw_sheet(leaps)
     assert max(picture.size) < 2000
@@ -892,12 +898,12 @@ def test_other_commands_do_not_pay_for_pictures() -> None:
 
 @pytest.mark.parametrize("options", [{"columns": 0}, {"columns": -3}, {"side": "top"}])
 def test_a_sheet_has_columns_and_two_sides(options: dict[str, object]) -> None:
-    with pytest.raises(MotionMindError, match="one column at least, and is seen from the right or left"):
+    with pytest.raises(MotionMindError, match=r"side must be 'right' or 'left'|columns must be 1 or more"):
         draw_sheet(clip(2), **options)  # type: ignore[arg-type]
 
 
 def test_a_body_far_under_or_over_the_floor_keeps_its_colours() -> None:
     for height in (-30.0, 30.0):
         pixels = np.asarray(draw_sheet(moved(standing().as_motion(), 0.0, height, 0.0))).astype(int)
-        assert (np.abs(pixels - SUNK).max(axis=-1) < 30).sum() < 300  # but for the words that explain it
+        assert (np.abs(pixels - SHEET.sunk).max(axis=-1) < 30).sum() < 300  # but for the words that explain it
         assert (pixels[..., 0] - pixels[..., 2] > 60).sum() > 500

@@ -20,7 +20,7 @@ from motionmind.files import parse_toml
 from motionmind.formats import read_motion, write_motion
 from motionmind.geometry import rotations as rot
 from motionmind.render.pictures import draw_picture
-from motionmind.render.timing import SLOWEST, film_rate, frame_times
+from motionmind.render.timing import MIN_FPS, film_rate, frame_times
 
 pytestmark = pytest.mark.long
 
@@ -93,10 +93,10 @@ def test_nobody_may_ask_for_a_film_of_many_times_as_many_frames(suffix: str, tmp
     assert [path.name for path in tmp_path.iterdir()] == ["slow.bvh"]
 
 
-@pytest.mark.parametrize(("frames", "rate"), [(2, 25.0), (1000, 25.0), (1001, 25.0), (1999, 12.5), (10**9, SLOWEST)])
+@pytest.mark.parametrize(("frames", "rate"), [(2, 25.0), (1000, 25.0), (1001, 25.0), (1999, 12.5), (10**9, MIN_FPS)])
 def test_a_film_has_so_many_frames_at_a_rate_that_nobody_chose(frames: int, rate: float) -> None:
     still = Motion(BODY, np.tile(rot.IDENTITY, (2, 23, 1)), np.zeros((2, 3)), np.array([0.0, (frames - 1) / 25.0]))
-    if rate == SLOWEST:
+    if rate == MIN_FPS:
         with pytest.raises(MotionMindError, match="more than a film of it may have, 4000 "):
             film_rate(still, 25.0, None)
         return

@@ -354,7 +354,7 @@ def test_orders_and_seeds_that_there_are_not_are_refused(kata: Piece) -> None:
 
 @pytest.mark.parametrize("by", RANDOM)
 def test_random_orders_have_no_portrait(by: str, kata: Piece) -> None:
-    with pytest.raises(MotionMindError, match=f"a variation by {by} is random, and follows no trajectory"):
+    with pytest.raises(MotionMindError, match=f"a variation by {by} is random, and has no trajectory"):
         portrait_of(vary(kata, by=by))  # type: ignore[arg-type]
 
 

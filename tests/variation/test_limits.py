@@ -195,7 +195,7 @@ def test_a_variation_within_limits_is_read_as_it_was_written(kata: Piece, within
 def test_what_cannot_be_reached_is_refused_in_a_line(
     kata: Piece, karate: Engine, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("motionmind.plots.portrait.SHEETS", 20_000)  # which are drawn quickly
+    monkeypatch.setattr("motionmind.plots.portrait.N_SHEET_STEPS", 20_000)  # which are drawn quickly
     for options, message in (
         ({"inserted": 0.3}, "limits what a corpus inserts, and none is given"),
         ({"inserted": 1.5, "engine": karate}, "must be from 0 to 1, not 1.5"),
