@@ -20,6 +20,8 @@ from .formats import read_motion as read_motion
 from .formats import read_posture as read_posture
 from .formats import write_motion as write_motion
 from .formats import write_posture as write_posture
+from .names.postures import FoundPosture as FoundPosture
+from .names.postures import find_posture as find_posture
 from .notation.compose import compose as compose
 from .notation.read import read_score as read_score
 from .notation.score import Score as Score
@@ -33,6 +35,7 @@ from .tween.certificate import Wait as Wait
 from .tween.engine import Engine as Engine
 from .tween.narrative import Explanation as Explanation
 from .tween.narrative import explain as explain
+from .tween.options import SearchOptions as SearchOptions
 from .tween.report import TweenReport as TweenReport
 from .tween.report import read_report as read_report
 from .tween.request import TweenRequest as TweenRequest
@@ -53,6 +56,7 @@ __all__ = [
     "Engine",
     "Explanation",
     "FormatError",
+    "FoundPosture",
     "Insertion",
     "Motion",
     "MotionMindError",
@@ -62,6 +66,7 @@ __all__ = [
     "Posture",
     "Score",
     "Seam",
+    "SearchOptions",
     "Skeleton",
     "SkeletonError",
     "Source",
@@ -76,6 +81,7 @@ __all__ = [
     "draw_picture",
     "draw_sheet",
     "explain",
+    "find_posture",
     "human23",
     "human44",
     "list_corpora",

@@ -563,7 +563,7 @@ def test_joint_moves_within_tolerance_are_those_between_the_ends() -> None:
     from motionmind import Engine
 
     engine = Engine.load("ballet")
-    tween = engine.tween("ballet/arabesque", "ballet/fifth")
+    tween = engine.tween(engine.posture("ballet/arabesque"), engine.posture("ballet/fifth"))
     tolerances = engine.space.tolerances
     count, within, within_three = near(tween, tolerances)
     off = [list(zip(row, tolerances, strict=True)) for row in tween.path_degrees[1:-1]]

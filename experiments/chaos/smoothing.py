@@ -21,7 +21,7 @@ from motionmind.variation.seams import judge_transitions
 PIECES = (("ballet", "jump"), ("macarena", "macarena"), ("karate", "heian-shodan"), ("medley", "medley"))
 FLOWS = ("lorenz", "rossler")
 NUDGES = (0.1, 0.3, 1.0)  # a variation each
-RULES = {"posturewise": {"posturewise": True}, "strict": {"strict": True}, "bridged": {}}
+RULES = {"whole_body": {"whole_body": True}, "strict": {"strict": True}, "bridged": {}}
 SHUFFLES = 10  # of each variation, by seeds from 0 on
 RATE = 5.0  # postures a second of recordings
 LEAST = 200  # postures of a variation, or as many as the piece has if it has more
@@ -70,7 +70,7 @@ def shuffled(variations: list[Variation], engine: Engine) -> float | None:
         flow, nudge = find_flow(variation.course.flow), variation.course.nudge
         control = vary(variation.piece, by="chunks", seed=seed, flow=flow, nudge=nudge)
         pairs = [(seam.start, seam.end) for seam in control.seams]
-        found += [one.is_abrupt for one in judge_transitions(variation.piece, pairs, engine, posturewise=False)]
+        found += [one.is_abrupt for one in judge_transitions(variation.piece, pairs, engine, whole_body=False)]
     return round(float(np.mean(found)), 3) if found else None
 
 

@@ -268,7 +268,7 @@ def ways(lesson: Lesson, given: str, own: bool, seconds: float) -> dict[str, Way
         plain["hermite"] = hermite
     out |= {kind: lambda window, ends, make=make: (make(ends), {}) for kind, make in plain.items()}
     if given == GIVEN[0] and own:
-        bodies = {"moves": (1, LONGEST), "posturewise": True}
+        bodies = {"moves": (1, LONGEST), "whole_body": True}
         out["whole bodies"] = lambda window, ends: tween(lesson.engine, ends, seconds, **bodies)
         out["no guide"] = lambda window, ends: tween(lesson.engine, ends, seconds, guide=0.0)
     out["motionmind"] = lambda window, ends: tween(lesson.engine, ends, seconds)

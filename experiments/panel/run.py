@@ -23,7 +23,7 @@ from motionmind.variation.seams import judge_transitions
 
 FLOWS, NUDGES, LENGTH = ("lorenz", "rossler"), (0.1, 0.3, 1.0), 200
 RULES: dict[str, dict[str, Any]] = {
-    "whole body": {"posturewise": True},
+    "whole body": {"whole_body": True},
     "strict": {"strict": True},
     "bridged": {},
 }
@@ -52,7 +52,7 @@ def work(data: str | None, by: str, rule: str, most: int, seed: int) -> list[Row
     out: list[Row] = []
     for number in order:
         piece, pair = pairs[number]
-        (transition,) = judge_transitions(piece, [pair], found, posturewise=False)
+        (transition,) = judge_transitions(piece, [pair], found, whole_body=False)
         if not transition.is_abrupt:
             continue
         row: Row = {

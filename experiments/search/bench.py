@@ -26,8 +26,7 @@ from motionmind.search import bounding, solve
 from motionmind.search.cfn import cfn
 from motionmind.search.problem import Model, Problem, Rules, costs_to_go, with_waits
 from motionmind.search.solve import Certificate
-from motionmind.tween.problem import build_model, ingredients_of
-from motionmind.tween.progression import lift_to_moves
+from motionmind.tween.problem import build_model, ingredients_of, lift_to_moves
 
 TIME_LIMIT = 20  # seconds that toulbar2 gets for one problem
 RULES = Rules(wait=1.0, per_move=1.0, shortest=1, longest=60, node_budget=200_000)

@@ -141,7 +141,7 @@ def posed(case: Case, engine: Engine, pairs: int, seed: int) -> Iterator[Posed]:
     rng = np.random.default_rng(seed)
     while pairs > 0:
         a, b = random_posture(engine, rng), random_posture(engine, rng)
-        request = TweenRequest(**case.ask(engine, rng))
+        request = TweenRequest.of(**case.ask(engine, rng))
         found = formulate(engine, a, b, request)
         if not feasible(found.searched):
             continue

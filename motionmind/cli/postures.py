@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal
 
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_motion
-from motionmind.names.ends import find_end
 from motionmind.names.finding import find_motion, select_frame, select_frames
+from motionmind.names.postures import find_posture
 from motionmind.names.spelling import FramesName, PostureName
 
 if TYPE_CHECKING:
@@ -37,8 +37,11 @@ def read_end(
     """
     if given and named.is_moving:
         raise MotionMindError(f"{named.word}: ~ takes the movement around the frame, and so does --{side}; give one")
-    posture, around = find_end(named, side, home, read=read)
-    return posture, _read_frames(given, home, read) if given else around
+    found = find_posture(named, home, read=read)
+    around = found.before if side == "before" else found.after
+    if named.is_moving and around is None:
+        raise MotionMindError(f"{named.word}: nothing comes {side} this frame; leave out ~")
+    return found.posture, _read_frames(given, home, read) if given else around
 
 
 def _read_frames(named: FramesName, home: Path | None, read: Callable[[Path], Motion]) -> Motion:

@@ -20,7 +20,8 @@ from motionmind.cli.words import parse_avoided, parse_pins, parse_vias
 from motionmind.errors import MotionMindError
 from motionmind.footing.corrections import Correction
 from motionmind.grammar.schemes import Scheme, Weights
-from motionmind.tween.request import PACES, TweenRequest
+from motionmind.tween.options import PACE_RANGE, SearchOptions
+from motionmind.tween.request import TweenRequest
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion, Posture
@@ -120,13 +121,13 @@ SEARCH_OPTIONS = (
         "--pace",
         _SEARCH,
         "Move this many times as fast as the corpus would, unless --duration is given.",
-        Number(*PACES),
+        Number(*PACE_RANGE),
         "FACTOR",
     ),
     SearchOption("strict", "--strict", _SEARCH, "Make only moves that the corpus attests: no bridges.", bool),
     SearchOption(
-        "posturewise",
-        "--posturewise",
+        "whole_body",
+        "--whole-body",
         _SEARCH,
         "Use only whole postures in the order of the corpus, as the search of 1998 did.",
         bool,
@@ -240,7 +241,7 @@ SEARCH_OPTIONS = (
 
 def searching(function: _Function) -> _Function:
     """Add all options of the search to a command, with the defaults of `TweenRequest`."""
-    defaults = {field.name: field.default for field in fields(TweenRequest)}
+    defaults = {field.name: field.default for field in (*fields(TweenRequest), *fields(SearchOptions))}
     for row in reversed(SEARCH_OPTIONS):
         attributes = {"is_flag": True} if row.type is bool else {"type": row.type}
         function = option(
@@ -291,7 +292,8 @@ def via_sources(options: Mapping[str, Any], home: Path | None) -> list[Source]:
 
 def _find_via(name: PostureName, move: int | None, home: Path | None, read: Callable[[Path], Motion] | None) -> Posture:
     from motionmind.formats import read_motion
-    from motionmind.names.finding import find_motion, find_posture
+    from motionmind.names.finding import find_motion
+    from motionmind.names.postures import find_posture
 
     word, read = name.word, read or read_motion
     is_clear = name.moment is not None or move is None
@@ -300,4 +302,4 @@ def _find_via(name: PostureName, move: int | None, home: Path | None, read: Call
             f"--via {word}@{move}: the last @ is a move, and {word} has {count} frames; write {word}@{move}@ for frame "
             f"{move} at any move, or {word}@FRAME@{move}"
         )
-    return find_posture(name, home, read=read)
+    return find_posture(name, home, read=read).posture

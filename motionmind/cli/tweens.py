@@ -113,8 +113,8 @@ def tween(
     Ctrl-C ends the search: the best movement found so far is written, with what is proven of it, and the exit code is
     130. Exit code 3 means that nothing joins A and B under the given rules; --report then holds the diagnosis.
     """
-    if problem and options["posturewise"]:
-        raise click.UsageError("--problem writes a search of joints that move on their own; leave out --posturewise")
+    if problem and options["whole_body"]:
+        raise click.UsageError("--problem writes a search of joints that move on their own; leave out --whole-body")
     gc.disable()  # start-up makes a million objects and no garbage; to look for it takes a tenth of a second
     _load_numba()
     from motionmind.cli.postures import read_end
@@ -156,7 +156,8 @@ def tween(
 
 def _corpus_of(ends: Sequence[PostureName], home: Path | None) -> str:
     """Return the corpus that names A, B or both; an error if there is none, or they are of two."""
-    from motionmind.names.finding import find_motion, find_posture
+    from motionmind.names.finding import find_motion
+    from motionmind.names.postures import find_posture
 
     corpora = [end.source.place for end in ends if end.source.kind == "corpus"]
     if not corpora:

@@ -80,9 +80,8 @@ class _Bounds:
     def __init__(self, learned: LearnedCorpus, pairs: Ints, moves: int) -> None:
         self._learned, self._moves = learned, moves
         self._graph = learned.grammar.transitions
-        self._model = build_model(
-            learned.grammar, PLAIN_REQUEST.weights, PLAIN_REQUEST.coordination_factor, PLAIN_REQUEST.bridge_price
-        )
+        search = PLAIN_REQUEST.search
+        self._model = build_model(learned.grammar, search.weights, search.coordination_factor, search.bridge_price)
         self._leaving = np.bincount(self._graph.sources, weights=self._graph.counts, minlength=len(self._graph.visits))
         self._ends = np.asarray(learned.states)[pairs].transpose(2, 1, 0)  # [L, 2, P]
         self.edges = float(len(self._model.targets)) * len(pairs) * moves
@@ -102,7 +101,7 @@ class _Bounds:
 
     def _total(self, chains: Floats) -> Floats:
         """Return the sum of bounds over chains [L, T + 1, P], minimised over numbers of moves [P]."""
-        per_move = PLAIN_REQUEST.tau * np.arange(self._moves + 1)
+        per_move = PLAIN_REQUEST.search.tau * np.arange(self._moves + 1)
         return np.asarray((chains.sum(axis=0) + per_move[:, None]).min(axis=0))
 
     def _bound(self, chain: int, edge: tuple[int, int] | None = None) -> Floats:
@@ -128,9 +127,8 @@ class _Bounds:
             then = np.full_like(reached, np.inf)
             if len(targets):
                 then[:, targets[starts]] = np.minimum.reduceat(reached[:, sources] + costs, starts, axis=1)
-            then[pair, b] = np.minimum(
-                then[pair, b], reached[pair, b] + PLAIN_REQUEST.beta + alone[b]
-            )  # a wait at the goal
+            waited = reached[pair, b] + PLAIN_REQUEST.search.beta + alone[b]  # at the goal
+            then[pair, b] = np.minimum(then[pair, b], waited)
             reached = then
             bounds.append(reached[pair, b])
         return np.stack(bounds)[:, which.reshape(-1)]

@@ -20,7 +20,7 @@ from motionmind.search.solve import solve
 from motionmind.tween.formulate import formulate
 from motionmind.tween.request import TweenRequest
 
-PLAIN_REQUEST = TweenRequest(guide=0.0, without=("pace",))
+PLAIN_REQUEST = TweenRequest.of(guide=0.0, without=("pace",))
 
 
 class Solved(NamedTuple):

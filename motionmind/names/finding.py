@@ -19,7 +19,7 @@ from motionmind.corpus.manifest import SourceManifest, parse_manifest
 from motionmind.credits.credit import Credit, Origin, credit_clip
 from motionmind.errors import MotionMindError, did_you_mean, enumerated, suggestion
 from motionmind.formats import read_motion
-from motionmind.names.spelling import Moment, PostureName, Source, is_file, parse_posture
+from motionmind.names.spelling import Moment, PostureName, Source, is_file
 from motionmind.notation import compose
 from motionmind.notation.read import read_scores
 from motionmind.notation.score import Score
@@ -286,24 +286,6 @@ def find_motion(
     if len(collection.clips) != 1:
         raise MotionMindError(f"{source.word}: holds {len(collection.clips)} clips{_example(source, collection)}")
     return collection.choose()[0]
-
-
-def find_posture(
-    name: PostureName | str, home: Path | None = None, *, read: Callable[[Path], Motion] = read_motion
-) -> Posture:
-    """Find a posture by name, such as "ballet/arabesque".
-
-    Args:
-        name: the name, or its spelling.
-        home: the folder of the user's corpora; None for the default folder.
-        read: reads a file.
-
-    Raises:
-        MotionMindError: there is no such posture; the message suggests a similar name or lists all.
-    """
-    named = parse_posture(name, home) if isinstance(name, str) else name
-    motion = find_motion(named.source, home, as_clip=named.moment is not None, read=read)
-    return motion.posture(frame_of(named, motion))
 
 
 def check_exists(source: Source, home: Path | None = None) -> None:

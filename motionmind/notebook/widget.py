@@ -42,7 +42,7 @@ class Player(anywidget.AnyWidget):
     >>> from motionmind import Engine
     >>> from motionmind.notebook import Player
     >>> engine = Engine.load("ballet")
-    >>> player = Player(engine.tween("ballet/arabesque", "ballet/fifth"))
+    >>> player = Player(engine.tween(engine.posture("ballet/arabesque"), engine.posture("ballet/fifth")))
     >>> player.selection = (0.5, 1.0)
     >>> player.selected().times[[0, -1]].tolist()
     [0.5, 1.0]

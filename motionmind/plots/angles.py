@@ -67,7 +67,7 @@ def draw_angles(motion: Motion, joints: Sequence[str] | None = None) -> Plate:
     >>> from motionmind import Engine
     >>> from motionmind.plots import draw_angles
     >>> engine = Engine.load("ballet")
-    >>> tween = engine.tween("ballet/arabesque", "ballet/fifth")
+    >>> tween = engine.tween(engine.posture("ballet/arabesque"), engine.posture("ballet/fifth"))
     >>> draw_angles(tween.motion, ["left_knee", "right_knee"]).save("knees.svg")
     """
     check_type("motion", motion, Motion)

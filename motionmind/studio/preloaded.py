@@ -15,4 +15,5 @@ for name in ("alternatives", "seams", "varied", "worker_loop"):  # they define t
     import_module(f"motionmind.studio.{name}")
 if is_all_compiled():  # otherwise another process is compiling it
     with suppress(MotionMindError):
-        Engine.load("ballet").tween("ballet/arabesque", "ballet/fifth")
+        engine = Engine.load("ballet")
+        engine.tween(engine.posture("ballet/arabesque"), engine.posture("ballet/fifth"))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.corpus.corpus import Corpus
+from motionmind.credits.credit import Credit, add_up
 from motionmind.discretize.states import StateSpace
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.coordination import Coordination
@@ -206,3 +207,37 @@ def sources_of(corpus: Corpus, postures: Ints | Int32s, to: Ints | Int32s, joint
 def gap_of(cost: float, lower_bound: float) -> float:
     """Return the optimality gap as a share of the cost: 0 where the bound (nats) meets the cost (nats)."""
     return 0.0 if cost <= lower_bound else (cost - lower_bound) / abs(cost)
+
+
+def credit_tween(
+    corpus: Corpus, sources: Sequence[Iterable[Source | None]], detail: Sequence[Source], times: Floats
+) -> tuple[Credit, ...]:
+    """Credit each clip in a tween with the time that the joints spend in moves that the clip attests.
+
+    The passage that the tween follows counts as one more joint. The engine gets the time of unattested moves.
+
+    Args:
+        corpus: the corpus that was searched.
+        sources: a place that attests each joint's move, or None [T][L].
+        detail: places of the passage, at equal intervals of the tween.
+        times: times of the moves [T + 1], seconds.
+
+    Returns:
+        The credits, the largest first; none where nothing moves.
+    """
+    seconds = np.diff(times)
+    shares: list[tuple[Source | None, float]]
+    shares = [(source, float(lasts)) for row, lasts in zip(sources, seconds, strict=True) for source in row]
+    shares += [(source, float(seconds.sum()) / len(detail)) for source in detail]
+    spent: dict[tuple[str, str] | None, float] = {}  # by corpus and clip; None for the engine
+    for source, share in shares:
+        clip = None if source is None else (source.corpus, source.clip)
+        spent[clip] = spent.get(clip, 0.0) + share
+    return add_up(_credit(corpus, clip, share) for clip, share in spent.items())
+
+
+def _credit(corpus: Corpus, clip: tuple[str, str] | None, share: float) -> Credit:
+    """Return a credit of this share for a clip, given as (corpus, name), or for the engine if `clip` is None."""
+    if clip is None:
+        return Credit(share)
+    return replace(corpus.credit_of(corpus.clips_named(*clip)[-1]), share=share)

@@ -8,43 +8,36 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import islice
-from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from motionmind._typing import Bools
 from motionmind.arguments import check_function, check_integer, check_type
-from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture
-from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import FACING
 from motionmind.credits.credit import Credit
 from motionmind.display import displayed
-from motionmind.errors import InfeasibleError, MotionMindError, MotionMindWarning, NoPathError
-from motionmind.formats import read_motion
+from motionmind.errors import InfeasibleError, MotionMindWarning, NoPathError
 from motionmind.geometry.splines import rotation_spline
 from motionmind.learned import graphs, summary
 from motionmind.learned.model import LearnedCorpus
 from motionmind.realise.realise import Realised, Style, Wishes, realise
-from motionmind.retarget.retarget import own_skeleton
 from motionmind.search.apart import TooAlikeError, difference, solve_apart
 from motionmind.search.problem import places
 from motionmind.search.sample import sample_path
 from motionmind.search.solve import Certificate, Watch, solve
-from motionmind.tween.certificate import Bridge, Source, break_down_cost, sources_of, trace_path
+from motionmind.tween.certificate import Bridge, Source, break_down_cost, credit_tween, sources_of, trace_path
 from motionmind.tween.constraints import find_conflicts
-from motionmind.tween.crediting import credit_tween
 from motionmind.tween.formulate import Formulation, formulate
 from motionmind.tween.modes import Modes
-from motionmind.tween.nearest_body import diagnose_posturewise
 from motionmind.tween.pacing import tempo_of, worded
 from motionmind.tween.problem import ingredients_of
 from motionmind.tween.request import TweenRequest
 from motionmind.tween.result import Tween
 from motionmind.tween.what_if import Answer, WhatIf, find_what_if
-from motionmind.tween.whole_body import Bodies, find_bodies, solve_posturewise
+from motionmind.tween.whole_body import Bodies, diagnose_whole_body, find_bodies, solve_whole_body
 
 TRIED = 2  # passages to try for an alternative before falling back on a variant of the best movement
 SAME_ANGLE = 0.1  # degrees: slack for comparing frames with a tolerance that the synthesis has met
@@ -64,8 +57,6 @@ class Engine(LearnedCorpus):
     >>> tween = engine.tween(motion.posture(0), motion.posture(3), moves=3)
     >>> tween.status, tween.moves
     ('optimal', 3)
-    >>> engine.tween("ballet/arabesque", "ballet/fifth").moves
-    7
     """
 
     def __repr__(self) -> str:
@@ -75,8 +66,8 @@ class Engine(LearnedCorpus):
 
     def tween(
         self,
-        a: Posture | str,
-        b: Posture | str,
+        a: Posture,
+        b: Posture,
         request: TweenRequest | None = None,
         *,
         before: Motion | None = None,
@@ -87,44 +78,45 @@ class Engine(LearnedCorpus):
         """Find the best movement from posture `a` to posture `b` in the style of the corpus.
 
         Args:
-            a: the exact first posture; a posture or its name, such as "ballet/arabesque" or "clip.bvh@240", or
-                "clip.bvh@240~" to leave it with the clip's velocity.
-            b: the exact last posture, in the same form.
+            a: the exact first posture; `find_posture` finds one by name.
+            b: the exact last posture.
             request: everything else in the request; None for the defaults.
             before: frames that lead up to `a` and show the body's velocity there. The last frame is `a`, wherever it
                 stands. Frames before a flip (a badly recorded joint) do not count. None if unknown.
             after: frames that follow `b`, in the same form; the first frame is `b`.
             watch: called from time to time with the search's progress; return True to end the search and get the best
                 path and bound so far.
-            options: fields of `TweenRequest` to set, as in `engine.tween(a, b, duration=2.0)`.
+            options: fields of `TweenRequest` and `SearchOptions` to set, as in
+                `engine.tween(a, b, duration=2.0, tau=0.5)`.
 
         Raises:
             NoPathError: no path joins the postures under these rules; the message is the diagnosis.
             SkeletonError: a posture or movement has another skeleton than the corpus, or lacks a joint.
-            MotionMindError: an option is out of range or impossible; no posture has this name; `before` does not end
-                in `a`, `after` does not begin in `b`, or one of them has a single frame.
+            MotionMindError: an option is out of range or impossible; `before` does not end in `a`, `after` does not
+                begin in `b`, or one of them has a single frame.
             WrongTypeError: an argument has the wrong type, or an option does not exist.
         """
         request = TweenRequest.of(request, **options)
+        search = request.search
+        for name, end in (("a", a), ("b", b)):
+            check_type(name, end, Posture, wanted="a Posture (find_posture finds one by name)")
         check_type("before", before, Motion, or_none=True)
         check_type("after", after, Motion, or_none=True)
-        start, before = _end("a", a, "before", before, self.corpus.skeleton)
-        end, after = _end("b", b, "after", after, self.corpus.skeleton)
         check_function("watch", watch, or_none=True)
         began = perf_counter()
-        formulation = formulate(self, start, end, request, before, after)
+        formulation = formulate(self, a, b, request, before, after)
         formulated = perf_counter()
         certificate = self._find_path(formulation, watch)
         what_if: tuple[WhatIf, ...] = ()
         if request.what_if:
 
             def answer(other: TweenRequest) -> Answer:
-                freed = formulate(self, start, end, other, before, after)
+                freed = formulate(self, a, b, other, before, after)
                 return Answer(other, freed.searched, self._find_path(freed, watch))
 
             what_if = find_what_if(Answer(request, formulation.searched, certificate), answer)
-        if request.sample and len(certificate.path) > 1:
-            certificate = sample_path(formulation.searched, certificate, request.seed)
+        if search.sample and len(certificate.path) > 1:
+            certificate = sample_path(formulation.searched, certificate, search.seed)
         realising = perf_counter()
         realised = self._realise(formulation, certificate)
         seconds = {
@@ -136,10 +128,22 @@ class Engine(LearnedCorpus):
         }
         return self._account_for(formulation, certificate, realised, seconds, what_if)
 
+    def posture(self, name: str) -> Posture:
+        """Return a posture by name, such as "ballet/arabesque" or "clip.bvh@240": see `find_posture`.
+
+        >>> from motionmind import Engine
+        >>> engine = Engine.load("ballet")
+        >>> engine.tween(engine.posture("ballet/arabesque"), engine.posture("ballet/fifth")).moves
+        7
+        """
+        from motionmind.names.postures import find_posture  # scores are slow to import
+
+        return find_posture(name).posture
+
     def alternatives(
         self,
-        a: Posture | str,
-        b: Posture | str,
+        a: Posture,
+        b: Posture,
         count: int,
         request: TweenRequest | None = None,
         *,
@@ -186,7 +190,8 @@ class Engine(LearnedCorpus):
         passages: Iterator[str] = iter(())
 
         def find(**other: Any) -> Tween:
-            unlike = {"seed": request.seed + len(found)} if request.sample else {"unlike": (*request.unlike, *found)}
+            search = request.search
+            unlike = {"seed": search.seed + len(found)} if search.sample else {"unlike": (*request.unlike, *found)}
             first = {"what_if": False} if found else {}
             return self.tween(a, b, request, before=before, after=after, watch=watch, **unlike, **first, **other)
 
@@ -213,16 +218,15 @@ class Engine(LearnedCorpus):
         if formulation.nearest is not None:
             unconstrained = replace(problem, model=formulation.model)
             try:
-                return solve_posturewise(unconstrained, self._bodies)
+                return solve_whole_body(unconstrained, self._bodies)
             except InfeasibleError as error:
-                reason = diagnose_posturewise(self.corpus, self._bodies, formulation.nearest, problem.rules)
+                reason = diagnose_whole_body(self.corpus, self._bodies, formulation.nearest, problem.rules)
                 raise NoPathError(reason) from error
         request = formulation.request
         try:
             if request.unlike:
-                return solve_apart(
-                    searched, [other.path for other in request.unlike], request.differ, watch, request.within
-                )
+                known = [other.path for other in request.unlike]
+                return solve_apart(searched, known, request.differ, watch, request.search.within)
             return solve(searched, watch)
         except TooAlikeError as error:
             raise _no_other_path(request, error.most) from error
@@ -237,7 +241,7 @@ class Engine(LearnedCorpus):
         # Imported here because SciPy's graphs are slow to import.
         from motionmind.tween.diagnosis import diagnose
 
-        strict = formulation.request.strict
+        strict = formulation.request.search.strict
         found = diagnose(
             model, self.grammar, self.corpus, self.space, problem.start, problem.goal, problem.rules, strict
         )
@@ -271,7 +275,7 @@ class Engine(LearnedCorpus):
                 request.without,
                 request.pace,
                 request.moves is None,
-                0.0 if request.posturewise else request.liveliness,
+                0.0 if request.search.whole_body else request.liveliness,
                 formulation.place,
             ),
         )
@@ -286,17 +290,23 @@ class Engine(LearnedCorpus):
     ) -> Tween:
         """Assemble the answer: a path and its motion with their certificate, costs and provenance."""
         request, searched = formulation.request, formulation.searched
+        search = request.search
         path = places(searched.model, certificate.path)
         attested, bridges, waits, sources = trace_path(
             path,
             self.grammar,
             self.corpus,
-            self.grammar.transitions.weights(request.weights, request.novelty),
-            request.beta,
-            request.bridge_price,
+            self.grammar.transitions.weights(search.weights, request.novelty),
+            search.beta,
+            search.bridge_price,
         )
         costs = break_down_cost(
-            certificate.path, searched, self.grammar, self.space, formulation.coordination, request.coordination_factor
+            certificate.path,
+            searched,
+            self.grammar,
+            self.space,
+            formulation.coordination,
+            search.coordination_factor,
         )
         motion = _with_bridges(realised.motion, bridges)
         tempo = tempo_of(self, formulation.times, formulation.usual_moves, formulation.detours, motion)
@@ -342,10 +352,10 @@ class Engine(LearnedCorpus):
                 ingredients_of,
                 searched,
                 self.grammar,
-                request.weights,
+                search.weights,
                 formulation.coordination,
-                request.coordination_factor,
-                request.beta,
+                search.coordination_factor,
+                search.beta,
                 request.novelty,
             ),
             request=request,
@@ -378,35 +388,6 @@ class Engine(LearnedCorpus):
     def check(self, pairs: int = 2000, seed: int = 0) -> dict[str, Any]:
         """Measure how well connected the corpus is, as plain values: see `motionmind.learned.summary.CorpusCheck`."""
         return summary.to_plain(summary.check_corpus(self.corpus, self.grammar, self.states, pairs, seed))
-
-
-def _end(
-    argument: str,
-    end: Posture | str,
-    side: Literal["before", "after"],
-    around: Motion | None,
-    body: Skeleton,
-) -> tuple[Posture, Motion | None]:
-    """Return the posture at an end, given as itself or by name, and the movement on its other side, if known.
-
-    A named file is retargeted as a whole to the `body` of a corpus of people: a movement reveals the up axis and the
-    orientation of a rig's joints better than one posture does.
-    """
-    check_type(argument, end, Posture, str, wanted="a Posture or the name of one")
-    if isinstance(end, Posture):
-        return end, around
-    # Imported here because scores are slow to import, and most callers give no names.
-    from motionmind.names.ends import find_end
-
-    is_human = human23().difference(body) is None
-    posture, own = find_end(end, side, read=_read_person if is_human else read_motion)
-    if own is not None and around is not None:
-        raise MotionMindError(f"{displayed(end)}: ~ takes the movement around the frame, and so does {side}; give one")
-    return posture, around if own is None else own
-
-
-def _read_person(path: Path) -> Motion:
-    return own_skeleton(read_motion(path))
 
 
 def _no_other_path(request: TweenRequest, most: float) -> NoPathError:

@@ -31,11 +31,11 @@ from motionmind.search.solve import MAX_CHAIN_STATES
 from motionmind.tween.constraints import Constraint, constraints_of, restrict
 from motionmind.tween.guide import find_detour, make_guide
 from motionmind.tween.modes import find_place
-from motionmind.tween.nearest_body import nearest_posture
+from motionmind.tween.options import MAX_MOVES
 from motionmind.tween.pacing import UsualTime, tolls, usual_times
-from motionmind.tween.problem import build_model
-from motionmind.tween.progression import lift_to_moves
-from motionmind.tween.request import MOST_MOVES, TweenRequest
+from motionmind.tween.problem import build_model, lift_to_moves
+from motionmind.tween.request import TweenRequest
+from motionmind.tween.whole_body import nearest_posture
 from motionmind.walks.passages import Place
 
 _Movement = TypeVar("_Movement", Motion, Posture)
@@ -96,7 +96,7 @@ class Formulation:
     def wished(self) -> Bools:
         """Whether the request restricts each chain beyond the ends and the length, which the motion should show [L]."""
         request = self.request
-        if request.unlike or request.sample or request.novelty or not request.kappa:
+        if request.unlike or request.search.sample or request.novelty or not request.kappa:
             return np.ones(len(self.constrained), dtype=np.bool_)
         return self.constrained
 
@@ -132,7 +132,7 @@ def formulate(
             shows no velocity.
     """
     shortest, longest = _move_range(learned, request)
-    rules = Rules(request.beta, request.tau, shortest, longest, request.nodes(len(learned.space)))
+    rules = Rules(request.search.beta, request.search.tau, shortest, longest, request.search.nodes(len(learned.space)))
     a, b = _on_skeleton(learned, a, "posture A"), _on_skeleton(learned, b, "posture B")
     before = None if before is None else _leading_to(learned, a, before)
     after = None if after is None else _following(learned, b, after)
@@ -143,17 +143,19 @@ def formulate(
     joints = len(a.skeleton)
     orientations = learned.corpus.to_chains(np.stack([posture.rotations for posture in (a, *through, b)]))
     states, nearest = learned.space.assign(orientations), None
-    if request.posturewise:
+    if request.search.whole_body:
         nearest = nearest_posture(learned.corpus, a.rotations), nearest_posture(learned.corpus, b.rotations)
         states[:, :joints] = learned.states[list(nearest), :joints]
     snap_degrees = learned.space.distance(orientations, states)
     start, *passing, goal = states.astype(np.int64)
 
     constraints = constraints_of(learned.space, start, goal, request.pin, request.hold, request.avoid)
-    by_moves = request.coordination == "progression"
-    factor = request.coordination_factor
-    bridge_price = None if request.strict else request.bridge_price
-    model = _grammar_model(learned.grammar, request.weights, 0.0 if by_moves else factor, bridge_price, request.novelty)
+    by_moves = request.search.coordination == "progression"
+    factor = request.search.coordination_factor
+    bridge_price = None if request.search.strict else request.search.bridge_price
+    model = _grammar_model(
+        learned.grammar, request.search.weights, 0.0 if by_moves else factor, bridge_price, request.novelty
+    )
     problem = Problem(
         restrict(model, constraints),
         start,
@@ -162,8 +164,8 @@ def formulate(
         tuple(Via(state, None if move is None else int(move)) for state, (_, move) in zip(passing, vias, strict=True)),
     )
     usual_moves = None
-    if request.duration is not None and request.moves is None and not (request.unlike or request.posturewise):
-        most = max(longest, request.max_moves)
+    if request.duration is not None and request.moves is None and not (request.unlike or request.search.whole_body):
+        most = max(longest, request.search.max_moves)
         fewest = fewest_moves(replace(problem, rules=replace(rules, longest=most)))
         if fewest is not None and fewest > longest:
             usual_moves, longest = longest, fewest
@@ -225,7 +227,7 @@ def _move_range(learned: LearnedCorpus, request: TweenRequest) -> tuple[int, int
     if request.duration is None:
         return request.move_range if theirs is None else (theirs, theirs)
     seconds = usual(learned.grammar.transitions)
-    longest = MOST_MOVES * seconds
+    longest = MAX_MOVES * seconds
     if not 1.0 / request.fps <= request.duration <= longest:
         raise MotionMindError(
             f"duration must be a number of seconds from a frame's {1.0 / request.fps:g} to {longest:g}, not "

@@ -134,3 +134,39 @@ def ingredients_of(
     is_at_goal = (rows[sources] == rows[targets]) & is_goal[targets]
     kind = kinds_of(edges, is_at_goal, graph.weights(weights, novelty), wait)
     return Ingredients(KINDS, kind, factor * network.child_costs, factor * network.parent_costs)
+
+
+def lift_to_moves(model: Model, net: Coordination, lambda_: float) -> Model:
+    """Return the model whose states are moves of `model`.
+
+    State s of a chain means being at s before any move; state S + k is the chain's k-th move. `place` maps each of
+    them to its state of `model`.
+
+    Args:
+        model: the costs over states.
+        net: the network that couples moves.
+        lambda_: factor of the network's -log P.
+    """
+    sizes, first_moves = np.diff(model.starts), model.indptr[model.starts]
+    starts = model.starts + first_moves
+    chain_of_state = np.repeat(np.arange(len(sizes)), sizes)
+    chain_of_move = np.repeat(np.arange(len(sizes)), np.diff(first_moves))
+    rows = np.arange(model.starts[-1]) + first_moves[chain_of_state]  # of the states before any move
+    moves = np.arange(len(model.targets)) + model.starts[chain_of_move + 1]  # and of the moves
+    place = np.empty(starts[-1], dtype=np.int32)
+    place[rows] = np.arange(model.starts[-1]) - model.starts[chain_of_state]
+    place[moves] = model.targets
+
+    at = model.starts[np.repeat(np.arange(len(sizes)), np.diff(starts))] + place  # row in `model` [states here]
+    count = np.diff(model.indptr)[at]
+    indptr = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
+    taken = np.arange(indptr[-1]) - np.repeat(indptr[:-1] - model.indptr[at], count)  # the move that each edge takes
+    return Model(
+        starts=starts,
+        **couplings(net, starts, lambda_)._asdict(),
+        indptr=indptr,
+        targets=(moves[taken] - starts[chain_of_move[taken]]).astype(np.int32),
+        costs=model.costs[taken],
+        allowed=model.allowed[at],
+        place=place,
+    )

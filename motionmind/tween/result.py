@@ -143,7 +143,7 @@ class Tween:
     @property
     def node_budget(self) -> int:
         """Number of nodes that A* was allowed to hold."""
-        return self.request.nodes(len(self.joints))
+        return self.request.search.nodes(len(self.joints))
 
     @property
     def asked(self) -> dict[str, Any]:
@@ -159,7 +159,7 @@ class Tween:
 
         Each ingredient of the cost has its own functions, named in docs/formats.md. Postures to pass through keep the
         moves at which this tween passes them. The format omits two conditions, so the optimum may be lower: that an
-        alternative differs from other tweens, and that a `posturewise` one keeps to whole postures.
+        alternative differs from other tweens, and that a `whole_body` one keeps to whole postures.
         """
         vias = [Via(via.states, move) for via, move in zip(self.search_problem.vias, self.passed, strict=True)]
         problem = replace(self.search_problem, vias=tuple(vias))

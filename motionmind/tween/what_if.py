@@ -92,8 +92,8 @@ def _without_each(asked: Answer) -> Iterator[tuple[str, TweenRequest]]:
         name = f"via {i + 1}" + ("" if move is None else f" at move {move}")
         yield name, replace(request, via=_all_but(request.via, i))
     if request.fixes_length:
-        longest = max(request.max_moves, _moves(asked))
-        yield _length_name(request), replace(request, moves=None, duration=None, max_moves=longest)
+        longest = max(request.search.max_moves, _moves(asked))
+        yield _length_name(request), TweenRequest.of(request, moves=None, duration=None, max_moves=longest)
 
 
 def _length_name(request: TweenRequest) -> str:

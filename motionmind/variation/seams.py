@@ -2,14 +2,14 @@
 which of them are abrupt, and the movement that the engine inserts to smooth those.
 
 A transition is abrupt if the corpus does not know it: some joint goes from one state to another as it never does in the
-corpus (or, posturewise, the whole body does), or turns faster than it ever does there. Staying in a state is no move.
+corpus (or, by whole bodies, the body does), or turns faster than it ever does there. Staying in a state is no move.
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sized
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, Any, Generic, TypeVar
 
@@ -24,7 +24,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.search.solve import Progress, Status, Watch
 from motionmind.tween.certificate import Bridge, Wait, gap_of
 from motionmind.tween.engine import Engine
-from motionmind.tween.request import TweenRequest
+from motionmind.tween.options import OPTIONS
 from motionmind.tween.result import Tween
 from motionmind.variation.arguments import check_whole
 from motionmind.variation.piece import Piece
@@ -172,11 +172,11 @@ class TransitionTest:
 
     Attributes:
         engine: what was learned from the corpus.
-        posturewise: whether the whole body must have made the move, not each joint.
+        whole_body: whether the whole body must have made the move, not each joint.
     """
 
     engine: Engine
-    posturewise: bool = False
+    whole_body: bool = False
 
     def abrupt_joints(self, a: Posture, b: Posture, seconds: float) -> tuple[AbruptJoint, ...]:
         """List the joints that make the transition from posture `a` to posture `b` within `seconds` abrupt.
@@ -193,7 +193,7 @@ class TransitionTest:
         fast = angles > self._largest(seconds)
         joints, found = len(corpus.skeleton), []
         attested = self._attested(before, after)
-        if self.posturewise:
+        if self.whole_body:
             attested[:] = True
             if (before != after)[:joints].any() and not self._has_made(before[:joints], after[:joints]):
                 found.append(AbruptJoint(BODY, float(angles[:joints].max()), attested=False, fast=False))
@@ -213,7 +213,7 @@ class TransitionTest:
         """
         chains = self.engine.corpus.to_chains(rotations)
         states = self.engine.space.assign(chains)
-        known = self._known_bodies(states) if self.posturewise else self._attested_pairs(states)
+        known = self._known_bodies(states) if self.whole_body else self._attested_pairs(states)
         for i, seconds in enumerate(durations):
             known[i] &= (np.degrees(rot.angle(chains[i], chains)) <= self._largest(float(seconds))).all(axis=-1)
         return known
@@ -277,7 +277,7 @@ class TransitionTest:
 
 
 def judge_transitions(
-    piece: Piece, pairs: Iterable[tuple[int, int]], engine: Engine, posturewise: bool
+    piece: Piece, pairs: Iterable[tuple[int, int]], engine: Engine, whole_body: bool
 ) -> list[Transition]:
     """Judge, for pairs (i, k), whether posture k of a piece may follow posture i.
 
@@ -285,12 +285,12 @@ def judge_transitions(
         piece: the piece.
         pairs: numbers of two postures each.
         engine: what was learned from the corpus that judges.
-        posturewise: whether whole bodies are judged, not each joint.
+        whole_body: whether whole bodies are judged, not each joint.
 
     Raises:
         SkeletonError: the piece is on another skeleton than the corpus.
     """
-    test, name = TransitionTest(engine, posturewise), engine.corpus.name
+    test, name = TransitionTest(engine, whole_body), engine.corpus.name
     return [
         Transition(i, k, name, test.abrupt_joints(*piece.ends(i, k), float(piece.durations[i])), (), "", {})
         for i, k in pairs
@@ -302,10 +302,10 @@ def check_asked(alternatives: int, options: Mapping[str, Any]) -> None:
 
     Raises:
         MotionMindError: `alternatives` is out of its range.
-        WrongTypeError: a name in `options` is no field of `TweenRequest`.
+        WrongTypeError: a name in `options` is no option of a tween.
     """
     check_whole("alternatives", alternatives, 1)
-    known = {field.name for field in fields(TweenRequest)} - {"unlike", "what_if"}
+    known = {"search", *OPTIONS} - {"unlike", "what_if"}
     for name in options:
         if name not in known:
             raise WrongTypeError(f"seams are not smoothed by an argument {name!r}{did_you_mean(name, known)}")
@@ -317,7 +317,7 @@ def judge_and_smooth(
     engine: Engine,
     alternatives: int,
     *,
-    posturewise: bool = False,
+    whole_body: bool = False,
     on_progress: OnProgress | None = None,
     watch: Watch | None = None,
     **options: Any,
@@ -331,7 +331,7 @@ def judge_and_smooth(
         pairs: numbers of two postures each, (from, to).
         engine: what was learned from the corpus.
         alternatives: how many movements to find for each; searches of whole bodies find one.
-        posturewise: whether whole bodies are judged and inserted.
+        whole_body: whether whole bodies are judged and inserted.
         on_progress: called before each search with how many are done and how many there are.
         watch: as for `Engine.tween`; once it returns True, the remaining transitions stay pending.
         options: the other arguments of `Engine.tween`.
@@ -340,8 +340,8 @@ def judge_and_smooth(
         SkeletonError: the piece is on another skeleton than the corpus.
         MotionMindError: an option is out of its range.
     """
-    transitions = judge_transitions(piece, pairs, engine, posturewise)
-    options = {"posturewise": posturewise, **options}
+    transitions = judge_transitions(piece, pairs, engine, whole_body)
+    options = {"whole_body": whole_body, **options}
     ended = False
 
     def watching(so_far: Progress) -> bool:
@@ -359,7 +359,7 @@ def judge_and_smooth(
         given = {"before": before, "after": after, "watch": watching if watch else None, **options}
         tweens: list[Tween] = []
         try:
-            for tween in engine.alternatives(a, b, 1 if posturewise else alternatives, **given):
+            for tween in engine.alternatives(a, b, 1 if whole_body else alternatives, **given):
                 tweens.append(tween)
                 if ended:
                     break

@@ -248,7 +248,7 @@ class Variation:
         engine: Engine,
         *,
         alternatives: int = ALTERNATIVES,
-        posturewise: bool = False,
+        whole_body: bool = False,
         on_progress: OnProgress | None = None,
         watch: Watch | None = None,
         **options: Any,
@@ -262,7 +262,7 @@ class Variation:
         Args:
             engine: the corpus that judges and smooths.
             alternatives: how many movements to find for each transition.
-            posturewise: whether to judge by whole bodies and insert only whole bodies of the corpus.
+            whole_body: whether to judge by whole bodies and insert only whole bodies of the corpus.
             on_progress: called before each search with how many are done and how many there are.
             watch: as for `Engine.tween`; once it returns True, the remaining seams stay as they are.
             options: the other arguments of `Engine.tween`.
@@ -274,7 +274,7 @@ class Variation:
         """
         on_progress = take_renamed(options, "told", "on_progress", on_progress)
         check_type("engine", engine, Engine)
-        _check_watchers(posturewise, on_progress, watch)
+        _check_watchers(whole_body, on_progress, watch)
         check_asked(alternatives, options)
         inserted = {(seam.start, seam.end) for seam in self.seams if seam.insertion}
         known = {(seam.start, seam.end): seam.transition for seam in self.seams}  # once, however often it comes
@@ -284,7 +284,7 @@ class Variation:
             left,
             engine,
             alternatives,
-            posturewise=posturewise,
+            whole_body=whole_body,
             on_progress=on_progress,
             watch=watch,
             **options,
@@ -303,9 +303,9 @@ class Variation:
         return self if self._state.looks_like(after._state) else after
 
 
-def _check_watchers(posturewise: bool, on_progress: OnProgress | None, watch: Watch | None) -> None:
+def _check_watchers(whole_body: bool, on_progress: OnProgress | None, watch: Watch | None) -> None:
     """Check the types of arguments that `vary` and `Variation.smooth` share."""
-    check_flag("posturewise", posturewise)
+    check_flag("whole_body", whole_body)
     check_function("on_progress", on_progress, or_none=True)
     check_function("watch", watch, or_none=True)
 
@@ -331,7 +331,7 @@ def vary(
     inserted: float | None = None,
     stretch: int | None = None,
     alternatives: int = ALTERNATIVES,
-    posturewise: bool = False,
+    whole_body: bool = False,
     on_progress: OnProgress | None = None,
     watch: Watch | None = None,
     **options: Any,
@@ -363,7 +363,7 @@ def vary(
             `motionmind.variation.limits`); if no order holds the limit, the one that inserts least is taken. None for
             no limit.
         stretch: postures that each stretch of the piece has at least; None for 4 where insertions are limited, else 1.
-        alternatives: see `Variation.smooth`, as for `posturewise`, `on_progress`, `watch` and `options`.
+        alternatives: see `Variation.smooth`, as for `whole_body`, `on_progress`, `watch` and `options`.
 
     Raises:
         MotionMindError: an argument is out of its range or not for this order, a trajectory diverges or settles, both a
@@ -382,7 +382,7 @@ def vary(
     on_progress = take_renamed(options, "told", "on_progress", on_progress)
     check_type("piece", piece, Motion, Piece)
     check_type("engine", engine, Engine, or_none=True)
-    _check_watchers(posturewise, on_progress, watch)
+    _check_watchers(whole_body, on_progress, watch)
     check_asked(alternatives, options)
     control = control_of(by, seed)
     trajectory: dict[str, Any] = {"flow": flow, "nudge": nudge, "depart": depart, "start": start}
@@ -407,7 +407,7 @@ def vary(
             piece,
             engine=engine,
             alternatives=alternatives,
-            posturewise=posturewise,
+            whole_body=whole_body,
             on_progress=on_progress,
             watch=watch,
             seed=seed,
@@ -416,7 +416,7 @@ def vary(
     if found is not None and limits is not None:
         seconds = np.zeros((len(piece), len(piece)), dtype=np.float32)
         if engine is not None and limits.inserted is not None:
-            seconds = estimate_insertions(piece, TransitionTest(engine, posturewise))
+            seconds = estimate_insertions(piece, TransitionTest(engine, whole_body))
         kept, transitions = keep_within(limits, found, piece.durations, seconds, None if control else smooth)
         variation = replace(variation, kept=kept, transitions=transitions)
         if control is None:

@@ -17,7 +17,8 @@ import motionmind
 from motionmind.chaos.flows import FLOWS
 from motionmind.cli import completion
 from motionmind.discretize.codebook import Codebook
-from motionmind.names.finding import find_motion, find_posture, open_collection
+from motionmind.names.finding import find_motion, open_collection
+from motionmind.names.postures import find_posture
 from motionmind.names.spelling import parse_source
 from motionmind.tween.engine import Engine
 

@@ -56,7 +56,8 @@ def test_what_is_up_in_a_file_of_an_end_is_seen_in_all_of_its_movement(run: Run)
     assert np.degrees(rot.angle(wanted.rotations[0], alone.rotations[0])) > 60.0
     assert run(*TWEEN, "z.bvh@60", "z.bvh@0", "-o", "t.json").code == 0
     assert np.max(rot.angle(read_motion("t.json").rotations[0], wanted.rotations)) < 1e-4
-    by_name = Engine.load("ballet").tween("z.bvh@60", "z.bvh@0", moves=(2, 6))
+    engine = Engine.load("ballet")
+    by_name = engine.tween(engine.posture("z.bvh@60"), engine.posture("z.bvh@0"), moves=(2, 6))
     assert np.max(rot.angle(by_name.motion.rotations[0], wanted.rotations)) < 1e-4
 
 

@@ -20,7 +20,7 @@ from motionmind.cli.words import parse_vias
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_motion, write_motion, write_posture
 from motionmind.geometry import rotations as rot
-from motionmind.names.finding import find_posture
+from motionmind.names.postures import find_posture
 from motionmind.names.spelling import Moment, parse_frames, parse_posture
 
 FIFTH = BALLET / "postures" / "fifth.json"
@@ -88,7 +88,7 @@ def test_a_frame_of_every_format_is_the_frame_with_the_movement_around_it(name: 
     write_motion(name, clip())
     whole = read_motion(name)
     for frame in (0, 7, -2):
-        found = find_posture(parse_posture(f"{name}@{frame}"))
+        found = find_posture(parse_posture(f"{name}@{frame}")).posture
         np.testing.assert_array_equal(found.rotations, whole.posture(frame).rotations)
         np.testing.assert_array_equal(found.root, whole.posture(frame).root)
     a, before = read_end(parse_posture(f"{name}@9~"), None, "before")
@@ -264,7 +264,7 @@ def test_posture_takes_what_sheet_numbers(run: Run, words: Sequence[object], fra
     write_motion("jump.json", ballet_clip("jump"))
     ran = run("posture", *words, "-o", "A.json")
     assert ran.out == f"A.json: frame {frame} of 7, on human23 (23 joints)\n", ran.err
-    assert rot.angle(find_posture("A.json").rotations, ballet_clip("jump").rotations[frame]).max() < 1e-6
+    assert rot.angle(find_posture("A.json").posture.rotations, ballet_clip("jump").rotations[frame]).max() < 1e-6
 
 
 def test_a_posture_by_name_is_drawn_measured_and_converted(run: Run) -> None:

@@ -18,7 +18,7 @@ from motionmind.corpus.gather import gather
 from motionmind.discretize.codebook import Codebook
 from motionmind.geometry import rotations as rot
 from motionmind.learned.model import LearnedCorpus
-from motionmind.names.finding import find_posture
+from motionmind.names.postures import find_posture
 from motionmind.tween.engine import Engine
 
 
@@ -98,7 +98,7 @@ def test_a_clip_is_found_by_its_name_its_label_and_its_postures(gathered: Corpus
                 corpus.clip_labelled(label)
         with pytest.raises(IndexError):
             corpus.clip_of(34)
-    posture = find_posture("mine/one: b: c@0", saved)
+    posture = find_posture("mine/one: b: c@0", saved).posture
     np.testing.assert_array_equal(posture.rotations, gathered.rotations[gathered.clip_labelled("one: b: c").start])
 
 

@@ -33,8 +33,7 @@ from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.formats import read_motion, write_motion
 from motionmind.render.page import page
 from motionmind.retarget.retarget import to_human23
-from motionmind.tween.certificate import Source
-from motionmind.tween.crediting import credit_tween
+from motionmind.tween.certificate import Source, credit_tween
 from motionmind.tween.engine import Engine
 from motionmind.tween.report import TweenReport, plain
 from motionmind.tween.result import Tween, report_of
@@ -59,7 +58,7 @@ def clip(name: str = "plies") -> Motion:
 
 @cache
 def tween() -> Tween:
-    return ballet().tween("ballet/arabesque", "ballet/fifth")
+    return ballet().tween(*map(ballet().posture, ("ballet/arabesque", "ballet/fifth")))
 
 
 @cache

@@ -30,7 +30,7 @@ from motionmind.search.solve import solve
 from motionmind.search.trellis import build_trellis
 from motionmind.tween.engine import Engine
 from motionmind.tween.formulate import formulate
-from motionmind.tween.progression import lift_to_moves
+from motionmind.tween.problem import lift_to_moves
 from motionmind.tween.request import TweenRequest
 from motionmind.tween.result import Tween
 
@@ -407,7 +407,7 @@ def test_the_report_adds_up_to_the_cost_whatever_was_asked(engine: Engine) -> No
 def test_chains_wait_at_the_goal_by_moves_that_coordinate_alone(engine: Engine) -> None:
     """They could wait there for the price of waiting as well, past what their parents do."""
     passe = read_posture(POSTURES / "passe.json")
-    searched = formulate(engine, passe, passe, TweenRequest(coordination="progression", moves=2)).searched
+    searched = formulate(engine, passe, passe, TweenRequest.of(coordination="progression", moves=2)).searched
     assert searched.model_with_waits() is searched.model
 
 
@@ -424,7 +424,7 @@ def test_coordination_that_costs_nothing_is_none(engine: Engine) -> None:
 
 def test_whole_postures_have_no_progressions(engine: Engine) -> None:
     with pytest.raises(MotionMindError, match="posture or none"):
-        join(engine, posturewise=True)
+        join(engine, whole_body=True)
 
 
 def test_more_moves_than_a_node_can_number_are_refused(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:

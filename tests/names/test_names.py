@@ -17,7 +17,8 @@ from motionmind.formats import read_motion, read_posture, write_motion, write_po
 from motionmind.learned import persistence
 from motionmind.learned.model import LearnedCorpus
 from motionmind.names import finding
-from motionmind.names.finding import find_motion, find_posture, locate_score, open_collection
+from motionmind.names.finding import find_motion, locate_score, open_collection
+from motionmind.names.postures import find_posture
 from motionmind.names.spelling import Moment, parse_frames, parse_posture, parse_source
 from motionmind.notation.compose import posture
 from motionmind.notation.read import read_score, read_scores
@@ -87,7 +88,7 @@ def test_a_file_goes_first_then_a_corpus_by_name_then_by_folder() -> None:
     shutil.copytree(BALLET, "ballet", dirs_exist_ok=True)
     assert parse_source("ballet/fifth").place == "ballet"
     assert parse_source("./ballet/fifth").place == "./ballet"
-    assert_same(find_posture("./ballet/fifth"), find_posture("ballet/fifth"))
+    assert_same(find_posture("./ballet/fifth").posture, find_posture("ballet/fifth").posture)
 
 
 def test_frames_are_a_range_or_all() -> None:
@@ -119,7 +120,7 @@ def test_every_posture_that_a_corpus_names_is_that_of_its_scores(corpus: str) ->
     }
     assert set(found.postures) == set(written)
     for name, score in written.items():
-        assert_same(find_posture(f"{corpus}/{name}"), posture(score, name))
+        assert_same(find_posture(f"{corpus}/{name}").posture, posture(score, name))
 
 
 @pytest.mark.parametrize(
@@ -142,14 +143,14 @@ def test_a_posture_is_as_its_files_have_it_now(
 
     monkeypatch.setattr(finding, "read_scores", counted)
     word = f"{Path('mine').resolve()}/{name}"
-    before, again = find_posture(word), find_posture(word)
+    before, again = find_posture(word).posture, find_posture(word).posture
     assert len(read) == 1
     assert_same(before, again)
     path = Path("mine", file)
     text = path.read_text("utf-8")
     assert text.count(old) == 1
     path.write_text(text.replace(old, new), "utf-8")
-    after = find_posture(word)
+    after = find_posture(word).posture
     assert len(read) == 2
     shape = [np.concatenate([one.rotations.ravel(), one.skeleton.offsets.ravel()]) for one in (before, after)]
     assert not np.array_equal(*shape)
@@ -191,30 +192,35 @@ def test_every_posture_of_a_clip_is_the_one_that_is_learned_from(corpus: str) ->
     for label in list(clips)[::9]:
         motion = learned.motion(clips[label])
         for frame in (0, len(motion) // 2, -1):
-            assert_same(find_posture(f"{corpus}/{label}@{frame}"), motion.posture(frame))
-        assert_same(find_posture(f"{corpus}/{label}@{motion.times[3]:.6f}s"), motion.posture(3))
+            assert_same(find_posture(f"{corpus}/{label}@{frame}").posture, motion.posture(frame))
+        assert_same(find_posture(f"{corpus}/{label}@{motion.times[3]:.6f}s").posture, motion.posture(3))
         assert len(find_motion(parse_source(f"{corpus}/{label}"))) == len(motion)
 
 
 def test_a_posture_of_a_score_is_its_own_or_one_that_it_includes() -> None:
-    assert_same(find_posture(f"{CENTRE}/tendu"), find_posture("ballet/tendu"))
-    assert_same(find_posture(f"{CENTRE}/adagio@23"), ballet_clip("adagio").posture(23))
+    assert_same(find_posture(f"{CENTRE}/tendu").posture, find_posture("ballet/tendu").posture)
+    assert_same(find_posture(f"{CENTRE}/adagio@23").posture, ballet_clip("adagio").posture(23))
     Path("mine.score").write_text(
         f"title Mine\ninclude {CENTRE}\nposture tendu = first | bas | upright | front\n"
         "clip first: Of one posture\n  start | second | bas | upright | front\n",
         "utf-8",
     )
-    assert_same(find_posture("mine.score/tendu"), find_posture("ballet/first"))  # what it says goes first
-    assert_same(find_posture("mine.score/fifth"), find_posture("ballet/fifth"))
-    assert_same(find_posture("mine.score/first"), find_posture("ballet/first"))  # of two, the posture
-    assert_same(find_posture("mine.score/first@0"), find_motion(parse_source("mine.score/first")).posture(0))
-    assert_same(find_posture("mine.score@0"), find_posture("mine.score/first@0"))
-    assert np.abs(find_posture("mine.score@0").rotations - find_posture("ballet/first").rotations).max() > 0.05
+    assert_same(
+        find_posture("mine.score/tendu").posture, find_posture("ballet/first").posture
+    )  # what it says goes first
+    assert_same(find_posture("mine.score/fifth").posture, find_posture("ballet/fifth").posture)
+    assert_same(find_posture("mine.score/first").posture, find_posture("ballet/first").posture)  # of two, the posture
+    assert_same(find_posture("mine.score/first@0").posture, find_motion(parse_source("mine.score/first")).posture(0))
+    assert_same(find_posture("mine.score@0").posture, find_posture("mine.score/first@0").posture)
+    assert (
+        np.abs(find_posture("mine.score@0").posture.rotations - find_posture("ballet/first").posture.rotations).max()
+        > 0.05
+    )
 
 
 def test_a_score_of_a_corpus_needs_no_path_and_a_file_of_that_name_goes_first() -> None:
     word = "ballet/centre.score/tendu"
-    assert_same(find_posture(parse_posture(word)), posture(read_score(CENTRE), "tendu"))
+    assert_same(find_posture(parse_posture(word)).posture, posture(read_score(CENTRE), "tendu"))
     assert locate_score("ballet/nothing.score") == Path("ballet/nothing.score")
     assert locate_score("ballet/../karate/kata.score") == Path("ballet/../karate/kata.score")
     Path("ballet").mkdir()
@@ -230,14 +236,14 @@ def test_a_posture_of_a_file_is_a_frame_or_the_frame_nearest_to_a_time() -> None
     write_motion("clip.bvh", clip)
     write_posture("A.json", clip.posture(3))
     whole = read_motion("clip.bvh")
-    assert_same(find_posture("A.json"), read_posture("A.json"))
-    assert_same(find_posture("A.json@0"), read_posture("A.json"))
+    assert_same(find_posture("A.json").posture, read_posture("A.json"))
+    assert_same(find_posture("A.json@0").posture, read_posture("A.json"))
     for frame in range(len(whole)):
-        assert_same(find_posture(f"clip.bvh@{frame}"), whole.posture(frame))
-        assert_same(find_posture(f"clip.bvh@{frame - len(whole)}"), whole.posture(frame))
+        assert_same(find_posture(f"clip.bvh@{frame}").posture, whole.posture(frame))
+        assert_same(find_posture(f"clip.bvh@{frame - len(whole)}").posture, whole.posture(frame))
         for off in (-0.016, 0.0, 0.016):
             if whole.times[frame] + off >= 0.0:
-                assert_same(find_posture(f"clip.bvh@{whole.times[frame] + off:.6f}s"), whole.posture(frame))
+                assert_same(find_posture(f"clip.bvh@{whole.times[frame] + off:.6f}s").posture, whole.posture(frame))
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ ADAGIO = ballet_clip("adagio")
 KINDS: dict[str, Callable[[], Any]] = {
     "motion": lambda: ADAGIO,
     "posture": lambda: ADAGIO.posture(3),
-    "tween": lambda: Engine.load("ballet").tween("ballet/arabesque", "ballet/fifth"),
+    "tween": lambda: Engine.load("ballet").tween(ADAGIO.posture(20), ADAGIO.posture(40)),
     "piece": lambda: Piece.of(ADAGIO),
     "variation": lambda: vary(ADAGIO, nudge=1.0),
 }

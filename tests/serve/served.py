@@ -16,7 +16,7 @@ from motionmind.body.human import human23
 from motionmind.body.motion import Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
-from motionmind.names.finding import find_posture
+from motionmind.names.postures import find_posture
 from motionmind.serve.guard import Guard
 
 STANDS = (0.0, 0.971, 0.0)  # the pelvis of human23 at rest, with the toes on the floor
@@ -97,7 +97,7 @@ def ask(constraints: list[dict[str, Any]], frames: int, skeleton: Skeleton | Non
 
 def of_ballet(name: str, root: tuple[float, float, float] | None = None) -> Posture:
     """A named posture of the corpus, its root elsewhere."""
-    found = find_posture(f"ballet/{name}")
+    found = find_posture(f"ballet/{name}").posture
     return found if root is None else Posture(found.skeleton, found.rotations, np.array(root))
 
 

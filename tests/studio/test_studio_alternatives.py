@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from motionmind import Engine, Motion, Tween
 from motionmind.errors import NoPathError
-from motionmind.names.finding import find_motion, find_posture
+from motionmind.names.finding import find_motion
+from motionmind.names.postures import find_posture
 from motionmind.names.spelling import Source
 from motionmind.studio.alternatives import COUNT, WITHIN, Account, account, clock, find, key_of, usual_likelihoods
 
@@ -30,7 +31,7 @@ def ballet() -> Engine:
 
 @pytest.fixture(scope="module", params=ENDS, ids=" to ".join)
 def found(request: pytest.FixtureRequest, ballet: Engine) -> list[tuple[Tween, Account]]:
-    a, b = map(find_posture, request.param)
+    a, b = (find_posture(name).posture for name in request.param)
     own = usual_likelihoods(ballet)
     tweens = list(find(ballet, a, b))
     firsts = [None, *[tweens[0].motion] * (len(tweens) - 1)]
@@ -113,7 +114,7 @@ def test_seen_stretches_name_the_place_in_words(ballet: Engine, found: list[tupl
 
 
 def test_equal_postures_need_no_movement(ballet: Engine) -> None:
-    posture = find_posture("ballet/fifth")
+    posture = find_posture("ballet/fifth").posture
     (tween,) = find(ballet, posture, posture)
     said = account(tween, ballet.corpus, usual_likelihoods(ballet))
     assert said.words.startswith("no movement")
@@ -122,7 +123,15 @@ def test_equal_postures_need_no_movement(ballet: Engine) -> None:
 
 def test_a_wish_that_cannot_be_met_is_an_error(ballet: Engine) -> None:
     with pytest.raises(NoPathError):
-        list(find(ballet, find_posture("ballet/arabesque"), find_posture("ballet/fifth"), moves=1, strict=True))
+        list(
+            find(
+                ballet,
+                find_posture("ballet/arabesque").posture,
+                find_posture("ballet/fifth").posture,
+                moves=1,
+                strict=True,
+            )
+        )
 
 
 def test_the_corpus_itself_is_usual(ballet: Engine) -> None:

@@ -39,7 +39,7 @@ def test_seams_are_abrupt_where_a_variation_says_so(engine, clips):
     """One definition of abrupt."""
     clip = clips["ballet/plies"]
     pairs = [(i, k) for i in range(0, 60, 7) for k in range(3, 66, 9) if k not in (i, i + 1)]
-    judged = judge_transitions(Piece.of(clip, facing=engine.corpus.facing), pairs, engine, posturewise=False)
+    judged = judge_transitions(Piece.of(clip, facing=engine.corpus.facing), pairs, engine, whole_body=False)
     asked = [question(clips, (End("ballet/plies", i, True), End("ballet/plies", k, True))) for i, k in pairs]
     findings = judge(say_nothing, "ballet", asked)
     assert [found.abrupt for found in findings] == [one.is_abrupt for one in judged]

@@ -18,8 +18,7 @@ from motionmind.search.cfn import cfn
 from motionmind.search.problem import Problem, Rules, with_waits
 from motionmind.search.solve import solve
 from motionmind.tween.engine import Engine
-from motionmind.tween.problem import build_model, ingredients_of
-from motionmind.tween.progression import lift_to_moves
+from motionmind.tween.problem import build_model, ingredients_of, lift_to_moves
 
 pytestmark = pytest.mark.long
 

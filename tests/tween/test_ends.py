@@ -16,6 +16,7 @@ from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError
 from motionmind.geometry import rotations as rot
+from motionmind.names.postures import find_posture
 from motionmind.retarget.retarget import to_human23
 from motionmind.tween.engine import Engine
 from motionmind.tween.formulate import formulate
@@ -254,9 +255,10 @@ def test_a_body_that_runs_on_goes_on_for_a_while(ballet: Engine) -> None:
 
 def test_names_of_moving_postures_move(ballet: Engine) -> None:
     """A ~ counts in Python as on the command line."""
-    still = ballet.tween("ballet/adagio@23", "ballet/adagio@40")
+    still = ballet.tween(*map(ballet.posture, ("ballet/adagio@23", "ballet/adagio@40")))
     assert (still.before, still.after) == (None, None)
-    named = ballet.tween("ballet/adagio@23~", "ballet/adagio@40~")
+    a, b = map(find_posture, ("ballet/adagio@23~", "ballet/adagio@40~"))
+    named = ballet.tween(a.posture, b.posture, before=a.before, after=b.after)
     adagio = ballet_clip("adagio")
     near = np.flatnonzero(np.abs(adagio.times - adagio.times[23]) <= 0.2 + 1e-6)[0]
     given = ballet.tween(
@@ -264,5 +266,14 @@ def test_names_of_moving_postures_move(ballet: Engine) -> None:
     )
     np.testing.assert_array_equal(named.motion.rotations, given.motion.rotations)
     assert not np.array_equal(named.motion.rotations[1], still.motion.rotations[1])
-    with pytest.raises(MotionMindError, match=r"adagio@23~: ~ takes the movement around the frame, and so does before"):
-        ballet.tween("ballet/adagio@23~", "ballet/fifth", before=BEFORE)
+
+
+def test_nothing_leads_up_to_a_clip_s_first_frame_or_follows_its_last() -> None:
+    first, last = (find_posture(f"ballet/adagio@{frame}~") for frame in (0, -1))
+    assert first.before is None
+    assert last.after is None
+    for around in (first.after, last.before):
+        assert around is not None
+        assert len(around) >= 2
+    still = find_posture("ballet/adagio@23")
+    assert (still.before, still.after) == (None, None)

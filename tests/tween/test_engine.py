@@ -24,11 +24,11 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store
 from motionmind.discretize.codebook import Codebook
-from motionmind.errors import CorpusError, FormatError, MotionMindError, NoPathError, SkeletonError
+from motionmind.errors import CorpusError, FormatError, MotionMindError, NoPathError, SkeletonError, WrongTypeError
 from motionmind.footing.root import stand
 from motionmind.formats import read_motion, read_posture, write_motion, write_posture
 from motionmind.geometry import rotations as rot
-from motionmind.names.finding import find_posture
+from motionmind.names.postures import find_posture
 from motionmind.retarget.retarget import own_skeleton
 from motionmind.tween.engine import Engine
 from motionmind.tween.result import Tween
@@ -626,14 +626,22 @@ def test_postures_of_the_bundled_corpus_are_joined() -> None:
     assert_sound(engine.tween(a, b), a, b)
 
 
-def test_ends_may_be_given_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ends_may_be_found_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     engine = Engine.load("ballet")
     monkeypatch.chdir(tmp_path)
-    b = find_posture("ballet/fifth")
+    b = find_posture("ballet/fifth").posture
     write_posture("B.json", b)
-    named, given = engine.tween("ballet/arabesque", "B.json"), engine.tween(find_posture("ballet/arabesque"), b)
+    a = engine.posture("ballet/arabesque")
+    named, given = engine.tween(a, engine.posture("B.json")), engine.tween(a, b)
     np.testing.assert_array_equal(named.path, given.path)
-    (other,) = engine.alternatives("ballet/arabesque", b, 1)
-    np.testing.assert_array_equal(other.path, given.path)
     with pytest.raises(MotionMindError, match="did you mean arabesque"):
-        engine.tween("ballet/arabesk", b)
+        engine.posture("ballet/arabesk")
+
+
+def test_a_name_in_place_of_a_posture_is_refused_with_what_finds_it() -> None:
+    engine = Engine.load("ballet")
+    b = engine.posture("ballet/fifth")
+    with pytest.raises(WrongTypeError, match=r"a must be a Posture \(find_posture finds one by name\), not 'ballet/x'"):
+        engine.tween("ballet/x", b)  # type: ignore[arg-type]
+    with pytest.raises(WrongTypeError, match="b must be a Posture"):
+        [*engine.alternatives(b, "ballet/x", 1)]  # type: ignore[arg-type]

@@ -43,7 +43,7 @@ def posture(engine: Engine, row: int) -> Posture:
 
 
 def formulated(engine: Engine, **options: Any) -> Formulation:
-    return formulate(engine, *ends(engine), TweenRequest(**options))
+    return formulate(engine, *ends(engine), TweenRequest.of(**options))
 
 
 def guide_of(engine: Engine, moves: int, /, **options: Any) -> Floats:
@@ -142,7 +142,7 @@ def test_the_search_is_guided_by_the_movement_before_a_and_after_b(engine: Engin
 
 def test_without_kappa_there_is_no_guide(engine: Engine) -> None:
     assert formulated(engine, guide=0.0).searched.guide is None
-    assert formulated(engine, posturewise=True).searched.guide is None
+    assert formulated(engine, whole_body=True).searched.guide is None
     tween = engine.tween(*ends(engine), guide=0.0, without=["pace"])
     assert not tween.costs.guide.any()
     assert tween.length is None

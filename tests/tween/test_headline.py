@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from motionmind.learned.plausibility import Sighting
-from motionmind.names.finding import find_posture
+from motionmind.names.postures import find_posture
 from motionmind.tween.certificate import Bridge
 from motionmind.tween.engine import Engine
 from motionmind.tween.headline import beyond, headline, shown_beyond
@@ -32,7 +32,7 @@ def test_what_exceeds_the_corpus_by_little_gets_the_digits_that_show_it(value: f
 
 @pytest.fixture(scope="module")
 def tween() -> Tween:
-    return Engine.load("ballet").tween(find_posture("ballet/arabesque"), find_posture("ballet/fifth"))
+    return Engine.load("ballet").tween(find_posture("ballet/arabesque").posture, find_posture("ballet/fifth").posture)
 
 
 def test_it_says_length_making_proof_and_feet(tween: Tween) -> None:
@@ -84,7 +84,9 @@ def test_feet_that_do_not_stay_are_not_said_to(tween: Tween) -> None:
 
 def test_an_insect_has_more_feet_than_two() -> None:
     engine = Engine.load("walk-hexapod")
-    said = headline(engine.tween(find_posture("walk-hexapod/stand"), find_posture("walk-hexapod/groom")))
+    said = headline(
+        engine.tween(find_posture("walk-hexapod/stand").posture, find_posture("walk-hexapod/groom").posture)
+    )
     assert "of 6 feet stay in place" in said or said.endswith("feet stay in place")
 
 

@@ -53,7 +53,7 @@ REQUESTS: list[dict[str, Any]] = [
     {"hold": ["left_wrist"], "moves": 5},
     {"avoid": [("left_knee", 0)]},
     {"sample": True, "seed": 3},
-    {"posturewise": True},
+    {"whole_body": True},
 ]
 
 

@@ -49,7 +49,7 @@ _FOUND: dict[tuple[object, ...], Tween] = {}
 def tween_of(engine: Engine, a: Posture, b: Posture, **asked: Any) -> Tween:
     """The engine's tween, found once for all tests that ask for the same, for it would be the same to the byte."""
     ends = tuple(array.tobytes() for end in (a, b) for array in (end.rotations, end.root))
-    key = (engine.corpus.name, *ends, repr(TweenRequest(**asked)))
+    key = (engine.corpus.name, *ends, repr(TweenRequest.of(**asked)))
     if key not in _FOUND:
         _FOUND[key] = engine.tween(a, b, **asked)
     return _FOUND[key]
@@ -187,7 +187,7 @@ def test_who_has_time_is_nowhere_faster_than_the_corpus(ballet: Engine, long: fl
 @pytest.mark.parametrize("asked", [{"pace": 0.0}, {"pace": -1.0}, {"pace": np.inf}, {"pace": 1.2, "duration": 2.0}])
 def test_a_pace_that_cannot_be_is_refused(asked: dict[str, float]) -> None:
     with pytest.raises(MotionMindError, match="pace"):
-        TweenRequest(**asked)  # type: ignore[arg-type]
+        TweenRequest.of(**asked)  # type: ignore[arg-type]
 
 
 def test_insertions_of_variations_take_it(ballet: Engine) -> None:

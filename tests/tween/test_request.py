@@ -15,6 +15,7 @@ from motionmind.cli import app
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.formats import read_posture
 from motionmind.tween.engine import Engine
+from motionmind.tween.options import OPTIONS, SearchOptions
 from motionmind.tween.report import TweenReport, encode_report, read_report
 from motionmind.tween.request import TweenRequest
 from motionmind.tween.result import report_of
@@ -60,13 +61,13 @@ def test_a_request_cannot_be_changed() -> None:
         ({"lambda_": -1.0}, "lambda must be"),
         ({"tau": float("inf")}, "tau must be"),
         ({"via": [(FIRST, 0)]}, "via 1: the move"),
-        ({"posturewise": True, "sample": True}, "posturewise"),
-        ({"posturewise": True, "coordination": "progression"}, "posturewise"),
+        ({"whole_body": True, "sample": True}, "whole_body"),
+        ({"whole_body": True, "coordination": "progression"}, "whole_body"),
     ],
 )
 def test_what_cannot_be_asked_is_refused_at_once(options: dict[str, Any], words: str) -> None:
     with pytest.raises(MotionMindError, match=words):
-        TweenRequest(**options)
+        TweenRequest.of(**options)
 
 
 def test_an_option_that_is_none_is_named_with_the_nearest() -> None:
@@ -77,8 +78,8 @@ def test_an_option_that_is_none_is_named_with_the_nearest() -> None:
 @pytest.mark.parametrize("command", ["tween", "vary", "review"])
 def test_the_command_line_offers_every_field_with_its_default(command: str) -> None:
     options = {option.name: option for option in app.commands[command].params}
-    defaults = {field.name: field.default for field in fields(TweenRequest)}
-    asked = defaults.keys() - {"unlike", "what_if"}  # those of `tween` alone
+    defaults = {field.name: field.default for field in (*fields(TweenRequest), *fields(SearchOptions))}
+    asked = OPTIONS.keys() - {"unlike", "what_if"}  # those of `tween` alone
     assert asked <= options.keys()
     for name in asked - {"pin", "hold", "avoid", "via", "node_budget"}:
         assert options[name].default == defaults[name], name
@@ -87,7 +88,8 @@ def test_the_command_line_offers_every_field_with_its_default(command: str) -> N
 def test_the_report_repeats_every_field(ballet: Engine) -> None:
     tween = ballet.tween(FIRST, PLIE, duration=2.0, pin={"left_wrist": "B"}, memory=10**8)
     asked = tween.report()["asked"]
-    assert asked.keys() == {field.name.rstrip("_") for field in fields(TweenRequest)} | {"before", "after"}
+    both = {field.name.rstrip("_") for field in (*fields(TweenRequest), *fields(SearchOptions))}
+    assert asked.keys() == both - {"search"} | {"before", "after"}
     assert (asked["duration"], asked["pin"], asked["memory"]) == (2.0, {"left_wrist": "B"}, 10**8)
     assert asked["node_budget"] == tween.node_budget > 0
     assert asked["guide"] == 1.0
@@ -109,7 +111,7 @@ def test_a_report_that_was_written_is_read_again(ballet: Engine, tmp_path: Path)
 def test_reports_of_0_1_are_read(ballet: Engine, tmp_path: Path) -> None:
     """They lack what came later, and may have what is gone."""
     old = ballet.tween(FIRST, PLIE).report()
-    del old["asked"]["posturewise"]
+    del old["asked"]["whole_body"]
     for name in ("detail", "path_degrees", "vias", "differs", "length", "tempo", "followed"):
         del old[name]
     del old["costs"]["guide"]

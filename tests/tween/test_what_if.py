@@ -44,7 +44,7 @@ _FOUND: dict[str, Tween] = {}
 
 def tween_of(engine: Engine, **asked: Any) -> Tween:
     """The engine's tween between both ends, found once for all that ask for the same."""
-    key = repr(TweenRequest(**asked))
+    key = repr(TweenRequest.of(**asked))
     if key not in _FOUND:
         _FOUND[key] = engine.tween(*ENDS, **asked)
     return _FOUND[key]

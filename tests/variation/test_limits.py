@@ -123,13 +123,13 @@ def test_without_price_and_stretches_it_is_the_trajectorys_own_order(flow: str, 
 # --- estimates ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("posturewise", [False, True])
+@pytest.mark.parametrize("whole_body", [False, True])
 def test_seams_that_a_corpus_knows_are_estimated_to_insert_nothing_and_no_others(
-    short: Piece, karate: Engine, posturewise: bool
+    short: Piece, karate: Engine, whole_body: bool
 ) -> None:
-    seconds = estimate_insertions(short, TransitionTest(karate, posturewise))
+    seconds = estimate_insertions(short, TransitionTest(karate, whole_body))
     pairs = [(i, k) for i in range(0, len(short), 8) for k in range(len(short))]
-    for one in judge_transitions(short, pairs, karate, posturewise):
+    for one in judge_transitions(short, pairs, karate, whole_body):
         assert one.is_abrupt == (seconds[one.start, one.end] > 0.0), (one.start, one.end)
     assert 0.0 < (seconds == 0.0).mean() < 0.5
 

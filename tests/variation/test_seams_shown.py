@@ -15,7 +15,8 @@ from PIL import Image
 from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
-from motionmind.names.finding import find_posture, open_collection
+from motionmind.names.finding import open_collection
+from motionmind.names.postures import find_posture
 from motionmind.names.spelling import parse_frames, parse_source
 from motionmind.render.seam_sheet import seam_sheet
 from motionmind.tween.engine import Engine
@@ -51,7 +52,7 @@ def test_a_name_leads_to_the_posture_that_it_names(adagio: Motion) -> None:
     assert len(set(names)) > 40
     assert any("@" not in name for name in names)
     for number, name in enumerate(names):
-        found = find_posture(f"ballet/{name}")
+        found = find_posture(f"ballet/{name}").posture
         np.testing.assert_array_less(rot.angle(found.rotations[1:], adagio.rotations[number, 1:]), np.radians(1.0))
         if "@" in name:
             assert name == f"adagio@{number}"

@@ -286,7 +286,7 @@ def test_abrupt_is_what_no_move_of_the_corpus_shows(macarena: Engine) -> None:
     fastest = (angles / corpus.moves.seconds[:, None]).max(axis=0)
     bodies = {(states[b, :-1].tobytes(), states[e, :-1].tobytes()) for b, e in zip(begins, ends, strict=True)}
     seen = [set(zip(states[begins, chain], states[ends, chain], strict=True)) for chain in range(states.shape[1])]
-    joined, whole = (judge_transitions(piece, pairs, macarena, posturewise) for posturewise in (False, True))
+    joined, whole = (judge_transitions(piece, pairs, macarena, whole_body) for whole_body in (False, True))
     assert any(not join.is_abrupt for join in joined)
     for join, body in zip(joined, whole, strict=True):
         i, k = join.start, join.end
@@ -309,8 +309,8 @@ def test_abrupt_is_what_no_move_of_the_corpus_shows(macarena: Engine) -> None:
 
 def test_the_piece_follows_itself_as_its_own_corpus_knows(macarena: Engine) -> None:
     piece = piece_of(macarena, "macarena")
-    for posturewise in (False, True):
-        found = judge_transitions(piece, list(pairwise(range(len(piece)))), macarena, posturewise)
+    for whole_body in (False, True):
+        found = judge_transitions(piece, list(pairwise(range(len(piece)))), macarena, whole_body)
         turning = [join for join in found if join.is_abrupt]
         # Its own turns are taken out at a seam, where a body goes on facing as it did.
         assert not turning

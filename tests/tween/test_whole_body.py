@@ -18,9 +18,8 @@ from motionmind.errors import InfeasibleError, MotionMindError, NoPathError
 from motionmind.geometry import rotations as rot
 from motionmind.search.solve import solve
 from motionmind.tween.engine import Engine
-from motionmind.tween.nearest_body import nearest_posture
 from motionmind.tween.result import Tween
-from motionmind.tween.whole_body import find_bodies, solve_posturewise
+from motionmind.tween.whole_body import find_bodies, nearest_posture, solve_whole_body
 
 ARABESQUE, FIFTH = (BALLET / "postures" / f"{name}.json" for name in ("arabesque", "fifth"))
 
@@ -30,7 +29,7 @@ def posture(engine: Engine, index: int) -> Posture:
 
 
 def between(engine: Engine, a: int, b: int, **options: Any) -> Tween:
-    return engine.tween(posture(engine, a), posture(engine, b), posturewise=True, **options)
+    return engine.tween(posture(engine, a), posture(engine, b), whole_body=True, **options)
 
 
 @pytest.fixture(scope="module")
@@ -87,9 +86,9 @@ def test_the_optimum_is_that_of_all_walks_through_the_bodies(seed: int) -> None:
                 least = min(least, value[toy.goal] + toy.per_move * t)
         if np.isinf(least):
             with pytest.raises(InfeasibleError):
-                solve_posturewise(problem, bodies)
+                solve_whole_body(problem, bodies)
             continue
-        found = solve_posturewise(problem, bodies)
+        found = solve_whole_body(problem, bodies)
         assert found.cost == pytest.approx(least, abs=1e-9)
         assert toy.cost(found.path) == pytest.approx(found.cost, abs=1e-9)
         assert found.status == "optimal"
@@ -104,7 +103,7 @@ def test_a_long_way_may_be_the_cheapest_where_moves_cost_less_than_nothing() -> 
     none = np.zeros(6)
     toy = Toy((-1,), (table,), (none,), (none,), (np.zeros((1, 6)),), (0,), (5,), wait=9.0, per_move=0.5)
     states, begins = np.array([[0], [1], [2], [3], [4], [5], [0], [5]], dtype=np.int32), np.array([0, 1, 2, 3, 4, 6])
-    found = solve_posturewise(toy.problem(toy.rules(1, 8)), find_bodies(states, begins, begins + 1))
+    found = solve_whole_body(toy.problem(toy.rules(1, 8)), find_bodies(states, begins, begins + 1))
     assert found.path[:, 0].tolist() == [0, 1, 2, 3, 4, 5]
     assert found.cost == pytest.approx(4.0 - 8.0 + 5 * 0.5)
 
@@ -196,13 +195,13 @@ def test_the_nearest_posture_has_the_least_sum_of_squares() -> None:
 
 
 def test_the_command_takes_it_and_refuses_the_problem_with_it(run: Run) -> None:
-    ran = run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "--posturewise", "--report", "-")
+    ran = run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "--whole-body", "--report", "-")
     assert ran.code == 0
     free = run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "--without", "pace", "--report", "-")
     assert ran.json["cost"] > free.json["lower_bound"]
-    both = run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "--posturewise", "--problem", "a.cfn")
+    both = run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "--whole-body", "--problem", "a.cfn")
     assert both.code == 2
-    assert "--posturewise" in both.err
+    assert "--whole-body" in both.err
 
 
 def test_options_are_checked_with_it_too(insects: Engine) -> None:

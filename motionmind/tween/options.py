@@ -1,0 +1,243 @@
+"""The options of a tween: the rule that each must follow, and the options of its search.
+
+The command line's options, the report's `asked` and the options that `vary` accepts are the rows of `OPTIONS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from types import MappingProxyType
+from typing import Any, get_args
+
+from motionmind.arguments import (
+    check_flag,
+    check_integer,
+    check_items,
+    check_mapping,
+    check_real,
+    check_text,
+)
+from motionmind.body.rates import FASTEST
+from motionmind.errors import MotionMindError, WrongTypeError
+from motionmind.footing.corrections import Correction
+from motionmind.grammar.schemes import Scheme, Weights
+
+MAX_MOVES = 10_000  # more is a typing error, and exceeds memory
+MAX_NODES = 1_000_000_000
+PACE_RANGE = 0.05, 20.0  # multiples of the corpus's pace
+
+_Rule = Callable[[str, Any], Any]  # check the value of a named option, and return it as the request keeps it
+
+
+def _whole(least: int, most: int | None = None) -> _Rule:
+    """Return the rule for a whole number, Python's or NumPy's."""
+    limits = f"of at least {least}" if most is None else f"from {least} to {most}"
+
+    def take(name: str, value: Any) -> Any:
+        check_integer(name, value)
+        if value < least or (most is not None and value > most):
+            raise MotionMindError(f"{name} must be a whole number {limits}, not {value}")
+        return value
+
+    return take
+
+
+def _number(least: float, most: float, unit: str = "") -> _Rule:
+    """Return the rule for a number in a range; NaN lies in none."""
+
+    def take(name: str, value: Any) -> Any:
+        check_real(name, value)
+        if not least <= value <= most:
+            raise MotionMindError(f"{name} must be a number{unit} from {least:g} to {most:g}, not {value}")
+        return value
+
+    return take
+
+
+def _choice(choices: Sequence[str]) -> _Rule:
+    """Return the rule for one of several words."""
+
+    def take(name: str, value: Any) -> Any:
+        check_text(name, value)
+        if value not in choices:
+            listed = f"{', '.join(map(repr, choices[:-1]))} or {choices[-1]!r}"
+            raise MotionMindError(f"{name} must be {listed}, not {value!r}")
+        return value
+
+    return take
+
+
+def _items(wanted: str, *types: type, each: _Rule = lambda _, item: item) -> _Rule:
+    """Return the rule for a sequence, which the request copies."""
+
+    def take(name: str, value: Any) -> Any:
+        check_items(name, value, wanted, *types)
+        return tuple(each(name, item) for item in value)
+
+    return take
+
+
+def _or_none(rule: _Rule) -> _Rule:
+    return lambda name, value: None if value is None else rule(name, value)
+
+
+def _checked(check: Callable[[str, Any], None]) -> _Rule:
+    """Return the rule for a value that only needs a check of its type."""
+
+    def take(name: str, value: Any) -> Any:
+        check(name, value)
+        return value
+
+    return take
+
+
+def _take_moves(name: str, value: Any) -> Any:
+    """Check a number of moves, or the least and the greatest."""
+    if not isinstance(value, tuple):
+        return _whole(1, MAX_MOVES)(name, value)
+    if len(value) != 2:
+        raise WrongTypeError(f"{name} must be a whole number, or a pair of them, not {len(value)} of them")
+    least, most = (_whole(1, MAX_MOVES)(name, number) for number in value)
+    if least > most:
+        raise MotionMindError(f"{name} must be a range from the least to the greatest, not from {least} to {most}")
+    return value
+
+
+def _take_pins(name: str, value: Any) -> Any:
+    """Check the pinned joints, and copy them."""
+    check_mapping(name, value)
+    return MappingProxyType(dict(value))
+
+
+def _take_vias(name: str, value: Any) -> Any:
+    """Check the moves of the postures to pass through."""
+    check_items(name, value, "postures, or pairs of a posture and a move")
+    vias = tuple(value)
+    for number, via in enumerate(vias, start=1):
+        if isinstance(via, tuple):
+            _, move = via
+            _or_none(_whole(1, MAX_MOVES - 1))(f"via {number}: the move", move)
+    return vias
+
+
+_NATS = _number(0.0, 1e6, " of nats")  # larger sums lose the other costs to rounding, and then overflow
+_SHARE = _number(0.0, 1.0)
+_FLAG = _checked(check_flag)
+
+# The rule of each option, in the order of reports.
+OPTIONS: Mapping[str, _Rule] = {
+    "moves": _or_none(_take_moves),
+    "max_moves": _whole(1, MAX_MOVES),
+    "duration": _or_none(_checked(check_real)),
+    "pace": _number(*PACE_RANGE),
+    "pin": _take_pins,
+    "hold": _items("joints' names", str),
+    "avoid": _items("pairs of a joint's name and a state", tuple, list),
+    "via": _take_vias,
+    "unlike": _items("tweens"),
+    "differ": _SHARE,
+    "within": _SHARE,
+    "what_if": _FLAG,
+    "sample": _FLAG,
+    "seed": _whole(0),
+    "strict": _FLAG,
+    "whole_body": _FLAG,
+    "node_budget": _whole(1, MAX_NODES),
+    "memory": _or_none(_whole(1, 1 << 50)),  # bytes
+    "weights": _choice(get_args(Weights)),
+    "novelty": _SHARE,
+    "coordination": _choice(get_args(Scheme)),
+    "lambda_": _NATS,
+    "beta": _NATS,
+    "tau": _NATS,
+    "bridge_price": _NATS,
+    "guide": _NATS,
+    "liveliness": _SHARE,
+    "passage": _or_none(_checked(check_text)),
+    "without": _items("corrections' names", str, each=_choice(get_args(Correction))),
+    "fps": _number(0.01, FASTEST, " of frames a second"),
+}
+
+
+def take_options(options: Any) -> None:
+    """Check the fields of a dataclass by their rules, and copy those that the caller could change later."""
+    for one in fields(options):
+        if one.name in OPTIONS:
+            value = OPTIONS[one.name](one.name.rstrip("_"), getattr(options, one.name))
+            object.__setattr__(options, one.name, value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SearchOptions:
+    """How to search for the path of a tween: the costs, the method and its limits.
+
+    Attributes:
+        max_moves: greatest number of moves that the search may find.
+        within: share by which the cost of a tween that differs from others may exceed the proven lower bound; 0 finds
+            the best.
+        sample: sample a path with probability proportional to exp(-cost) instead of finding the best one; it has as
+            many moves as the best. See `motionmind.search.sample` for the accuracy of the distribution.
+        seed: seed of the sample, at least 0.
+        strict: forbid bridges: every move of every joint is attested, or a wait at its goal.
+        whole_body: search whole postures of the corpus in their recorded order, from the one nearest to A to the one
+            nearest to B: the search of 1998, as a baseline.
+        node_budget: nodes that the search may hold at once; it also stops after this many expansions.
+        memory: bytes for these nodes, instead of `node_budget`.
+        weights: cost of a transition: "conditional", -log P(next state | state), or "printed", as in the papers.
+        coordination: model of a joint's coordination: "posture", P(joint's state | parent's state); "progression",
+            P(joint's next state | its state, parent's state and next state), as in [C98]; or "none".
+        lambda_: factor of the coordination's -log P.
+        beta: nats for each move that a joint waits at its goal.
+        tau: nats for each move.
+        bridge_price: nats for each degree of an unattested move.
+        guide: kappa, nats for a joint that is one tolerance away from the corpus walks for 0.2 s; 0 turns the guide
+            off. It shrinks as novelty grows; a search of whole postures has no guide.
+
+    Raises:
+        WrongTypeError: a value has the wrong type.
+        MotionMindError: a value is out of range.
+
+    >>> from motionmind import SearchOptions
+    >>> SearchOptions(tau=-1.0)
+    Traceback (most recent call last):
+    motionmind.errors.MotionMindError: tau must be a number of nats from 0 to 1e+06, not -1.0
+    """
+
+    max_moves: int = 60
+    within: float = 0.0
+    sample: bool = False
+    seed: int = 0
+    strict: bool = False
+    whole_body: bool = False
+    node_budget: int = 200_000
+    memory: int | None = None
+    weights: Weights = "conditional"
+    coordination: Scheme = "posture"
+    lambda_: float = 1.0
+    beta: float = 1.0
+    tau: float = 1.0
+    bridge_price: float = 1.0
+    guide: float = 1.0
+
+    def __post_init__(self) -> None:
+        take_options(self)
+        if self.whole_body and self.coordination == "progression":
+            raise MotionMindError("whole_body: coordination can be posture or none, not progression")
+
+    @property
+    def coordination_factor(self) -> float:
+        """Factor of the coordination's -log P: lambda, or 0 if joints move independently."""
+        return 0.0 if self.coordination == "none" else self.lambda_
+
+    def nodes(self, chains: int) -> int:
+        """Return the number of nodes that the search may hold, for a body with this many joint chains."""
+        check_integer("chains", chains)
+        if self.memory is None:
+            return self.node_budget
+        from motionmind.search.astar import nodes_in  # numba is slow to import
+
+        nodes = nodes_in(int(self.memory), chains)
+        if nodes < 1:
+            raise MotionMindError(f"memory={self.memory} is too small: a search needs some megabytes")
+        return min(nodes, MAX_NODES)
