@@ -24,6 +24,7 @@ from motionmind.search.apart import solve_apart
 from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.search.problem import Problem
 from motionmind.search.solve import Certificate, feasible, solve
+from motionmind.tween.ends import bring_ends
 from motionmind.tween.formulate import formulate
 
 EXPANSIONS = 200_000
@@ -142,13 +143,13 @@ def posed(case: Case, engine: Engine, pairs: int, seed: int) -> Iterator[Posed]:
     while pairs > 0:
         a, b = random_posture(engine, rng), random_posture(engine, rng)
         request = TweenRequest.of(**case.ask(engine, rng))
-        found = formulate(engine, a, b, request)
+        found = formulate(engine, bring_ends(engine.corpus, a, b), request)
         if not feasible(found.searched):
             continue
         other = None
         if case.differs:
             other = solve(found.searched)
-            found = formulate(engine, a, b, replace(request, unlike=(other,)))
+            found = formulate(engine, bring_ends(engine.corpus, a, b), replace(request, unlike=(other,)))
         pairs -= 1
         yield Posed(found.searched, other, request.differ)
 

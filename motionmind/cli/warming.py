@@ -420,10 +420,12 @@ def draw() -> None:
 
 def _problem() -> Problem:
     """Return the problem of a movement between two postures of a bundled corpus."""
+    from motionmind.tween.ends import bring_ends
     from motionmind.tween.engine import Engine
     from motionmind.tween.formulate import formulate
     from motionmind.tween.request import TweenRequest
 
     engine = Engine.load("ballet")
     clip = engine.corpus.motion(engine.corpus.clips[0])
-    return formulate(engine, clip.posture(0), clip.posture(9), TweenRequest()).searched
+    ends = bring_ends(engine.corpus, clip.posture(0), clip.posture(9))
+    return formulate(engine, ends, TweenRequest()).searched

@@ -17,6 +17,7 @@ from motionmind.errors import MotionMindError
 from motionmind.grammar.grammar import Grammar
 from motionmind.learned.model import LearnedCorpus
 from motionmind.search.solve import solve
+from motionmind.tween.ends import bring_ends
 from motionmind.tween.formulate import formulate
 from motionmind.tween.request import TweenRequest
 
@@ -57,7 +58,8 @@ def solve_pairs(learned: LearnedCorpus, pairs: Ints) -> Solved:
     costs, bounds, moves = np.zeros(len(pairs)), np.zeros(len(pairs)), np.zeros(len(pairs), np.int64)
     bridged = np.zeros((len(pairs), len(learned.grammar.chains)), np.int64)
     for number, (a, b) in enumerate(pairs.tolist()):
-        formulation = formulate(learned, _posture(learned.corpus, a), _posture(learned.corpus, b), PLAIN_REQUEST)
+        ends = bring_ends(learned.corpus, _posture(learned.corpus, a), _posture(learned.corpus, b))
+        formulation = formulate(learned, ends, PLAIN)
         if not formulation.stays:
             found = solve(formulation.searched)
             costs[number], bounds[number], moves[number] = found.cost, found.lower_bound, len(found.path) - 1

@@ -30,6 +30,7 @@ from motionmind.search.sample import sample_path
 from motionmind.search.solve import Certificate, Watch, solve
 from motionmind.tween.certificate import Bridge, Source, break_down_cost, credit_tween, sources_of, trace_path
 from motionmind.tween.constraints import find_conflicts
+from motionmind.tween.ends import bring_ends
 from motionmind.tween.formulate import Formulation, formulate
 from motionmind.tween.modes import Modes
 from motionmind.tween.pacing import tempo_of, worded
@@ -104,14 +105,15 @@ class Engine(LearnedCorpus):
         check_type("after", after, Motion, or_none=True)
         check_function("watch", watch, or_none=True)
         began = perf_counter()
-        formulation = formulate(self, a, b, request, before, after)
+        ends = bring_ends(self.corpus, a, b, before, after)
+        formulation = formulate(self, ends, request)
         formulated = perf_counter()
         certificate = self._find_path(formulation, watch)
         what_if: tuple[WhatIf, ...] = ()
         if request.what_if:
 
             def answer(other: TweenRequest) -> Answer:
-                freed = formulate(self, a, b, other, before, after)
+                freed = formulate(self, ends, other)
                 return Answer(other, freed.searched, self._find_path(freed, watch))
 
             what_if = find_what_if(Answer(request, formulation.searched, certificate), answer)
@@ -249,7 +251,7 @@ class Engine(LearnedCorpus):
 
     def _realise(self, formulation: Formulation, certificate: Certificate) -> Realised:
         """Synthesise the motion of a path."""
-        request = formulation.request
+        request, ends = formulation.request, formulation.ends
         paced = request.paced and request.moves is None
         return realise(
             places(formulation.searched.model, certificate.path),
@@ -263,15 +265,15 @@ class Engine(LearnedCorpus):
                 float(self.plausibility.slides[0]) if paced else np.inf,
             ),
             Wishes(
-                formulation.a,
-                formulation.b,
+                ends.a,
+                ends.b,
                 formulation.wished,
                 formulation.constrained,
                 request.fps,
                 request.duration,
                 dict(zip(certificate.passed, formulation.through, strict=True)),
-                formulation.leaving,
-                formulation.arriving,
+                ends.leaving,
+                ends.arriving,
                 request.without,
                 request.pace,
                 request.moves is None,
@@ -362,8 +364,8 @@ class Engine(LearnedCorpus):
             length=certificate.length,
             times=formulation.times,
             tempo=tempo,
-            before=formulation.before,
-            after=formulation.after,
+            before=formulation.ends.before,
+            after=formulation.ends.after,
             plausibility=self.plausibility,
         )
 

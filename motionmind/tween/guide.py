@@ -20,7 +20,7 @@ from functools import lru_cache
 import numpy as np
 
 from motionmind._typing import Floats, Ints
-from motionmind.body.motion import Posture, Velocity
+from motionmind.body.motion import Posture
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
 from motionmind.learned.model import LearnedCorpus
@@ -31,7 +31,7 @@ from motionmind.realise.timeline import usual
 from motionmind.tween.pacing import usual_times
 from motionmind.walks.expectation import expect
 from motionmind.walks.passages import Place, dance
-from motionmind.walks.stops import Stop, stop_at
+from motionmind.walks.stops import Stop
 
 CREEPING = 0.25  # share of the time that corpus walks may creep
 SELDOM = 2.0  # standard deviations of log duration for a distance: dancers take longer one time in forty
@@ -40,8 +40,7 @@ MOVE = 0.2  # seconds: a move of this length pays kappa for a departure of one t
 
 def make_guide(
     learned: LearnedCorpus,
-    ends: tuple[Posture, Posture],
-    velocities: tuple[Velocity | None, Velocity | None],
+    stops: tuple[Stop, Stop],
     kappa: float,
     duration: float | None,
     rows: Ints,
@@ -53,10 +52,10 @@ def make_guide(
 
     It depends on both ends and the number of moves, but not on pins, vias or other restrictions, so that answers under
     different restrictions share one energy.
+
     Args:
         learned: the corpus.
-        ends: postures A and B on its skeleton.
-        velocities: velocities at A and B; None where unknown.
+        stops: the stops at A and B.
         kappa: nats for a chain that is off by its tolerance for 0.2 s.
         duration: total seconds; None for moves of the corpus's usual length.
         rows: row of the grammar's states for each row of the searched model [G].
@@ -66,7 +65,6 @@ def make_guide(
         place: start in the corpus of a passage to follow instead of the mean; None for the mean.
     """
     space, seconds = learned.space, usual(learned.grammar.transitions)
-    stops = [stop_at(learned.corpus, *end) for end in zip(ends, velocities, strict=True)]
 
     @lru_cache(maxsize=1)  # the cost breakdown needs the last number of moves again
     def costs(moves: int) -> Floats:
@@ -93,7 +91,7 @@ def make_guide(
 def find_detour(
     learned: LearnedCorpus,
     ends: tuple[Posture, Posture],
-    velocities: tuple[Velocity | None, Velocity | None],
+    stops: tuple[Stop, Stop],
     duration: float,
 ) -> Floats | None:
     """Return a detour that fills spare time, in moves of the usual length [T + 1, J, 4] (`motionmind.realise.detour`).
@@ -104,7 +102,7 @@ def find_detour(
     Args:
         learned: the corpus.
         ends: postures A and B on its skeleton.
-        velocities: velocities at A and B; None where unknown.
+        stops: the stops at A and B.
         duration: total seconds.
     """
     seconds, way = usual(learned.grammar.transitions), way_between(*ends)
@@ -113,7 +111,6 @@ def find_detour(
     (own,) = (time.median for time in usual_times(learned, ends))
     if np.log(duration / own) <= SELDOM * learned.pace.spread:
         return None
-    stops = [stop_at(learned.corpus, *end) for end in zip(ends, velocities, strict=True)]
     walked = max(1, round(duration / seconds))
     half_steps = np.linspace(0.0, duration, 2 * walked + 1)
     expected = expect(learned.corpus, learned.carriage, {0: stops[0], walked: stops[1]}, half_steps)

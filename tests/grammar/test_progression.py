@@ -28,6 +28,7 @@ from motionmind.search.problem import Model, Problem, Rules, Via, costs_to_go, p
 from motionmind.search.sample import gibbs_sample, sample_path
 from motionmind.search.solve import solve
 from motionmind.search.trellis import build_trellis
+from motionmind.tween.ends import bring_ends
 from motionmind.tween.engine import Engine
 from motionmind.tween.formulate import formulate
 from motionmind.tween.problem import lift_to_moves
@@ -407,7 +408,9 @@ def test_the_report_adds_up_to_the_cost_whatever_was_asked(engine: Engine) -> No
 def test_chains_wait_at_the_goal_by_moves_that_coordinate_alone(engine: Engine) -> None:
     """They could wait there for the price of waiting as well, past what their parents do."""
     passe = read_posture(POSTURES / "passe.json")
-    searched = formulate(engine, passe, passe, TweenRequest.of(coordination="progression", moves=2)).searched
+    searched = formulate(
+        engine, bring_ends(engine.corpus, passe, passe), TweenRequest.of(coordination="progression", moves=2)
+    ).searched
     assert searched.model_with_waits() is searched.model
 
 

@@ -18,9 +18,8 @@ from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.names.postures import find_posture
 from motionmind.retarget.retarget import to_human23
+from motionmind.tween.ends import bring_ends
 from motionmind.tween.engine import Engine
-from motionmind.tween.formulate import formulate
-from motionmind.tween.request import TweenRequest
 
 CLIP = ballet_clip("adagio").resample(30.0)
 A, B = CLIP.posture(40), CLIP.posture(100)
@@ -57,14 +56,14 @@ def renamed(motion: Motion) -> Motion:
 
 
 def test_the_velocities_are_those_of_the_frames_before_a_and_after_b(ballet: Engine) -> None:
-    found = formulate(ballet, A, B, TweenRequest(), BEFORE, stood_elsewhere(AFTER))
+    found = bring_ends(ballet.corpus, A, B, BEFORE, stood_elsewhere(AFTER))
     assert found.leaving is not None
     assert found.arriving is not None
     for velocity, expected in ((found.leaving, Velocity.at_end(BEFORE)), (found.arriving, Velocity.at_start(AFTER))):
         assert np.abs(velocity.rotations).max() > 0.1
         np.testing.assert_allclose(velocity.rotations, expected.rotations, atol=1e-9)
         np.testing.assert_allclose(velocity.root, expected.root, atol=1e-9)
-    alone = formulate(ballet, A, B, TweenRequest(), after=AFTER)
+    alone = bring_ends(ballet.corpus, A, B, after=AFTER)
     assert alone.leaving is None
     assert alone.arriving is not None
 
@@ -72,7 +71,7 @@ def test_the_velocities_are_those_of_the_frames_before_a_and_after_b(ballet: Eng
 def test_velocities_are_on_the_corpus_s_skeleton(ballet: Engine) -> None:
     """As postures are: movement on another rig is retargeted."""
     recorded = renamed(BEFORE)
-    found = formulate(ballet, recorded.posture(-1), B, TweenRequest(), recorded)
+    found = bring_ends(ballet.corpus, recorded.posture(-1), B, recorded)
     on_human23 = to_human23(recorded)
     assert human23().difference(on_human23.skeleton) is None
     assert found.leaving is not None
@@ -134,7 +133,7 @@ def test_a_flip_of_the_recording_is_no_velocity(ballet: Engine, first: int, last
     fine = CLIP.resample(120.0)
     before, after = fine.slice(150, 161), fine.slice(400, 411)
     a, b = before.posture(-1), after.posture(0)
-    found = formulate(ballet, a, b, TweenRequest(), flipped(before, slice(first, 7)), flipped(after, slice(4, last)))
+    found = bring_ends(ballet.corpus, a, b, flipped(before, slice(first, 7)), flipped(after, slice(4, last)))
     for velocity, wanted in (
         (found.leaving, Velocity.at_end(before.slice(7, 11))),
         (found.arriving, Velocity.at_start(after.slice(0, 4))),
@@ -144,11 +143,11 @@ def test_a_flip_of_the_recording_is_no_velocity(ballet: Engine, first: int, last
     with pytest.warns(
         MotionMindWarning, match=r"before A shows no velocity: left_hip flips by 1\d\d degrees in a frame"
     ):
-        alone = formulate(ballet, a, b, TweenRequest(), flipped(before, slice(0, 10)), after)
+        alone = bring_ends(ballet.corpus, a, b, flipped(before, slice(0, 10)), after)
     assert (alone.leaving, alone.before) == (None, None)
     assert alone.arriving is not None
     with pytest.warns(MotionMindWarning, match="after B shows no velocity: left_hip flips"):
-        assert formulate(ballet, a, b, TweenRequest(), None, flipped(after, slice(1, 11))).arriving is None
+        assert bring_ends(ballet.corpus, a, b, None, flipped(after, slice(1, 11))).arriving is None
 
 
 def test_movement_of_another_body_is_refused(ballet: Engine) -> None:

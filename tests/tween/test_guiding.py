@@ -12,6 +12,7 @@ from motionmind._typing import Floats
 from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.geometry import rotations as rot
 from motionmind.realise.timeline import usual
+from motionmind.tween.ends import bring_ends
 from motionmind.tween.engine import Engine
 from motionmind.tween.formulate import Formulation, formulate
 from motionmind.tween.guide import MOVE, departures, make_guide
@@ -43,7 +44,7 @@ def posture(engine: Engine, row: int) -> Posture:
 
 
 def formulated(engine: Engine, **options: Any) -> Formulation:
-    return formulate(engine, *ends(engine), TweenRequest.of(**options))
+    return formulate(engine, bring_ends(engine.corpus, *ends(engine)), TweenRequest.of(**options))
 
 
 def guide_of(engine: Engine, moves: int, /, **options: Any) -> Floats:
@@ -103,7 +104,7 @@ def test_the_sum_over_moves_does_not_depend_on_their_length(engine: Engine) -> N
     (a, b), rows = ends(engine), np.arange(engine.space.starts[-1])
     totals = []
     for moves in (10, 20, 40, 80):
-        guide = make_guide(engine, (a, b), (None, None), 1.0, 1.0, rows)
+        guide = make_guide(engine, bring_ends(engine.corpus, a, b).stops(engine.corpus), 1.0, 1.0, rows)
         totals.append(guide(moves).sum(axis=0))
     # What is summed is the trapezoid rule of one integral, but for the ends, where no move is charged.
     np.testing.assert_allclose(totals[2], totals[3], rtol=0.1, atol=0.1)
@@ -114,8 +115,8 @@ def test_ends_that_move_are_guided_otherwise(engine: Engine) -> None:
     (a, b), rows = ends(engine), np.arange(engine.space.starts[-1])
     velocity = Velocity(np.full((len(a.skeleton), 3), 2.0), np.zeros(3))
     plain, leaving, arriving = (
-        make_guide(engine, (a, b), velocities, 1.0, None, rows)(6)
-        for velocities in ((None, None), (velocity, None), (None, velocity))
+        make_guide(engine, (stop_at(engine.corpus, a, left), stop_at(engine.corpus, b, arrived)), 1.0, None, rows)(6)
+        for left, arrived in ((None, None), (velocity, None), (None, velocity))
     )
     assert np.abs(leaving - plain)[0].max() > 0.1
     assert np.abs(arriving - plain)[-1].max() > 0.1
@@ -130,7 +131,7 @@ def test_the_search_is_guided_by_the_movement_before_a_and_after_b(engine: Engin
     after = Motion(b.skeleton, rot.mul(b.rotations, spin)[::-1], np.repeat(b.root[None], 3, axis=0), times, "after")
     guides = []
     for moving in ({}, {"before": before}, {"after": after}):
-        guide = formulate(engine, a, b, TweenRequest(), **moving).searched.guide
+        guide = formulate(engine, bring_ends(engine.corpus, a, b, **moving), TweenRequest()).searched.guide
         assert guide is not None
         guides.append(guide(6))
     assert np.abs(guides[1] - guides[0])[0].max() > 0.1
