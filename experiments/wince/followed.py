@@ -20,7 +20,7 @@ from experiments.wince.dancers import Dancers, dancers
 from experiments.wince.run import BUDGET
 from motionmind import Engine, NoPathError, Tween
 from motionmind._typing import Floats, Ints
-from motionmind.tween.engine import SAME_ANGLE
+from motionmind.tween.engine import FOLLOWED_SLACK_DEG
 
 BUNDLED = ("ballet", "karate", "macarena")
 RECORDINGS = ("cmu-05", "indian", "cmu-16")
@@ -76,7 +76,7 @@ def counted(found: Engine, danced: Dancers, pairs: int) -> Ints:
 def near(tween: Tween, tolerances: Floats) -> tuple[int, int, int]:
     """Count a tween's inner joint-moves, those within tolerance and within three; `tolerances` [L] are in degrees."""
     inner = tween.path_degrees[1:-1]
-    return inner.size, int(tween.followed[1:-1].sum()), int((inner <= 3.0 * tolerances + SAME_ANGLE).sum())
+    return inner.size, int(tween.followed[1:-1].sum()), int((inner <= 3.0 * tolerances + FOLLOWED_SLACK_DEG).sum())
 
 
 def share(part: Ints, whole: Ints) -> tuple[float, float, float]:

@@ -71,7 +71,7 @@ LAST = option(
     section=Section.DRAW,
     type=COUNT,
     metavar="N",
-    help="Put N postures in a row  [default: as fit a screen's shape]",
+    help="Put N postures in a row  [default: as many as suit the screen]",
 )
 @option(
     "--side",
@@ -100,8 +100,8 @@ def sheet(
     SOURCE is a file of movement, a score, a corpus by its name or folder, CORPUS/CLIP, or a posture such as
     ballet/arabesque. Scores and corpora hold several clips; --clip takes some.
 
-    Each posture is drawn from the front and from the side, and its feet from above, with its time and its frame's
-    number: 23 is SOURCE@23 where a posture is wanted.
+    The sheet draws each posture from the front and from the side, and its feet from above, with its time and frame
+    number: frame 23 is the posture SOURCE@23.
     """
     from motionmind.files import write_atomically
     from motionmind.render.sheet import check_frames, draw_sheet, png
@@ -164,9 +164,9 @@ def render(
     """Draw movement as a picture, a film, or a page that plays it.
 
     SOURCE is a file of movement, a score, a corpus by its name or folder, CORPUS/CLIP, or a posture such as
-    ballet/arabesque. A .png shows one posture, or
-    a sheet of up to 48 evenly spread ones (the sheet command offers more choice); an .html page plays the movement in
-    any browser, from disk, offline. Inserted movement is drawn in violet; a green ball marks a joint that was bridged.
+    ballet/arabesque. A .png shows one posture, or a sheet of up to 48 evenly spread ones (the sheet command has more
+    options); an .html page plays the movement in any browser, from disk, offline. Inserted movement is violet; a green
+    ball marks a bridged joint.
     """
     from motionmind.render.pictures import draw_picture
 
@@ -187,7 +187,7 @@ def render(
 
 
 def _make_files(folder: Path, motions: Sequence[Motion], read_from: Sequence[Path]) -> list[Path]:
-    """Return a file for each motion, named after it, in a folder that is made if it does not exist."""
+    """Return a file for each motion, named after it, in a folder; make the folder if it does not exist."""
     is_new = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -206,7 +206,7 @@ def _make_files(folder: Path, motions: Sequence[Motion], read_from: Sequence[Pat
 def _select_drawn(frames: range, every: int | None, postures: int | None) -> Sequence[int]:
     """Select every `every`th frame, or as many as `postures`, evenly spread from the first to the last."""
     if every and postures:
-        raise MotionMindError("--every and --postures both say which frames to draw; give one of them")
+        raise MotionMindError("--every and --postures both choose the frames to draw; give one of them")
     from motionmind.render.sheet import evenly
 
     return evenly(frames, postures) if postures else frames[:: every or 1]

@@ -1,4 +1,4 @@
-"""Read the postures that commands name, and the movement that leads up to them or follows them."""
+"""Read the ends of a tween: the postures that the command names, and the movement around them."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ def read_end(
 
     Args:
         named: the posture.
-        given: the frames before or after it, if they are named.
-        side: the side of the posture on which movement is taken: before A, after B.
-        home: the folder of the user's corpora; None for the usual one.
-        read: reads a file of movement.
+        given: the frames before or after it, if the command names them.
+        side: the side of the posture: before A, after B.
+        home: the folder of the user's corpora; None for the default folder.
+        read: reads a motion file.
 
     Raises:
-        MotionMindError: there is no such posture; or it is to be moving and there is no movement on that side.
+        MotionMindError: there is no such posture, or no movement on the side that a ~ asks for.
     """
     if given and named.is_moving:
         raise MotionMindError(f"{named.word}: ~ takes the movement around the frame, and so does --{side}; give one")

@@ -1,6 +1,6 @@
-"""The options of commands that search for movement: one for each field of `TweenRequest`, with its default.
+"""The options of commands that search for movement: one for each option of a tween, with its default.
 
-`tween` fills the others itself: `unlike` by --alternatives, `what_if` by --what-if.
+`tween` sets the others itself: `unlike` by --alternatives, `what_if` by --what-if.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 @dataclass(frozen=True)
 class SearchOption:
-    """An option for one field of `TweenRequest`.
+    """An option for one field of `TweenRequest` or `SearchOptions`.
 
     Attributes:
         field: the field's name.
@@ -40,10 +40,10 @@ class SearchOption:
         section: the heading that --help lists it under.
         help: its help text.
         type: the type of its value; bool for a switch.
-        metavar: the word that stands for its value; None to show its type.
-        advanced: whether --help-all alone lists it.
+        metavar: the placeholder of its value in --help; None to show its type.
+        advanced: whether only --help-all lists it.
         multiple: whether it may be repeated.
-        complete: what shells complete its value to; None for what its type does.
+        complete: completes its value in shells; None to complete by its type.
     """
 
     field: str
@@ -57,12 +57,11 @@ class SearchOption:
     complete: Callable[[click.Context, click.Parameter, str], list[CompletionItem]] | None = None
 
 
-_THROUGH, _SEARCH, _WEIGH, _MOTION = Section.THROUGH, Section.SEARCH, Section.WEIGH, Section.MOTION
 SEARCH_OPTIONS = (
     SearchOption(
         "via",
         "--via",
-        _THROUGH,
+        Section.THROUGH,
         "Pass through this posture at move N, or at any move; a frame of a clip is CLIP@FRAME@N, or CLIP@FRAME@. "
         "Repeat for several, in order.",
         str,
@@ -73,7 +72,7 @@ SEARCH_OPTIONS = (
     SearchOption(
         "pin",
         "--pin",
-        _THROUGH,
+        Section.THROUGH,
         "Keep JOINT in A's state until the last move; =B: in B's state from the first move on. Repeatable.",
         str,
         "JOINT[=B]",
@@ -83,7 +82,7 @@ SEARCH_OPTIONS = (
     SearchOption(
         "hold",
         "--hold",
-        _THROUGH,
+        Section.THROUGH,
         "Keep these joints, separated by commas, in their state throughout; A and B must agree there. Repeatable.",
         str,
         "JOINTS",
@@ -93,7 +92,7 @@ SEARCH_OPTIONS = (
     SearchOption(
         "avoid",
         "--avoid",
-        _THROUGH,
+        Section.THROUGH,
         "Keep JOINT out of a state, given by number or name, between A and B. Repeatable.",
         str,
         "JOINT=STATE",
@@ -103,7 +102,7 @@ SEARCH_OPTIONS = (
     SearchOption(
         "moves",
         "--moves",
-        _SEARCH,
+        Section.SEARCH,
         "Make N moves, or as many as a range such as 6..10 allows  [default: the best number]",
         Moves(),
         "N",
@@ -111,7 +110,7 @@ SEARCH_OPTIONS = (
     SearchOption(
         "duration",
         "--duration",
-        _SEARCH,
+        Section.SEARCH,
         "Make the motion last this long; the number of moves follows, unless --moves is given.",
         POSITIVE,
         "SECONDS",
@@ -119,47 +118,61 @@ SEARCH_OPTIONS = (
     SearchOption(
         "pace",
         "--pace",
-        _SEARCH,
+        Section.SEARCH,
         "Move this many times as fast as the corpus would, unless --duration is given.",
         Number(*PACE_RANGE),
         "FACTOR",
     ),
-    SearchOption("strict", "--strict", _SEARCH, "Make only moves that the corpus attests: no bridges.", bool),
+    SearchOption("strict", "--strict", Section.SEARCH, "Make only moves that the corpus attests: no bridges.", bool),
     SearchOption(
         "whole_body",
         "--whole-body",
-        _SEARCH,
+        Section.SEARCH,
         "Use only whole postures in the order of the corpus, as the search of 1998 did.",
         bool,
     ),
-    SearchOption("sample", "--sample", _SEARCH, "Sample a path, with probability proportional to exp(-cost).", bool),
-    SearchOption("seed", "--seed", _SEARCH, "Seed all that is random, such as --sample.", NATURAL, "N"),
     SearchOption(
-        "max_moves", "--max-moves", _SEARCH, "Try at most N moves, unless --moves is given.", COUNT, "N", advanced=True
+        "sample", "--sample", Section.SEARCH, "Sample a path, with probability proportional to exp(-cost).", bool
+    ),
+    SearchOption("seed", "--seed", Section.SEARCH, "Seed all random numbers, such as those of --sample.", NATURAL, "N"),
+    SearchOption(
+        "max_moves",
+        "--max-moves",
+        Section.SEARCH,
+        "Try at most N moves, unless --moves is given.",
+        COUNT,
+        "N",
+        advanced=True,
     ),
     SearchOption(
         "differ",
         "--differ",
-        _SEARCH,
-        "Make an alternative differ from each earlier one in this share of its joints' states on the way.",
+        Section.SEARCH,
+        "Make an alternative differ from each earlier one in this share of its joints' states between A and B.",
         Number(min=0, max=1),
         "SHARE",
     ),
     SearchOption(
         "within",
         "--within",
-        _SEARCH,
-        "Take an alternative that is proven to cost at most this share more than the best: 0.05 is soon found.",
+        Section.SEARCH,
+        "Accept an alternative proven to cost at most this share more than the best; 0.05 is fast.",
         Number(min=0, max=1),
         "SHARE",
     ),
     SearchOption(
-        "node_budget", "--node-budget", _SEARCH, "Hold at most N search nodes at once.", COUNT, "N", advanced=True
+        "node_budget",
+        "--node-budget",
+        Section.SEARCH,
+        "Hold at most N search nodes at once.",
+        COUNT,
+        "N",
+        advanced=True,
     ),
     SearchOption(
         "memory",
         "--memory",
-        _SEARCH,
+        Section.SEARCH,
         "Hold as many search nodes as fit in SIZE, such as 200MB; replaces --node-budget.",
         Size(),
         "SIZE",
@@ -168,36 +181,36 @@ SEARCH_OPTIONS = (
     SearchOption(
         "novelty",
         "--novelty",
-        _WEIGH,
+        Section.WEIGH,
         "Flatten the cost of attested moves: 0 favours frequent ones, 1 treats all alike.",
         Number(min=0, max=1),
     ),
     SearchOption(
         "coordination",
         "--coordination",
-        _WEIGH,
+        Section.WEIGH,
         "Coordinate joints by their postures, by their progressions from posture to posture, or not at all.",
         click.Choice(get_args(Scheme)),
     ),
     SearchOption(
         "weights",
         "--weights",
-        _WEIGH,
+        Section.WEIGH,
         "Weigh transitions by their conditional probability, or by the formula as printed in the papers.",
         click.Choice(get_args(Weights)),
         advanced=True,
     ),
     SearchOption(
-        "lambda_", "--lambda", _WEIGH, "Multiply the cost of coordination by this factor.", NATS, advanced=True
+        "lambda_", "--lambda", Section.WEIGH, "Multiply the cost of coordination by this factor.", NATS, advanced=True
     ),
     SearchOption(
-        "beta", "--beta", _WEIGH, "Charge N nats for each move that a joint waits at its goal.", NATS, "N", True
+        "beta", "--beta", Section.WEIGH, "Charge N nats for each move that a joint waits at its goal.", NATS, "N", True
     ),
-    SearchOption("tau", "--tau", _WEIGH, "Charge N nats for each move.", NATS, "N", advanced=True),
+    SearchOption("tau", "--tau", Section.WEIGH, "Charge N nats for each move.", NATS, "N", advanced=True),
     SearchOption(
         "bridge_price",
         "--bridge-price",
-        _WEIGH,
+        Section.WEIGH,
         "Charge N nats for each degree of an unattested move.",
         NATS,
         "N",
@@ -206,8 +219,8 @@ SEARCH_OPTIONS = (
     SearchOption(
         "guide",
         "--guide",
-        _WEIGH,
-        "Charge N nats for a joint that is off what walks through the corpus expect by its tolerance for 0.2 s.",
+        Section.WEIGH,
+        "Charge N nats for a joint that is one tolerance away from the corpus walks for 0.2 s.",
         NATS,
         "N",
         advanced=True,
@@ -215,14 +228,14 @@ SEARCH_OPTIONS = (
     SearchOption(
         "liveliness",
         "--liveliness",
-        _MOTION,
-        "Move like the mean of what the corpus does on such a way (0), or like one passage of it (1).",
+        Section.MOTION,
+        "Move like the mean of the corpus over this displacement (0), or like one passage of it (1).",
         Number(min=0, max=1),
     ),
     SearchOption(
         "passage",
         "--passage",
-        _MOTION,
+        Section.MOTION,
         "Follow the corpus's passage that begins at CLIP@TIME, such as adagio@3.2s, in place of the mean.",
         str,
         "CLIP@TIME",
@@ -230,17 +243,17 @@ SEARCH_OPTIONS = (
     SearchOption(
         "without",
         "--without",
-        _MOTION,
-        "Leave out a part of what makes the movement a body's own. Repeatable.",
+        Section.MOTION,
+        "Leave out this part of the synthesis. Repeatable.",
         click.Choice(get_args(Correction)),
         multiple=True,
     ),
-    SearchOption("fps", "--fps", _MOTION, "Set the motion's frames per second.", RATE, advanced=True),
+    SearchOption("fps", "--fps", Section.MOTION, "Set the motion's frames per second.", RATE, advanced=True),
 )
 
 
 def searching(function: _Function) -> _Function:
-    """Add all options of the search to a command, with the defaults of `TweenRequest`."""
+    """Add all options of the search to a command, with their defaults."""
     defaults = {field.name: field.default for field in (*fields(TweenRequest), *fields(SearchOptions))}
     for row in reversed(SEARCH_OPTIONS):
         attributes = {"is_flag": True} if row.type is bool else {"type": row.type}
@@ -262,12 +275,12 @@ def searching(function: _Function) -> _Function:
 def request_options(
     options: Mapping[str, Any], home: Path | None, read: Callable[[Path], Motion] | None = None
 ) -> dict[str, Any]:
-    """Turn the values of the search options into fields of `TweenRequest`, reading the postures to pass through.
+    """Convert the values of the search options to options of `Engine.tween`; read the postures to pass through.
 
     Args:
-        options: a value for each field in `SEARCH_OPTIONS`, as the running command got them.
-        home: the folder of the user's corpora; None for the usual one.
-        read: reads a file of movement; None reads it as it is.
+        options: a value for each field in `SEARCH_OPTIONS`, as the command received them.
+        home: the folder of the user's corpora; None for the default folder.
+        read: reads a motion file; None reads it as it is.
 
     Raises:
         MotionMindError: a value cannot be used, or a posture cannot be read.
@@ -286,7 +299,7 @@ def request_options(
 
 
 def via_sources(options: Mapping[str, Any], home: Path | None) -> list[Source]:
-    """Return where the postures to pass through are."""
+    """Return the sources of the postures to pass through."""
     return [posture.source for posture, _ in parse_vias(options["via"], home)]
 
 

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from motionmind.tween.report import TweenReport
     from motionmind.tween.result import Tween
 
-MOST_ALTERNATIVES = 1000
 INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
 
 
@@ -45,7 +44,7 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
     section=Section.CORPORA,
     metavar="NAME",
     shell_complete=completion.corpora,
-    help="Take this corpus, by name or folder  [default: that of A and B, if they are named postures of one]",
+    help="Move in this corpus, by name or folder  [default: the corpus of A and B, if they are named postures of one]",
 )
 @outputs(f"Write {OUTPUT_KINDS}.", required=False)
 @option("--report", section=Section.OUTPUT, type=FILE, help="Write the report as JSON; - prints it.")
@@ -56,7 +55,7 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
 @option(
     "--alternatives",
     section=Section.SEARCH,
-    type=Whole(1, MOST_ALTERNATIVES),
+    type=Whole(1, 1000),
     metavar="K",
     help="Find K tweens of as many moves that differ; write out-1.json, out-2.json, ...",
 )
@@ -64,21 +63,21 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
     "--what-if",
     section=Section.SEARCH,
     is_flag=True,
-    help="Say what each --pin, --hold, --avoid and --via costs, and the length: search again without it.",
+    help="Report the cost of each --pin, --hold, --avoid and --via, and of the length: search again without it.",
 )
 @option(
     "--before",
     section=Section.MOTION,
     metavar="FRAMES",
     shell_complete=completion.movement,
-    help="Leave A with the velocity of these frames, of which the last is A: FILE@FIRST..LAST, or all of FILE.",
+    help="Leave A with the velocity of these frames; the last is A: FILE@FIRST..LAST, or all of FILE.",
 )
 @option(
     "--after",
     section=Section.MOTION,
     metavar="FRAMES",
     shell_complete=completion.movement,
-    help="Arrive at B with the velocity of these frames, of which the first is B, given as for --before.",
+    help="Arrive at B with the velocity of these frames; the first is B. Same form as --before.",
 )
 @searching
 @reading
@@ -105,17 +104,17 @@ def tween(
 ) -> None:
     """Find the best movement from A to B, and prove how good it is.
 
-    A and B are postures of corpora, as ballet/arabesque or ballet/adagio@23 (postures lists them), files of one
-    posture, or frames of clips, as clip.bvh@240, counted from 0, and clip.bvh@2.0s. The body may have any velocity
-    there, unless --before and --after give it, or a ~: at clip.bvh@240~ it has the clip's. What is said of input files
-    is said of all files of movement that are named.
+    A and B are postures of corpora, such as ballet/arabesque or ballet/adagio@23 (the postures command lists them),
+    files of one posture, or frames of clips, such as clip.bvh@240, counted from 0, or clip.bvh@2.0s. The velocity there
+    is free, unless --before and --after give it; clip.bvh@240~ has the clip's velocity. The input options apply to
+    every motion file on the command line.
 
-    Ctrl-C ends the search: the best movement found so far is written, with what is proven of it, and the exit code is
-    130. Exit code 3 means that nothing joins A and B under the given rules; --report then holds the diagnosis.
+    Ctrl-C ends the search: the command writes the best movement found so far, with the proof so far, and exits with
+    code 130. Exit code 3 means that no path joins A and B under these rules; --report then holds the diagnosis.
     """
     if problem and options["whole_body"]:
         raise click.UsageError("--problem writes a search of joints that move on their own; leave out --whole-body")
-    gc.disable()  # start-up makes a million objects and no garbage; to look for it takes a tenth of a second
+    gc.disable()  # start-up makes a million objects and no garbage; collecting takes a tenth of a second
     _load_numba()
     from motionmind.cli.postures import read_end
     from motionmind.corpus.store import locate
@@ -155,28 +154,28 @@ def tween(
 
 
 def _corpus_of(ends: Sequence[PostureName], home: Path | None) -> str:
-    """Return the corpus that names A, B or both; an error if there is none, or they are of two."""
+    """Return the corpus of A and B; fail if neither is a posture of one, or they are of two."""
     from motionmind.names.finding import find_motion
     from motionmind.names.postures import find_posture
 
     corpora = [end.source.place for end in ends if end.source.kind == "corpus"]
     if not corpora:
         for end in ends:
-            find_motion(end.source, home)  # or says that there is no such file
+            find_motion(end.source, home)  # raises if there is no such file
         context = click.get_current_context()
         raise click.UsageError("Missing option '--corpus': no corpus names A or B.", context)
     if len(set(corpora)) > 1:
         for end in ends:
-            find_posture(end, home)  # or says that there is none of that name
+            find_posture(end, home)  # raises if there is no such posture
         a, b = map(displayed, corpora)
-        raise MotionMindError(f"A is a posture of {a} and B of {b}: say in which to move, --corpus {a} or --corpus {b}")
+        raise MotionMindError(f"A is a posture of {a} and B of {b}: choose --corpus {a} or --corpus {b}")
     return corpora[0]
 
 
 def _find_tweens(
     engine: Engine, ends: tuple[Posture, Posture], request: dict[str, Any], count: int, interruption: Interruption
 ) -> list[Tween]:
-    """Find `count` tweens; fewer if Ctrl-C ends the search, or with a note if nothing else differs by enough."""
+    """Find `count` tweens; fewer after Ctrl-C, or, with a note, if no other path differs enough."""
     found: list[Tween] = []
     try:
         for tween in engine.alternatives(*ends, count, **request, watch=interruption.watch):
@@ -198,7 +197,7 @@ class _Files:
         motions: the files of the motion.
         report: the file of the report; - to print it.
         problem: the file of the problem.
-        alternatives: how many tweens are asked for; None for one, whose files are not numbered.
+        alternatives: the requested number of tweens; None for one, with unnumbered files.
     """
 
     motions: tuple[Path, ...]
@@ -227,7 +226,7 @@ class _Files:
         check_outputs(outputs, sources)
 
     def write(self, results: Sequence[Tween]) -> tuple[list[Path], list[TweenReport]]:
-        """Write all that was asked for, or nothing if one file fails; return the files, and the reports if asked."""
+        """Write all requested files, or none if one fails; return the files, and the reports if requested."""
         from motionmind.files import write_atomically
         from motionmind.tween.report import encode_report
         from motionmind.tween.result import report_of
@@ -249,7 +248,7 @@ class _Files:
         return files, reports
 
     def write_diagnosis(self, error: NoPathError) -> None:
-        """Write, or print, why there is no path in place of the first report, if there was to be one."""
+        """Write or print the diagnosis in place of the first report, if one was requested."""
         from motionmind.files import write_atomically
 
         text = json.dumps({"status": "no path", "message": str(error), "diagnosis": error.diagnosis})
@@ -260,7 +259,7 @@ class _Files:
             write_atomically(report, f"{text}\n".encode())
 
     def _files_of(self, number: int) -> tuple[list[Path], Path | None, Path | None]:
-        """Return the motion's files, the report's and the problem's of one tween, None for those not to be written."""
+        """Return one tween's files: the motion's, the report's and the problem's; None for no file."""
         report = None if self.is_report_printed else self.report
         return (
             [numbered(path, number, self.alternatives) for path in self.motions],
@@ -280,10 +279,9 @@ def _diagnosing(files: _Files) -> Iterator[None]:
 
 
 def _load_numba() -> None:
-    """Import numba without two modules that it looks for, at a quarter of a second, and that nothing here needs.
+    """Import numba without two optional modules, which take a quarter of a second and are not needed here.
 
-    They are SciPy's linear algebra, and YAML unless a file configures numba. They are hidden only while numba looks, so
-    that a later import finds them.
+    They are SciPy's linear algebra, and YAML unless a file configures numba. Later imports find them.
     """
     hidden = {"scipy.linalg"} | ({"yaml"} if not Path(".numba_config.yaml").exists() else set())
     hidden -= sys.modules.keys()

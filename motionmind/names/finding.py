@@ -24,10 +24,7 @@ from motionmind.notation import compose
 from motionmind.notation.read import read_scores
 from motionmind.notation.score import Score
 
-_MOST = 60  # names in a message, at most
-_POSTURES = 64  # in the cache, each with its whole score
-_SCORES = 16  # files or corpora with scores in the cache
-_SUFFIX = re.compile(r"\.[a-z]\w{1,4}", re.IGNORECASE | re.ASCII)  # suffix of a file name
+_FILE_SUFFIX = re.compile(r"\.[a-z]\w{1,4}", re.IGNORECASE | re.ASCII)
 
 
 class Collection(ABC):
@@ -216,13 +213,13 @@ def _read_once(places: tuple[Path, ...]) -> Sequence[Score]:
     _kept.pop(places, None)
     # A file that changed during the read may be incomplete: do not cache it.
     if _stamps(places) == before:
-        while len(_kept) >= _SCORES:
+        while len(_kept) >= 16:
             _kept.pop(next(iter(_kept)))
         _kept[places] = stamps, scores
     return scores
 
 
-@lru_cache(_POSTURES)
+@lru_cache(64)
 def _posture(score: Score, name: str) -> Posture:
     """Return a cached posture of a score; balancing it over its feet takes half as long as a tween."""
     return compose.posture(score, name)
@@ -291,7 +288,7 @@ def find_motion(
 def check_exists(source: Source, home: Path | None = None) -> None:
     """Raise MotionMindError, with a suggestion, if a source does not exist and is not spelled like a file."""
     word = source.word
-    if source.kind != "file" or is_file(word) or _SUFFIX.fullmatch(Path(word).suffix):
+    if source.kind != "file" or is_file(word) or _FILE_SUFFIX.fullmatch(Path(word).suffix):
         return  # the reader reports what is wrong with a file
     if os.path.isdir(word):  # noqa: PTH112 - a name may be too long for any file
         raise MotionMindError(f"{word}: is a folder, and no corpus; give a file, or a corpus's posture or clip")
@@ -304,7 +301,7 @@ def check_exists(source: Source, home: Path | None = None) -> None:
         raise MotionMindError(f"{word}: there is no such file, and no corpus {first!r}{suggestion(first, corpora)}")
     if "@" in word:
         raise MotionMindError(f"{word}: there is no such file; frames are spelled clip.bvh@240 or clip.bvh@2.0s")
-    hint = _elsewhere(word, home) or f"; corpora are {enumerated(corpora, _MOST)}, a posture of one is CORPUS/NAME"
+    hint = _elsewhere(word, home) or f"; corpora are {enumerated(corpora, 60)}, a posture of one is CORPUS/NAME"
     raise MotionMindError(f"{word}: there is no such file or corpus{hint}")
 
 

@@ -14,9 +14,6 @@ from motionmind.errors import MotionMindError, NoPathError
 from motionmind.search.problem import Model, Problem, Via, costs_to_go
 from motionmind.search.solve import feasible
 
-MOST_CONFLICTS, MOST_TRIED = 4, 50  # conflicts to report; sets of constraints to examine for them
-FARTHEST = 60  # moves by which to shift a via at most to see whether that helps
-
 
 class Constraint(NamedTuple):
     """A named constraint, such as "pin left_wrist=B", and whether it allows each state between A and B [G]."""
@@ -109,7 +106,7 @@ def find_conflicts(chains: Sequence[str], model: Model, problem: Problem, constr
 
 
 def _minimal_conflicts(every: list[int], possible: Callable[[Sequence[int]], bool]) -> list[list[int]]:
-    """Find up to MOST_CONFLICTS minimal sets of constraints that exclude every path.
+    """Find up to 4 minimal sets of constraints that exclude every path.
 
     To find the next set, drop one constraint of each set found so far.
 
@@ -129,7 +126,7 @@ def _minimal_conflicts(every: list[int], possible: Callable[[Sequence[int]], boo
                 if not possible(others := [k for k in guilty if k != i]):
                     guilty = others
             found.append(guilty)
-        if len(found) == MOST_CONFLICTS or len(tried) > MOST_TRIED:
+        if len(found) == 4 or len(tried) > 50:  # enough to read, and to examine
             break
         shorter = ([k for k in left if k != i] for i in guilty)
         tried += [one for one in shorter if one not in tried]
@@ -141,7 +138,7 @@ def _feasible_moves(problem: Problem) -> Iterator[tuple[int, int]]:
     for i, (states, wanted) in enumerate(problem.vias):
         if wanted is None:
             continue
-        near = range(max(1, wanted - FARTHEST), wanted + FARTHEST)
+        near = range(max(1, wanted - 60), wanted + 60)
         for move in sorted(near, key=lambda move: abs(move - wanted)):
             moved = (*problem.vias[:i], Via(states, move), *problem.vias[i + 1 :])
             if feasible(replace(problem, vias=moved)):

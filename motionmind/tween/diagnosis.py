@@ -21,8 +21,6 @@ from motionmind.geometry import rotations as rot
 from motionmind.grammar.grammar import Grammar
 from motionmind.search.problem import Model, Rules
 
-_COARSER = (1.25, 1.5, 2.0, 3.0)  # multiples of the tolerance to try
-
 
 @dataclass(frozen=True)
 class Remedy:
@@ -170,8 +168,8 @@ def _remedies(
     if mirrored is not None:
         yield "the corpus learned in a mirror too (--mirror)", _moves(graph + mirrored, a, b)
     if grammar.chains[chain] != FACING:
-        for times in _COARSER:
-            degrees = times * float(space.tolerances[chain])
+        for ratio in (1.25, 1.5, 2.0, 3.0):
+            degrees = ratio * float(space.tolerances[chain])
             moves = _coarser(corpus, space.of(chain)[[a, b]], chain, min(degrees, 180.0))
             if moves is not None:
                 yield f"a tolerance of {degrees:g} degrees for {grammar.chains[chain]}", moves

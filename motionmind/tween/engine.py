@@ -40,8 +40,7 @@ from motionmind.tween.result import Tween
 from motionmind.tween.what_if import Answer, WhatIf, find_what_if
 from motionmind.tween.whole_body import Bodies, diagnose_whole_body, find_bodies, solve_whole_body
 
-TRIED = 2  # passages to try for an alternative before falling back on a variant of the best movement
-SAME_ANGLE = 0.1  # degrees: slack for comparing frames with a tolerance that the synthesis has met
+FOLLOWED_SLACK_DEG = 0.1  # slack for comparing frames with a tolerance that the synthesis has met
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -199,7 +198,7 @@ class Engine(LearnedCorpus):
 
         while len(found) < count:
             tween = None
-            for passage in islice(passages, TRIED):
+            for passage in islice(passages, 2):  # then fall back on a variant of the best movement
                 with suppress(NoPathError):
                     tween = find(passage=passage)
                     break
@@ -321,7 +320,7 @@ class Engine(LearnedCorpus):
         # Use a spline: a move may fall between two frames, and the arc between them cuts the corner.
         reached = rotation_spline(motion.times, motion.rotations, motion.insertions[0].times)
         path_degrees = self.space.distance(self.corpus.to_chains(reached), path)
-        followed = path_degrees <= self.space.tolerances + SAME_ANGLE
+        followed = path_degrees <= self.space.tolerances + FOLLOWED_SLACK_DEG
         shown = _shown(sources, followed)
         found = tuple(sources_of(self.corpus, begins, np.minimum(begins + 1, last), [""] * len(begins)))
         return Tween(

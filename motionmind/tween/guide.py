@@ -33,9 +33,7 @@ from motionmind.walks.expectation import expect
 from motionmind.walks.passages import Place, dance
 from motionmind.walks.stops import Stop
 
-CREEPING = 0.25  # share of the time that corpus walks may creep
-SELDOM = 2.0  # standard deviations of log duration for a distance: dancers take longer one time in forty
-MOVE = 0.2  # seconds: a move of this length pays kappa for a departure of one tolerance
+PRICED_MOVE_S = 0.2  # a move of this length pays kappa for a departure of one tolerance
 
 
 def make_guide(
@@ -82,7 +80,7 @@ def make_guide(
             danced = dance(learned.corpus, learned.carriage, expected, met, 1.0 if place else liveliness, place)
             if danced is not None:
                 chains = danced.move(chains, at)
-        price = kappa * length / moves / MOVE
+        price = kappa * length / moves / PRICED_MOVE_S
         return price * departures(chains, space.centres, space.starts, np.radians(space.tolerances))[:, rows]
 
     return costs
@@ -96,8 +94,8 @@ def find_detour(
 ) -> Floats | None:
     """Return a detour that fills spare time, in moves of the usual length [T + 1, J, 4] (`motionmind.realise.detour`).
 
-    Return None if corpus walks between the postures do not creep in that time, or the duration is common for the
-    distance.
+    Return None if corpus walks between the postures creep for at most a quarter of that time, or the duration is
+    common for the distance.
 
     Args:
         learned: the corpus.
@@ -105,19 +103,19 @@ def find_detour(
         stops: the stops at A and B.
         duration: total seconds.
     """
-    seconds, way = usual(learned.grammar.transitions), way_between(*ends)
-    if way.parts.max() < ZERO_DISPLACEMENT_RAD:  # equal ends: hold still
+    seconds, displacement = usual(learned.grammar.transitions), way_between(*ends)
+    if displacement.parts.max() < ZERO_DISPLACEMENT_RAD:  # equal ends: hold still
         return None
     (own,) = (time.median for time in usual_times(learned, ends))
-    if np.log(duration / own) <= SELDOM * learned.pace.spread:
+    if np.log(duration / own) <= 2.0 * learned.pace.spread:  # dancers take longer one time in forty
         return None
     walked = max(1, round(duration / seconds))
     half_steps = np.linspace(0.0, duration, 2 * walked + 1)
     expected = expect(learned.corpus, learned.carriage, {0: stops[0], walked: stops[1]}, half_steps)
-    if creeps(learned, expected.poses, half_steps) <= CREEPING:
+    if creeps(learned, expected.poses, half_steps) <= 0.25:
         return None
-    ways = stops[0].chains, stops[1].chains
-    return detour(learned.corpus, learned.carriage, ways, walked, max(1, round(own / seconds)))
+    chains = stops[0].chains, stops[1].chains
+    return detour(learned.corpus, learned.carriage, chains, walked, max(1, round(own / seconds)))
 
 
 def creeps(learned: LearnedCorpus, poses: Floats, times: Floats) -> float:

@@ -13,26 +13,22 @@ from motionmind.errors import enumerated
 from motionmind.learned.plausibility import Sighting
 from motionmind.tween.result import Tween
 
-_FAR = 30.0  # degrees; nobody notices a smaller bridge
-_SIDES = ("left", "right")
-
 # Words for what a movement shows a viewer: its greatest value, the corpus's greatest and the part of the body; and the
 # digits and the kind that format a number.
-_SHOWN = {
+_MEASURE_WORDS = {
     "balance": ("it leans {0} m over what it stands on, in the corpus {1} at most", 2, "f"),
     "bounce": ("it bounces: its mass is accelerated by {0} m/s^2, in the corpus by {1} at most", 0, "f"),
     "flight": ("it floats: in the air it lacks {0} of gravity, in the corpus {1} at most", 0, "%"),
     "crossed_limbs": ("limbs are {0} m deep in each other, in the corpus {1} at most", 3, "f"),
     "sliding": ("feet slide: near the floor one moves in {0} of a second, in the corpus in {1} at most", 0, "%"),
-    "pace": ("{2} is {0} times as fast as is fast in the corpus, where nothing is more than {1} times", 1, "f"),
+    "pace": ("{2} moves at {0} times the corpus's fast pace; the corpus itself at {1} times at most", 1, "f"),
 }
 # Words for residuals of the solve, and the visible thresholds in centimetres and degrees.
-_GAVE = {
+_RESIDUAL_WORDS = {
     "Contacts": ("a part that stands is {0:.0f} cm off its place at {1:.1f} s", 4.0),
     "Floor": ("a part is {0:.0f} cm under the floor at {1:.1f} s", 2.0),
     "Limits": ("a joint is {0:.0f} degrees beyond its limit at {1:.1f} s", 8.0),
 }
-_MORE_DIGITS = 3  # most extra digits to tell two numbers apart
 
 
 def headline(tween: Tween) -> str:
@@ -55,13 +51,13 @@ def beyond(tween: Tween) -> list[str]:
     """List, one per line, the ways in which a tween exceeds everything in the corpus and makes a viewer wince."""
     said = [shown_beyond(name, one) for name, one in tween.shown.items() if one.is_beyond]
     said += [
-        _GAVE[one.term][0].format(one.most, one.at)
+        _RESIDUAL_WORDS[one.term][0].format(one.most, one.at)
         for one in tween.gave
-        if one.most > _GAVE.get(one.term, ("", math.inf))[1]
+        if one.most > _RESIDUAL_WORDS.get(one.term, ("", math.inf))[1]
     ]
     if tween.bridges:
         far = max(tween.bridges, key=lambda bridge: bridge.degrees)
-        if far.degrees >= _FAR:
+        if far.degrees >= 30.0:  # nobody notices a smaller bridge
             said.append(
                 f"{displayed(far.joint)} turns by {far.degrees:.0f} degrees as in no clip, in move {far.move + 1}"
             )
@@ -75,8 +71,8 @@ def shown_beyond(name: str, one: Sighting) -> str:
         name: name of the measure, one of `motionmind.learned.plausibility.MEASURES`.
         one: the movement's sighting of it, which exceeds the corpus's.
     """
-    words, digits, kind = _SHOWN[name]
-    for more in range(_MORE_DIGITS + 1):
+    words, digits, kind = _MEASURE_WORDS[name]
+    for more in range(4):  # extra digits to tell the two numbers apart
         value, most = (f"{number:.{digits + more}{kind}}" for number in (one.value, one.most))
         if value != most:
             break
@@ -121,7 +117,7 @@ def feet_staying(motion: Motion) -> list[str]:
     if len(staying) == len(feet):
         return ["feet stay in place"]
     side = staying[0].partition("_")[0]
-    if len(feet) == 2 and side in _SIDES:
+    if len(feet) == 2 and side in ("left", "right"):
         return [f"the {side} foot stays in place"]
     return [f"{len(staying)} of {len(feet)} feet stay in place"]
 

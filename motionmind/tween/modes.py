@@ -18,8 +18,7 @@ from motionmind.walks.modes import find_modes
 from motionmind.walks.passages import Place
 from motionmind.walks.stops import stop_at
 
-COMPARED = 11  # postures, evenly spaced in time, for comparing movements
-ROUNDED_S = 1e-3  # rounding of the time in a passage's name
+N_COMPARED = 11  # postures, evenly spaced in time, for comparing movements
 _PASSAGE = re.compile(r"(.+)@(\d+(?:\.\d*)?|\.\d+)s?", re.ASCII | re.DOTALL)
 
 
@@ -41,7 +40,7 @@ def find_place(corpus: Corpus, passage: str) -> Place:
             f"passage {displayed(passage)}: {displayed(corpus.name)} has no such clip{near}"
         ) from None
     begin, end = corpus.times[clip.start], corpus.times[clip.stop - 1]
-    if not begin - ROUNDED_S <= seconds <= end + ROUNDED_S:
+    if not begin - 1e-3 <= seconds <= end + 1e-3:  # names are rounded to milliseconds
         raise MotionMindError(
             f"passage {displayed(passage)}: the clip lasts from {begin:.2f} s to {end:.2f} s of its recording"
         )
@@ -71,7 +70,7 @@ class Modes:
 
     def know(self, motion: Motion) -> None:
         """Add a movement to the known ones."""
-        times = np.linspace(motion.times[0], motion.times[-1], COMPARED)
+        times = np.linspace(motion.times[0], motion.times[-1], N_COMPARED)
         chains = self._corpus.to_chains(rotation_spline(motion.times, motion.rotations, times))
         self._known.append(chains[:, : len(motion.skeleton)])
 

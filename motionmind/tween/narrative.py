@@ -218,7 +218,7 @@ def _likelihood(step: JointStep) -> str:
 def _place(step: JointStep) -> str:
     """Return the place where a move was recorded."""
     if step.source is None:
-        return "bridge" if step.how == "bridge" else "wait" if step.how == "wait" else "the motion passes it by"
+        return "bridge" if step.how == "bridge" else "wait" if step.how == "wait" else "not reached in the motion"
     mended = ", reconstructed" * step.source.reconstructed
     return f"{_clip(step.source)}, posture {step.source.posture} ({step.source.seconds:.2f} s{mended})"
 

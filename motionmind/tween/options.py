@@ -121,9 +121,9 @@ def _take_vias(name: str, value: Any) -> Any:
     return vias
 
 
-_NATS = _number(0.0, 1e6, " of nats")  # larger sums lose the other costs to rounding, and then overflow
-_SHARE = _number(0.0, 1.0)
-_FLAG = _checked(check_flag)
+_nats = _number(0.0, 1e6, " of nats")  # larger sums lose the other costs to rounding, and then overflow
+_share = _number(0.0, 1.0)
+_flag = _checked(check_flag)
 
 # The rule of each option, in the order of reports.
 OPTIONS: Mapping[str, _Rule] = {
@@ -136,24 +136,24 @@ OPTIONS: Mapping[str, _Rule] = {
     "avoid": _items("pairs of a joint's name and a state", tuple, list),
     "via": _take_vias,
     "unlike": _items("tweens"),
-    "differ": _SHARE,
-    "within": _SHARE,
-    "what_if": _FLAG,
-    "sample": _FLAG,
+    "differ": _share,
+    "within": _share,
+    "what_if": _flag,
+    "sample": _flag,
     "seed": _whole(0),
-    "strict": _FLAG,
-    "whole_body": _FLAG,
+    "strict": _flag,
+    "whole_body": _flag,
     "node_budget": _whole(1, MAX_NODES),
     "memory": _or_none(_whole(1, 1 << 50)),  # bytes
     "weights": _choice(get_args(Weights)),
-    "novelty": _SHARE,
+    "novelty": _share,
     "coordination": _choice(get_args(Scheme)),
-    "lambda_": _NATS,
-    "beta": _NATS,
-    "tau": _NATS,
-    "bridge_price": _NATS,
-    "guide": _NATS,
-    "liveliness": _SHARE,
+    "lambda_": _nats,
+    "beta": _nats,
+    "tau": _nats,
+    "bridge_price": _nats,
+    "guide": _nats,
+    "liveliness": _share,
     "passage": _or_none(_checked(check_text)),
     "without": _items("corrections' names", str, each=_choice(get_args(Correction))),
     "fps": _number(0.01, FASTEST, " of frames a second"),

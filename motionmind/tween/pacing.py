@@ -3,12 +3,12 @@
 A likeliest path hurries: every move costs something, so the energy alone prefers as few as the states' graphs allow.
 Dancers take their time (`motionmind.learned.pace`). So a segment of T moves, of u seconds each, pays a toll
 
-    w L (log(T u / d) / spread)^2 / 2 + HURRIES max(0, least / (T u) - 1)   nats
+    10 L (log(T u / d) / spread)^2 / 2 + 10000 max(0, least / (T u) - 1)   nats
 
 beside its haste (`motionmind.search.length`):
 
 - the first term is the duration's -log density in the corpus, given the displacement, up to a constant; d is the
-  median. Haste adds up over the L chains, so the duration counts w times for each chain too;
+  median. Haste adds up over the L chains, so the duration counts ten times for each chain too;
 - `least` is the shortest time in which every joint can turn, and the body turn and travel, at no more than the 99th
   percentile of the corpus's speeds. The peak speed of a smooth movement is 15/8 of its mean where jerk is least (Flash
   and Hogan, J. Neuroscience 5:1688, 1985). The toll amounts to a prohibition, but gives way where the number of moves
@@ -32,11 +32,7 @@ from motionmind.learned.nearest import postures_near
 from motionmind.learned.pace import N_NEIGHBORS, over_seconds, way_between, way_of
 from motionmind.realise.timeline import usual
 
-A_CHAIN = 10.0  # w: weight of the duration's density for each chain
-HURRIES = 1e4  # nats for half of the least time
-WORST = 3  # most body parts to name as faster than ever
-BEYOND = 1.2  # multiple of the corpus's greatest speed below which a body part is not reported
-PEAK = 15.0 / 8.0  # peak speed of a smooth movement over its mean
+PEAK_SPEED_RATIO = 15.0 / 8.0  # peak speed of a smooth movement over its mean
 
 
 @dataclass(frozen=True)
@@ -57,18 +53,18 @@ class UsualTime:
 def usual_times(learned: LearnedCorpus, stops: Sequence[Posture]) -> tuple[UsualTime, ...]:
     """Return the corpus's usual time from each posture to the next."""
     parts = _parts(learned)
-    lulls = lulls_of(learned, np.stack([posture.rotations for posture in stops]))
+    resting = resting_speeds(learned, np.stack([posture.rotations for posture in stops]))
     out = []
-    for (a, first), (b, last) in pairwise(zip(stops, lulls, strict=True)):
-        way = way_between(a, b)
-        needs = PEAK * way.parts / learned.pace.fastest
+    for (a, first), (b, last) in pairwise(zip(stops, resting, strict=True)):
+        displacement = way_between(a, b)
+        needs = PEAK_SPEED_RATIO * displacement.parts / learned.pace.fastest
         slowest = int(needs.argmax())
-        median = float(learned.pace.expected(way, (first, last)))
+        median = float(learned.pace.expected(displacement, (first, last)))
         out.append(UsualTime(median, float(needs[slowest]), parts[slowest]))
     return tuple(out)
 
 
-def lulls_of(learned: LearnedCorpus, rotations: Floats) -> Floats:
+def resting_speeds(learned: LearnedCorpus, rotations: Floats) -> Floats:
     """Return the resting speeds of postures [n, J, 4], as far as the corpus knows them [n] (`Pace.lulls_of`)."""
     corpus, joints = learned.corpus, len(learned.corpus.skeleton)
     shown, trees = learned.carriage.orientations, learned.carriage.trees
@@ -95,7 +91,7 @@ class Tempo(msgspec.Struct, frozen=True):
         slowest: the body part that determines `least`: a joint, "turning" or "travel".
         usual_moves: number of moves of the corpus's usual length in the given duration, if too few to reach B, so that
             the tween makes more; else None.
-        faster: the few body parts that most exceed their greatest speed in the corpus, worst first.
+        faster: up to three body parts that exceed their greatest speed in the corpus by a fifth, worst first.
         creeps: share of the time in which the body is slower than in all but the slowest hundredth of the corpus's
             seconds.
         detours: whether movement that the corpus shows after postures like A and before ones like B fills spare time;
@@ -126,11 +122,11 @@ def tempo_of(
     faster: list[FasterPart] = []
     creeps = 0.0
     if len(motion) > 1:
-        pace, way = learned.pace, way_of(motion)
-        speeds = way.parts / np.diff(motion.times)[:, None]
+        pace = learned.pace
+        speeds = way_of(motion).parts / np.diff(motion.times)[:, None]
         beyond = speeds.max(axis=0) / pace.greatest
         names = _parts(learned)
-        worst = [k for k in np.argsort(-beyond, kind="stable")[:WORST] if beyond[k] > BEYOND]
+        worst = [k for k in np.argsort(-beyond, kind="stable")[:3] if beyond[k] > 1.2]
         faster = [FasterPart(names[k], float(beyond[k])) for k in worst]
         seconds = over_seconds(speeds[:, : len(motion.skeleton)].mean(axis=1), max(motion.fps, 1.0))
         creeps = float(np.mean(seconds < pace.slowest[0]))
@@ -162,5 +158,5 @@ def tolls(learned: LearnedCorpus, times: Sequence[UsualTime], longest: int) -> F
     for row, time in zip(out, times, strict=True):
         off = np.log(seconds / time.median) / learned.pace.spread
         hurries = np.maximum(time.least / seconds - 1.0, 0.0)
-        row[:] = 0.5 * A_CHAIN * len(learned.space) * off**2 + HURRIES * hurries
+        row[:] = 0.5 * 10.0 * len(learned.space) * off**2 + 1e4 * hurries
     return out

@@ -154,8 +154,8 @@ def test_a_frame_of_a_clip_is_passed(run: Run) -> None:
         (["clip.bvh@-99~", "B.json"], r"clip\.bvh: frames are 0 to 36, there is no frame -99"),
         (["clip.bvh", "B.json"], r"clip\.bvh: 37 frames, .* expected; say which, from clip\.bvh@0 to clip\.bvh@36"),
         (["clip.bvh@9.9s", "B.json"], r"clip\.bvh: its frames are from 0\.00 to 1\.20 s, there is none at 9\.9 s"),
-        (["clip.bvh@0~", "B.json"], r"clip\.bvh@0~: nothing comes before frame 0 of clip\.bvh; leave out ~"),
-        (["B.json", "clip.bvh@-1~"], r"clip\.bvh@-1~: nothing comes after frame 36 of clip\.bvh; leave out ~"),
+        (["clip.bvh@0~", "B.json"], r"clip\.bvh@0~: nothing comes before this frame; leave out ~"),
+        (["B.json", "clip.bvh@-1~"], r"clip\.bvh@-1~: nothing comes after this frame; leave out ~"),
         (["B.json~", "clip.bvh@3"], r"B\.json~: B\.json holds one posture, no movement around it; leave out ~"),
         (["B.json@0~", "clip.bvh@3"], r"B\.json@0~: B\.json holds one posture, no movement around it; leave out ~"),
         (["clip.bvh~", "B.json"], r"clip\.bvh~: say which frame, from 0 to 36, as clip\.bvh@0~"),
@@ -226,10 +226,7 @@ def test_a_tween_of_named_postures_is_of_their_corpus(run: Run) -> None:
         assert ran.code in (0, 3), ran.err  # of karate, for nothing says otherwise
     mixed = run("tween", "karate/yoi", "ballet/fifth", "-o", "out.json")
     assert mixed.code == 2
-    assert (
-        "A is a posture of karate and B of ballet: say in which to move, --corpus karate or --corpus ballet"
-        in mixed.err
-    )
+    assert "A is a posture of karate and B of ballet: choose --corpus karate or --corpus ballet" in mixed.err
     assert "karate: no posture or clip 'arabesque'" in run("tween", "karate/arabesque", "ballet/fifth").err
     assert tween(run, "karate/yoi", "ballet/fifth").code == 0
     alone = run("tween", FIFTH, FIFTH)

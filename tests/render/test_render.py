@@ -789,7 +789,7 @@ def test_the_command_reads_every_format_and_one_posture(run: Run, jump: Path) ->
         (("-o", "sheet.png", "--from", 999), r"plies\.json: frames are 0 to \d+, there is no frame 999"),
         (("-o", "sheet.png", "--to", -999), r"plies\.json: frames are 0 to \d+, there is no frame -999"),
         (("-o", "sheet.png", "--from", 9, "--to", 8), r"plies\.json: the last frame, 8, lies before the first, 9"),
-        (("-o", "sheet.png", "--every", 2, "--postures", 3), r"--every and --postures both say which frames to draw"),
+        (("-o", "sheet.png", "--every", 2, "--postures", 3), r"--every and --postures both choose the frames to draw"),
         (("-o", "sheet.png", "--postures", 0), r"'--postures': 0 is not in the range"),
         (("-o", "sheet.png", "--side", "top"), r"'--side': 'top' is not one of 'right', 'left'"),
     ],

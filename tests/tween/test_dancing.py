@@ -24,7 +24,7 @@ from motionmind.geometry.splines import rotation_spline
 from motionmind.realise import realise
 from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.tween.engine import Engine
-from motionmind.tween.modes import COMPARED, Modes, find_place
+from motionmind.tween.modes import N_COMPARED, Modes, find_place
 from motionmind.tween.result import Tween
 from motionmind.walks.passages import Danced, Place
 
@@ -110,7 +110,7 @@ def test_modes_yield_names_of_places(ballet: Engine, ends: tuple[Posture, Postur
     for name in names:
         find_place(ballet.corpus, name)
     (known,) = modes._known
-    assert len(known) == COMPARED
+    assert len(known) == N_COMPARED
     assert rot.angle(known[[0, -1]], first.rotations[[0, -1]]).max() < 1e-7
 
 

@@ -16,7 +16,7 @@ from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
 from motionmind.realise.bending import FREE_PULL_RATIO
 from motionmind.realise.realise import Style, Wishes, realise
-from motionmind.tween.engine import SAME_ANGLE, Engine
+from motionmind.tween.engine import FOLLOWED_SLACK_DEG, Engine
 from motionmind.tween.result import Tween
 
 
@@ -68,7 +68,7 @@ def test_a_held_joint_stays_where_it_would_have_moved(name: str) -> None:
             except NoPathError:
                 continue
             assert np.all(tween.path[:, chain] == states[0, chain])
-            assert np.all(tween.path_degrees[1:-1, chain] <= tolerances[chain] + SAME_ANGLE), joint
+            assert np.all(tween.path_degrees[1:-1, chain] <= tolerances[chain] + FOLLOWED_SLACK_DEG), joint
             assert tween.followed[1:-1, chain].all()
             # Between moves, too, it stays near.
             chains = engine.corpus.to_chains(tween.motion.rotations)[:, chain]

@@ -15,7 +15,7 @@ from motionmind.realise.timeline import usual
 from motionmind.tween.ends import bring_ends
 from motionmind.tween.engine import Engine
 from motionmind.tween.formulate import Formulation, formulate
-from motionmind.tween.guide import MOVE, departures, make_guide
+from motionmind.tween.guide import PRICED_MOVE_S, departures, make_guide
 from motionmind.tween.request import TweenRequest
 from motionmind.walks.expectation import expect
 from motionmind.walks.stops import stop_at
@@ -96,7 +96,9 @@ def test_the_guide_is_about_what_walks_expect(engine: Engine) -> None:
         rows = slice(starts[chain], starts[chain + 1])
         angles = rot.angle(chains[:, chain, None], engine.space.centres[rows])
         width = np.maximum(angles.min(axis=1, keepdims=True), tolerance)
-        np.testing.assert_allclose(found[:, rows], 0.7 * seconds / MOVE * (angles / width) ** 2, rtol=1e-5, atol=1e-5)
+        np.testing.assert_allclose(
+            found[:, rows], 0.7 * seconds / PRICED_MOVE_S * (angles / width) ** 2, rtol=1e-5, atol=1e-5
+        )
 
 
 def test_the_sum_over_moves_does_not_depend_on_their_length(engine: Engine) -> None:

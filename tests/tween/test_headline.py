@@ -101,7 +101,7 @@ def test_a_viewer_winces_at_what_the_corpus_never_shows_and_at_far_bridges(
             Sighting(0.8, 0.4, ""),
             "feet slide: near the floor one moves in 80% of a second, in the",
         ),
-        ("pace", Sighting(3.0, 1.5, "", "left_hip"), "left_hip is 3.0 times as fast as is fast in the corpus"),
+        ("pace", Sighting(3.0, 1.5, "", "left_hip"), "left_hip moves at 3.0 times the corpus's fast pace"),
     ):
         (sentence,) = beyond(shown(tween, name, sighting))
         assert sentence.startswith(said)
