@@ -311,8 +311,8 @@ def _align_standing(sources: _Sources, body_axes: Floats, rig: Rig | None) -> Fl
             alignment[name] = _align_ankle(sources, name, above)
         elif name == "cervical" and rig is not None and rig.neck_leans:
             alignment[name] = rot.mul(rot.between(rot.mul_vec(body_axes, _UP), _neck_bone(sources)), above)
-    for name, twist in rig.twists.items() if rig is not None else ():
-        alignment[name] = rot.mul(alignment[name], rot.from_axis_angle([1.0, 0.0, 0.0], twist))
+    for name, angle_rad in rig.twists_rad.items() if rig is not None else ():
+        alignment[name] = rot.mul(alignment[name], rot.from_axis_angle([1.0, 0.0, 0.0], angle_rad))
     return np.array([alignment[name] for name in body.names])
 
 

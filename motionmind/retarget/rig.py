@@ -36,7 +36,7 @@ class Rig:
     marks: frozenset[str] = frozenset()
     frames: Mapping[str, Floats] = field(default_factory=dict)
     neck_leans: bool = False
-    twists: Mapping[str, float] = field(default_factory=dict)
+    twists_rad: Mapping[str, float] = field(default_factory=dict)
 
 
 def plain_names(names: Sequence[str]) -> list[str]:
