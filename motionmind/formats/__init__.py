@@ -31,7 +31,7 @@ from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.files import FilePath
 from motionmind.formats.added import MotionReader, MotionWriter, added_suffixes, read_added, write_added
 from motionmind.formats.lossy import WRITABLE, lossy_fields
-from motionmind.retarget.vertical import check_up, stood_up
+from motionmind.retarget.vertical import check_up, to_y_up
 
 __all__ = ["MotionReader", "MotionWriter", "lossy_fields"]
 
@@ -115,7 +115,7 @@ def read_motion(
         case _:
             motion = read_added(path, fps)
     _question_height(path, motion.skeleton)
-    return stood_up(motion) if up == "z" and Path(path).suffix.lower() != ".npz" else motion
+    return to_y_up(motion) if up == "z" and Path(path).suffix.lower() != ".npz" else motion
 
 
 def _question_height(path: FilePath, skeleton: Skeleton) -> None:

@@ -9,28 +9,23 @@ from functools import lru_cache
 from pathlib import Path
 
 from motionmind.arguments import check_path
+from motionmind.body.anatomy import SIDES
 from motionmind.body.human import BODIES, human23
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, SkeletonError, enumerated
 from motionmind.files import parse_toml, read_bytes
-from motionmind.retarget.limb_names import find_unclear, map_by_limbs
+from motionmind.retarget.limb_names import ESSENTIAL_LIMB_JOINTS, find_unclear, map_by_limbs
 from motionmind.retarget.rig import Rig, plain_names, spine_shares, without_endings
 from motionmind.retarget.rigs import RIGS
 
 # A skeleton must have one joint of each tuple; any other joint of human23 moves with its parent.
 _ESSENTIAL = (
     ("pelvis",),
-    *(
-        (f"{side}_{joint}",)
-        for side in ("left", "right")
-        for joint in ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
-    ),
+    *((f"{side}_{joint}",) for side in SIDES for joint in ESSENTIAL_LIMB_JOINTS),
     ("lumbar", "thorax"),
     ("cervical", "atlantal"),
 )
-BY_LIMBS = Rig("names of limbs", {}, ())  # of `limb_names`
-_FEW = 2  # limbs that names do not tell, where the others' are names of limbs
-_TREES = 64  # that are known again
+_LIMB_NAMES = Rig("names of limbs", {}, ())  # any rig that `limb_names` recognises
 
 
 def joint_mapping(skeleton: Skeleton, joints: Mapping[str, str] | None = None) -> dict[str, str] | None:
@@ -43,7 +38,7 @@ def joint_mapping(skeleton: Skeleton, joints: Mapping[str, str] | None = None) -
     Args:
         skeleton: a file's own skeleton.
         joints: the user's mapping, as `read_joint_mapping` returns it. Names of the file's joints may lack their
-            namespace and differ in case. None recognises the rig by its names: one of `RIGS`, or human44.
+            namespace and differ in case. None recognises the rig by its names: one of `RIGS`, or names of limbs.
 
     Returns:
         The mapping in the skeleton's order; None if `joints` is None and no rig has these names.
@@ -100,7 +95,7 @@ def read_joint_mapping(path: str | Path) -> dict[str, str]:
     for source, target in table.items():
         if not isinstance(target, str):
             raise FormatError(
-                f"{source!r} must be given the name of a joint of human23, as text (a name with a dot needs quotes)",
+                f"{source!r} must map to the name of a joint of human23, as text (a name with a dot needs quotes)",
                 path=path,
             )
         if target not in human23().names:
@@ -112,41 +107,41 @@ def known_rig(skeleton: Skeleton) -> tuple[Rig, dict[str, str]] | None:
     """Recognise a rig by its joints' names.
 
     Returns:
-        The first of `RIGS` of which the skeleton has all essential joints, and its mapping {file's joint: human23's
-        joint} in the skeleton's order; None if there is none.
+        The first of `RIGS` whose essential joints the skeleton has, and its mapping {file's joint: human23's joint} in
+        the skeleton's order; None if there is none.
     """
     known = _known_tree(skeleton.names, skeleton.parents)
     return known and (known[0], dict(known[1]))
 
 
-@lru_cache(_TREES)
+@lru_cache(64)  # the files of a collection share a few trees
 def _known_tree(names: tuple[str, ...], parents: tuple[int, ...]) -> tuple[Rig, dict[str, str]] | None:
-    """Recognise a rig as `known_rig`, of joints with these parents; all files of a collection have the same."""
-    for some in (names, without_endings(names)):
-        plain = plain_names(some) if some else []
-        for rig in (one for one in RIGS if some is names or (some and one.name not in BODIES)):
+    """Recognise a rig as `known_rig`, by its joints' names and parents."""
+    for variant in (names, without_endings(names)):
+        plain = plain_names(variant) if variant else []
+        for rig in (one for one in RIGS if variant is names or (variant and one.name not in BODIES)):
             mapping = _map_by_names(rig, plain, parents)
             if rig.marks <= set(plain) and not _missing(mapping.values()):
                 return rig, {names[i]: mapping[i] for i in sorted(mapping)}
     limbs = map_by_limbs(names, parents)
-    return (BY_LIMBS, {names[i]: limbs[i] for i in sorted(limbs)}) if limbs else None
+    return (_LIMB_NAMES, {names[i]: limbs[i] for i in sorted(limbs)}) if limbs else None
 
 
 def _map_by_names(rig: Rig, plain: Sequence[str], parents: Sequence[int]) -> dict[int, str]:
-    """Map joints, of these plain names and parents, as a rig's: {joint's index: human23's joint}."""
+    """Map joints with these plain names and parents by a rig's table: {joint's index: human23's joint}."""
     table = dict(rig.joints) | spine_shares([name for name in rig.spine if name in plain])
     order = list(table)
     found = sorted((order.index(name), i) for i, name in enumerate(plain) if name in table)
     mapping: dict[int, str] = {}
-    for _, i in found:  # in the table's order: of two joints not in a row the first counts
+    for _, i in found:  # in the table's order: of two joints in different branches the first counts
         target = table[plain[i]]
-        if all(_descends(parents, i, other) for other, taken in mapping.items() if taken == target):
+        if all(on_one_chain(parents, i, other) for other, taken in mapping.items() if taken == target):
             mapping[i] = target
     return mapping
 
 
 def describe_unknown_rig(skeleton: Skeleton) -> str:
-    """Say why joints do not map to human23: what they lack of the rig that has most of their names."""
+    """Say why joints do not map to human23: which joints of the most similar rig they lack."""
     plain = plain_names(skeleton.names)
     lacking = []
     for rig in RIGS:
@@ -154,25 +149,26 @@ def describe_unknown_rig(skeleton: Skeleton) -> str:
         lacking.append((missing + [f"a joint called {mark}" for mark in sorted(rig.marks - set(plain))], rig.name))
     missing, name = min(lacking, key=lambda one: len(one[0]))
     unclear = find_unclear(skeleton.names, skeleton.parents)
-    if len(unclear) < len(missing) and len(unclear) <= _FEW:
-        fault = f"names of limbs do not tell {enumerated([f'the {part}' for part in unclear])}"
-        return f"the joints of {skeleton.name} do not map to human23: {fault}"
-    if len(missing) > len(_ESSENTIAL) // 2:
-        return f"the joints of {skeleton.name} do not map to human23: they have the names of no known rig"
-    return f"the joints of {skeleton.name} do not map to human23: named as in {name}, they lack {enumerated(missing)}"
+    if len(unclear) < len(missing) and len(unclear) <= 2:
+        fault = f"the joints' names do not show {enumerated([f'the {part}' for part in unclear])}"
+    elif len(missing) > len(_ESSENTIAL) // 2:
+        fault = "they have the names of no known rig"
+    else:
+        fault = f"named as in {name}, they lack {enumerated(missing)}"
+    return f"the joints of {skeleton.name} do not map to human23: {fault}"
 
 
 def describe_limbs(skeleton: Skeleton) -> str:
-    """Say which joints are taken for pelvis, left leg and left arm, where names of limbs tell; "" for any other rig."""
+    """Describe which joints names of limbs make pelvis, left leg and left arm; return "" for any other rig."""
     known = known_rig(skeleton)
-    if known is None or known[0] is not BY_LIMBS:
+    if known is None or known[0] is not _LIMB_NAMES:
         return ""
-    of = {joint: name for name, joint in reversed(known[1].items())}
+    source = {joint: name for name, joint in reversed(known[1].items())}
     leg, arm = (
-        ", ".join(of[f"left_{joint}"] for joint in row)
-        for row in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
+        ", ".join(source[f"left_{joint}"] for joint in limb)
+        for limb in (ESSENTIAL_LIMB_JOINTS[:3], ESSENTIAL_LIMB_JOINTS[3:])
     )
-    return f"joints are known by names of limbs: {of['pelvis']} is the pelvis, {leg} a leg, {arm} an arm"
+    return f"joints recognised by names of limbs: {source['pelvis']} is the pelvis, {leg} a leg, {arm} an arm"
 
 
 def _resolve(skeleton: Skeleton, joints: Mapping[str, str]) -> dict[str, str]:
@@ -187,11 +183,11 @@ def _resolve(skeleton: Skeleton, joints: Mapping[str, str]) -> dict[str, str]:
         if len(matches) != 1:
             raise SkeletonError(f"mapping to {target}: {_describe_unknown(source, skeleton.names, skeleton.name)}")
         if mapping.get(matches[0], target) != target:
-            raise SkeletonError(f"mapping of {source!r}: it is given both {mapping[matches[0]]} and {target}")
+            raise SkeletonError(f"mapping of {source!r}: both {mapping[matches[0]]} and {target}; give one")
         mapping[matches[0]] = target
     for i, target in mapping.items():
         for other, taken in mapping.items():
-            if taken == target and not in_a_row(skeleton, i, other):
+            if taken == target and not on_one_chain(skeleton.parents, i, other):
                 names = f"{skeleton.names[i]!r} and {skeleton.names[other]!r}"
                 raise SkeletonError(f"{names} both map to {target}, but neither descends from the other")
     missing = _missing(mapping.values())
@@ -206,12 +202,8 @@ def _missing(targets: Iterable[str]) -> list[str]:
     return [" or ".join(choice) for choice in _ESSENTIAL if not present & set(choice)]
 
 
-def in_a_row(skeleton: Skeleton, a: int, b: int) -> bool:
+def on_one_chain(parents: Sequence[int], a: int, b: int) -> bool:
     """Return whether one of the joints `a` and `b` (indices) is the other or descends from it."""
-    return _descends(skeleton.parents, a, b)
-
-
-def _descends(parents: Sequence[int], a: int, b: int) -> bool:
     low, high = max(a, b), min(a, b)
     while low > high:
         low = parents[low]

@@ -1,10 +1,10 @@
 """Retargets movement onto human23.
 
 Each joint of human23 takes the global rotation of the file's joint that maps to it, times a constant *alignment*: the
-orientation of human23's axes in the frame of the file's joint. The same movement so has the same rotations, whatever
-body and axes it was recorded on. Proportions stay the performer's.
+orientation of human23's axes in the frame of the file's joint. So the same movement has the same rotations, on whatever
+body and axes it was recorded. The performer's proportions stay.
 
-The fit of the two bodies is `motionmind.retarget.fitting`.
+`motionmind.retarget.fitting` fits the two bodies.
 """
 
 from __future__ import annotations
@@ -31,41 +31,42 @@ from motionmind.retarget.joint_mapping import (
     read_joint_mapping,
 )
 from motionmind.retarget.rig import plain_names
-from motionmind.retarget.vertical import Z_UP, Vertical, check_up, find_vertical
+from motionmind.retarget.vertical import Z_UP_TO_Y_UP, Vertical, check_up, find_vertical
 
 __all__ = ["filled_joints", "joint_mapping", "read_joint_mapping", "to_human23"]
 
 Movement = TypeVar("Movement", Motion, Posture)
 
-_STANDS = 0.7  # cosine between the trunk and the vertical of a body that stands
-_POINTS = 0.01  # metres of a bone below which it points nowhere
+_MIN_COS_LEAN = 0.7  # between the trunk and the axis along which a body stands
 
 
 def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, up: str | None = None) -> Movement:
     """Retarget movement to human23's joints, with the performer's proportions.
 
     Forward kinematics reproduces the file's joint positions exactly, except where several joints of the file became
-    one: there a bent chain has become a straight bone. Of a spine the lumbar joint's bone points to where the arms are.
-    (CMU, where three joints of the spine become two and the lower neck is left out: arms are 1 mm off on average in 20
-    clips of a dancer, 10 mm at most, and the head 23 mm; 0.4 mm, 4 mm and 15 mm in 9 clips of karate; the legs are
-    exact.) Joints that the file lacks, such as toes or fingers, move with their parents, at human23's place
-    scaled by the length of the legs. Movement on human23 is returned unchanged; movement taken from there to human44,
-    whose new joints stay at rest, comes back unchanged.
+    one: a straight bone then replaces a bent chain. In a spine the lumbar joint's bone points to the arms. (CMU, whose
+    three joints of the spine become two, without the lower neck: arms are 1 mm off on average in 20 clips of a dancer,
+    10 mm at most, and the head 23 mm; 0.4 mm, 4 mm and 15 mm in 9 clips of karate; the legs are exact.) Joints that the
+    file lacks, such as toes or fingers, move with their parents, at human23's place scaled by the length of the legs.
+    Movement on human23 is returned unchanged; movement taken from there to human44, whose new joints stay at rest,
+    comes back unchanged.
 
     Args:
         movement: a motion or posture on the file's own skeleton.
         joints: {file's joint: human23's joint} as for `joint_mapping`; None recognises the rig by its names.
-        up: "y" or "z", the vertical in the file. None takes the one that the zero pose stands along, unless the
-            movement stands along the other, by where its feet stay (`motionmind.retarget.vertical`).
+        up: "y" or "z", the vertical in the file. None takes the axis that the zero pose stands along, unless the
+            movement and its floor show the other one (`motionmind.retarget.vertical`).
 
     Returns:
         The movement on human23, y up, in metres.
 
     Raises:
         SkeletonError: the skeleton does not map to human23, or its zero pose does not show how the body stands.
-        MotionMindWarning: the zero pose does not stand, and the movement does not show how limbs are turned; or nothing
-            shows whether people stand or lie.
         MotionMindError: `up` is neither "y" nor "z".
+
+    Warns:
+        MotionMindWarning: the zero pose does not stand, and the movement does not show the twist of limbs; or it is
+            unclear whether people stand or lie.
 
     >>> import numpy as np
     >>> from motionmind import Posture, human44, to_human23
@@ -80,7 +81,7 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
         joints is None
         and up != "z"
         and human23().difference(movement.skeleton) is None
-        and not _lies(movement.skeleton)
+        and not _rests_along_z(movement.skeleton)
     ):
         return movement
     fit = fit_human23(movement, joints)
@@ -90,13 +91,13 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
     if isinstance(movement, Motion) and movement.insertions:
         mapping = joint_mapping(movement.skeleton, joints) or {}
         renamed["insertions"] = tuple(one.renamed(mapping) for one in movement.insertions)
-    turned = movement.skeleton.global_rotations(movement.rotations)[..., fit.turns, :]
+    turned = movement.skeleton.global_rotations(movement.rotations)[..., fit.rotation_sources, :]
     vertical = Vertical(up) if up else _vertical(fit, movement, turned[..., 0, :])
     if vertical.doubt:
         name = (movement.name if isinstance(movement, Motion) else "") or movement.skeleton.name
         message = f"{name}: taken with {vertical.axis} up, which is doubtful: {vertical.doubt}"
         warnings.warn(message, MotionMindWarning, stacklevel=2)
-    upright = Z_UP if vertical.axis == "z" else rot.IDENTITY
+    upright = Z_UP_TO_Y_UP if vertical.axis == "z" else rot.IDENTITY
     turned = rot.mul(rot.mul(upright, turned), fit.alignment)
     root = movement.root
     if fit.pelvis > 0 or fit.chest:
@@ -114,41 +115,37 @@ def from_human23(motion: Motion, like: Posture, joints: Mapping[str, str] | None
 
     Args:
         motion: the motion, on human23.
-        like: a posture on the rig to move. Joints of its that have no counterpart stay as they are in it, and of
-            several in a row for one joint all turn as one.
+        like: a posture on the rig to move. Joints without a counterpart keep its rotations; several joints in a row
+            that map to one joint turn as one.
         joints: {rig's joint: human23's joint} as for `joint_mapping`; None recognises the rig by its names.
 
     Returns:
-        The motion on the rig's skeleton, its joints turned, and its pelvis placed, as human23's.
+        The motion on the rig's skeleton, with human23's rotations and pelvis.
 
     Raises:
         SkeletonError: the rig does not map to human23, or its zero pose does not show how the body stands.
     """
     rig = like.skeleton
     fit = fit_human23(like, joints)
-    source = dict(zip(reversed(fit.turns.tolist()), reversed(range(len(fit.turns))), strict=True))  # parents win
+    sources = fit.rotation_sources
+    target = {joint: i for i, joint in reversed([*enumerate(sources.tolist())])}  # parents win
     turned = rot.mul_inv(motion.skeleton.global_rotations(motion.rotations), fit.alignment)
     at_first = rig.global_rotations(like.rotations)
-    placed = np.empty((len(motion), len(rig), 4))
-    rows = _rows(rig, joint_mapping(rig, joints) or {}, fit)
+    orientations = np.empty((len(motion), len(rig), 4))
+    body, mapping = human23(), joint_mapping(rig, joints) or {}
+    last_of_row = {rig.index(name): int(sources[body.index(joint)]) for name, joint in mapping.items()}
     for joint, parent in enumerate(rig.parents):
-        if joint in source:
-            placed[:, joint] = turned[:, source[joint]]
-        elif joint in rows:
-            within = rot.inv_mul(at_first[rows[joint]], at_first[joint])
-            placed[:, joint] = rot.mul(turned[:, source[rows[joint]]], within)
+        if joint in target:
+            orientations[:, joint] = turned[:, target[joint]]
+        elif joint in last_of_row:
+            within = rot.inv_mul(at_first[last_of_row[joint]], at_first[joint])
+            orientations[:, joint] = rot.mul(turned[:, target[last_of_row[joint]]], within)
         else:
             own = like.rotations[joint]
-            placed[:, joint] = own if parent < 0 else rot.mul(placed[:, parent], own)
-    rotations = rot.normalise(rig.local_rotations(placed))
+            orientations[:, joint] = own if parent < 0 else rot.mul(orientations[:, parent], own)
+    rotations = rot.normalise(rig.local_rotations(orientations))
     root = motion.root - rig.positions(rotations, np.zeros(3))[:, fit.pelvis]
     return replace(motion, skeleton=rig, rotations=rotations, root=root, insertions=())
-
-
-def _rows(rig: Skeleton, mapping: Mapping[str, str], fit: Fit) -> dict[int, int]:
-    """Return for each joint of a rig that is mapped the one that turns its row, the last: {index: index}."""
-    body = human23()
-    return {rig.index(name): int(fit.turns[body.index(joint)]) for name, joint in mapping.items()}
 
 
 def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None, *, up: str | None = None) -> Movement:
@@ -157,11 +154,11 @@ def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None, *,
     Args:
         movement: a motion or posture.
         joints: {file's joint: human23's joint} as for `joint_mapping`; None recognises the rig by its names.
-        up: as `to_human23`; of a rig that stays on its own skeleton, nothing is turned.
+        up: as `to_human23`; ignored if the movement stays on a skeleton other than human44.
 
     Returns:
-        The movement on human23 or on its own skeleton. On human44, which has joints that human23 lacks, it stays
-        unless `joints` is given; with z up, it is turned.
+        The movement on human23 or on its own skeleton. Movement on human44, which has joints that human23 lacks, stays
+        there unless `joints` is given, turned to y up if it rests along z.
 
     Raises:
         SkeletonError: as `to_human23`.
@@ -176,20 +173,23 @@ def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None, *,
     check_type("movement", movement, Motion, Posture)
     check_mapping("joints", joints, or_none=True)
     if joints is None and is_human44(movement.skeleton):
-        return _turned_up(movement, up) if _lies(movement.skeleton) else movement
+        return _rest_along_y(movement, up) if _rests_along_z(movement.skeleton) else movement
     known = joint_mapping(movement.skeleton) is not None
     return to_human23(movement, joints, up=up) if known or joints is not None else movement
 
 
 def _aim_lumbar(fit: Fit, turned: Floats, places: Floats) -> Floats:
-    """Return orientations [..., 23, 4] with the lumbar joint turned so that arms, or the neck, come to their places.
+    """Turn the lumbar joint so that arms, or the neck, reach their places in the file.
 
-    The thorax keeps its orientation: the lumbar joint's bone alone, which stands for several, points elsewhere.
+    Only the lumbar joint's bone, which represents several, changes its direction; the thorax keeps its orientation.
 
     Args:
         fit: of human23 to the file's skeleton, with a chest.
         turned: orientations of human23's joints [..., 23, 4].
         places: of the file's joints [..., J, 3], metres.
+
+    Returns:
+        The orientations [..., 23, 4].
     """
     body = fit.skeleton
     ours = body.positions(body.local_rotations(turned), places[..., fit.pelvis, :])
@@ -198,48 +198,48 @@ def _aim_lumbar(fit: Fit, turned: Floats, places: Floats) -> Floats:
     bone = ours[..., thorax, :] - ours[..., lumbar, :]
     wanted = bone + (places[..., sources, :] - ours[..., joints, :]).mean(axis=-2)
     out = turned.copy()
-    if min(np.min(rot.norm(bone)), np.min(rot.norm(wanted))) > _POINTS:
+    if min(np.min(rot.norm(bone)), np.min(rot.norm(wanted))) > 0.01:  # metres; shorter bones have no direction
         out[..., lumbar, :] = rot.mul(rot.between(bone, wanted), turned[..., lumbar, :])
     return out
 
 
 def _describe_unclear(name: str, joints: Sequence[str]) -> str:
-    """Say that movement does not show how joints of human23 are turned about their bones."""
+    """Say that movement does not show the twist of joints of human23."""
     return (
-        f"{name}: with all rotations 0 it does not stand, and {enumerated(joints)} bend too little to show how they "
-        "are turned about their bones: they may be turned wrongly"
+        f"{name}: with all rotations 0 it does not stand, and {enumerated(joints)} bend too little to show their "
+        "twist, which may be wrong"
     )
 
 
 def _vertical(fit: Fit, movement: Motion | Posture, turned: Floats) -> Vertical:
-    """Find which axis is up in a file, given the orientations [..., 4] of its pelvis's source in the world."""
+    """Find which axis is up in a file, by the world's orientations [..., 4] of the joint at the pelvis."""
     body = movement.skeleton
     rotations, root = movement.rotations.reshape(-1, len(body), 4), movement.root.reshape(-1, 3)
-    joints = np.unique(fit.turns)
+    joints = np.unique(fit.rotation_sources)
 
     def points(some: slice) -> Floats:
         return body.positions_and_tips(rotations[some], root[some])[:, np.concatenate([joints, joints + len(body)])]
 
-    usual = "z" if fit.stands and fit.up[2] >= _STANDS else "y"
+    usual = "z" if fit.stands and fit.up[2] >= _MIN_COS_LEAN else "y"
     trunk = rot.mul_vec(turned, fit.up).reshape(-1, 3)
     return find_vertical(points, trunk, usual=usual, height=fit.skeleton.height)
 
 
-def _lies(skeleton: Skeleton) -> bool:
-    """Return whether the zero pose of human23's or human44's joints stands along z, as Blender writes it."""
+def _rests_along_z(skeleton: Skeleton) -> bool:
+    """Return whether the zero pose of human23's or human44's joints stands along z, as in Blender's files."""
     zero = skeleton.rest[: len(skeleton)]
     names = plain_names(skeleton.names)
     up = unit(zero[names.index("atlantal")] - zero[names.index("pelvis")])
-    return bool(up[2] >= _STANDS)
+    return bool(up[2] >= _MIN_COS_LEAN)
 
 
-def _turned_up(movement: Movement, up: str | None) -> Movement:
-    """Return movement whose zero pose stands along z with one that stands along y; `up` is its vertical, None for z."""
+def _rest_along_y(movement: Movement, up: str | None) -> Movement:
+    """Turn a zero pose that stands along z to stand along y; `up` is the movement's vertical, None for z."""
     body = movement.skeleton
-    skeleton = replace(body, offsets=rot.mul_vec(Z_UP, body.offsets), tips=rot.mul_vec(Z_UP, body.tips))
-    rotations = rot.mul_inv(rot.mul(Z_UP, movement.rotations), Z_UP)
-    root = rot.mul_vec(Z_UP, movement.root)
+    skeleton = replace(body, offsets=rot.mul_vec(Z_UP_TO_Y_UP, body.offsets), tips=rot.mul_vec(Z_UP_TO_Y_UP, body.tips))
+    rotations = rot.mul_inv(rot.mul(Z_UP_TO_Y_UP, movement.rotations), Z_UP_TO_Y_UP)
+    root = rot.mul_vec(Z_UP_TO_Y_UP, movement.root)
     if up == "y":
-        rotations[..., 0, :] = rot.inv_mul(Z_UP, rotations[..., 0, :])
+        rotations[..., 0, :] = rot.inv_mul(Z_UP_TO_Y_UP, rotations[..., 0, :])
         root = movement.root
     return replace(movement, skeleton=skeleton, rotations=rotations, root=root)

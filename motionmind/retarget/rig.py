@@ -1,4 +1,4 @@
-"""A rig: how a family of skeletons calls its joints, and what is left of their names without what varies."""
+"""Rigs: how a family of skeletons names its joints, and how to reduce names to their plain form."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 
 from motionmind._typing import Floats
 
-_MOST = 0.8  # share of a file's joints whose names end in numbers, if these tell its nodes apart
-
 
 @dataclass(frozen=True, eq=False)
 class Rig:
@@ -17,16 +15,16 @@ class Rig:
 
     Attributes:
         name: the rig's name.
-        joints: by plain name of a file's joint, the joint of human23 that it maps to; without the spine. Of names for
-            one joint that do not descend from each other, the first that a skeleton has counts.
-        spine: plain names of all joints from the pelvis upwards to the one that carries the arms. Those that a
-            skeleton has are divided between lumbar and thorax.
+        joints: {plain name of a file's joint: human23's joint}, without the spine. If several names for one joint
+            occur in different branches of a skeleton, the first counts.
+        spine: plain names of all joints from the pelvis up to the joint that carries the arms; divided between lumbar
+            and thorax, as far as a skeleton has them.
         marks: plain names that every skeleton of this rig has.
-        frames: for rigs whose zero pose does not stand, by joint of human23, the orientation of its axes in the file's
-            joint's own frame, quaternions [4]. Empty if the zero pose stands.
-        neck_leans: whether the slope of the neck in the zero pose is posture, not anatomy: a neck and head at rest are
-            then turned upright from it.
-        twists: by joint of human23, radians by which its axes are turned about +x in the file's, once the bones'
+        frames: for rigs whose zero pose does not stand: {joint of human23: orientation of its axes in the frame of the
+            file's joint, quaternion [4]}. Empty if the zero pose stands.
+        neck_leans: whether the slope of the neck in the zero pose is posture, not anatomy; neck and head at rest are
+            then turned upright.
+        twists_rad: {joint of human23: rotation of its axes about +x in the file's, radians}, applied once the bones'
             directions agree; a bone's direction does not determine its twist.
     """
 
@@ -40,7 +38,7 @@ class Rig:
 
 
 def plain_names(names: Sequence[str]) -> list[str]:
-    """Strip from names what varies from file to file: namespaces, a common prefix, case, punctuation."""
+    """Return names in plain form: without namespace, common prefix, case and punctuation, which vary among files."""
     bare = [re.split(r"[:|]", name)[-1] or name for name in names]
     # "Character1_Hips", "Character1_Spine": the common prefix, if it ends at a word's end.
     first = re.match(r".*[^A-Za-z0-9]", bare[0])
@@ -51,9 +49,9 @@ def plain_names(names: Sequence[str]) -> list[str]:
 
 
 def without_endings(names: Sequence[str]) -> list[str] | None:
-    """Return names without an ending that all have ("Hips_jnt"), or a number that most end in ("Hips_01, Head_05").
+    """Strip an ending that all names have ("Hips_jnt"), or the number that most end in ("Hips_01", "Head_05").
 
-    Exporters add these, so that names are unique in a scene. None if there is none, or names are then alike.
+    Exporters add these to make names unique in a scene. None if there is no ending, or stripping makes names equal.
 
     >>> without_endings(["Hips_01", "Spine_02", "Head_03"])
     ['Hips', 'Spine', 'Head']
@@ -63,7 +61,7 @@ def without_endings(names: Sequence[str]) -> list[str] | None:
         bare = [name.removesuffix(last[0]) for name in names]
     else:
         bare = [re.sub(r"[^A-Za-z0-9]\d+$", "", name) for name in names]
-        if sum(map(str.__ne__, bare, names)) <= _MOST * len(names):
+        if sum(map(str.__ne__, bare, names)) <= 0.8 * len(names):
             return None
     return bare if len({*bare}) == len(bare) else None
 
@@ -71,8 +69,8 @@ def without_endings(names: Sequence[str]) -> list[str] | None:
 def spine_shares(chain: Sequence[str]) -> dict[str, str]:
     """Divide a spine's joints, listed upwards, between human23's lumbar and thorax: {name: "lumbar" or "thorax"}.
 
-    The last joint, which carries the arms, is always the thorax's. Of an odd number the lumbar gets one more: in CMU's
-    spines of three the thorax is then as high as human23's (0.24 m and 0.23 m above the pelvis).
+    The last joint, which carries the arms, always belongs to the thorax. With an odd number the lumbar gets one more:
+    in CMU's spines of three the thorax is then as high as human23's (0.24 m and 0.23 m above the pelvis).
     """
     upper = max(1, len(chain) // 2)
     return {name: "lumbar" if i < len(chain) - upper else "thorax" for i, name in enumerate(chain)}

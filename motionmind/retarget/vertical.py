@@ -1,8 +1,8 @@
-"""Finds which axis of a file's world is up: its rig's zero pose and its people's trunks tell, and where they touch.
+"""Finds which axis of a file's world is up, by the rig's zero pose, people's trunks and the floor.
 
-A rig is made standing along y or along z, and people mostly stand along the same axis. Where they do not, either the
-file turns them (its world has z up, the rig's y), or they lie or crawl all the time. Then the floor tells: along the
-vertical the lowest point of a body stays where the floor is, wherever that is, and across it goes where the body goes.
+A rig is made standing along y or along z, and people mostly stand along the same axis. If they do not, either the file
+turns them (its world has z up, the rig's y), or they lie or crawl all the time. The floor then decides: along the
+vertical the lowest point of a body stays at the floor, at whatever height; along other axes it travels with the body.
 """
 
 from __future__ import annotations
@@ -19,18 +19,11 @@ from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 
-_FRAMES, _FEWEST = 500, 8  # frames that are looked at, at most; and at least, to see what is steady
-_ALONG = 0.7  # mean cosine between the trunk and the axis that a body stands along
-_STANDS = 0.5  # the same of the axis that a rig stands along, which needs less
-_RISES = (0.05, 0.6)  # quantiles of the lowest point's height between which a body is on the floor
-_STEADIER = 2.0  # times as steady as along another axis, the lowest point shows where the floor is
-_STILL = 0.002  # share of a body's height below which the lowest point does not move
-_AT_FLOOR = 0.15  # share of a body's height by which its lowest point may be off a floor at 0
-_NAMES = "xyz"
+# The lowest point of a body marks the floor if along another axis it moves more by this factor.
+_FLOOR_STEADINESS_RATIO = 2.0
 
-
-# From z up to y up: z becomes y, and a body that faced -y faces +z.
-Z_UP = rot.from_axis_angle([1.0, 0.0, 0.0], -np.pi / 2)
+# Rotation [4] from a world with z up to one with y up: a body that faced -y faces +z.
+Z_UP_TO_Y_UP = rot.from_axis_angle([1.0, 0.0, 0.0], -np.pi / 2)
 
 
 class Vertical(NamedTuple):
@@ -38,7 +31,7 @@ class Vertical(NamedTuple):
 
     Attributes:
         axis: "y" or "z".
-        doubt: says what speaks for another axis; "" if nothing does.
+        doubt: the reason to doubt it, in words; "" for none.
     """
 
     axis: str
@@ -46,24 +39,29 @@ class Vertical(NamedTuple):
 
 
 def check_up(up: str | None) -> None:
-    """Raise MotionMindError if `up` is none of "y", "z" and None."""
+    """Raise MotionMindError unless `up` is "y", "z" or None."""
     check_text("up", up, or_none=True)
     if up not in (None, "y", "z"):
         raise MotionMindError(f'up must be "y" or "z", not {up!r}')
 
 
-def stood_up(motion: Motion) -> Motion:
-    """Return movement in a world with z up in one with y up; its zero pose stays.
+def to_y_up(motion: Motion) -> Motion:
+    """Turn the world of a motion from z up to y up; the zero pose stays.
 
     >>> import numpy as np
     >>> from motionmind import Motion, human23
     >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (1, 23, 1))
-    >>> stood_up(Motion(human23(), at_rest, np.array([[0.0, 0.0, 0.9]]), np.zeros(1))).root.round(3).tolist()
+    >>> to_y_up(Motion(human23(), at_rest, np.array([[0.0, 0.0, 0.9]]), np.zeros(1))).root.round(3).tolist()
     [[0.0, 0.9, 0.0]]
     """
     rotations = motion.rotations.copy()
-    rotations[:, 0] = rot.mul(Z_UP, rotations[:, 0])
-    return replace(motion, rotations=rotations, root=rot.mul_vec(Z_UP, motion.root))
+    rotations[:, 0] = rot.mul(Z_UP_TO_Y_UP, rotations[:, 0])
+    return replace(motion, rotations=rotations, root=rot.mul_vec(Z_UP_TO_Y_UP, motion.root))
+
+
+def thin_frames(count: int) -> slice:
+    """Return a slice of at most 500 of `count` frames, evenly spaced; a posture is known by no more."""
+    return slice(None, None, -(-count // 500))
 
 
 def find_vertical(
@@ -72,11 +70,11 @@ def find_vertical(
     """Find which axis of a file's world is up, y or z.
 
     Args:
-        points: returns the places [T', P, 3] of a body's joints and tips in some of the frames, metres.
+        points: function of some of the frames; returns the positions [T', P, 3] of joints and tips, metres.
         trunk: directions of the trunk, up along the spine [T, 3].
         usual: "y" or "z", the axis that the rig stands along, or that is up in all files of a format.
         height: of the body, metres.
-        is_stated: whether the format says what is usual: then a floor at 0 tells nothing.
+        is_stated: whether the format defines the usual axis; a floor at 0 then proves nothing.
 
     >>> import numpy as np
     >>> ahead = np.tile([0.0, 0.0, 1.0], (60, 1))
@@ -84,35 +82,43 @@ def find_vertical(
     >>> find_vertical(lambda some: lying[some], ahead, usual="y", height=1.7).axis
     'y'
     """
-    mean, own = trunk.mean(axis=0), _NAMES.index(usual)
+    mean, usual_axis = trunk.mean(axis=0), "xyz".index(usual)
     axis = int(np.argmax(np.abs(mean)))
-    if mean[own] >= _STANDS or abs(mean[axis]) < _ALONG:
+    # Mean cosines: people stand along the rig's own axis from 0.5, along another one from 0.7.
+    if mean[usual_axis] >= 0.5 or abs(mean[axis]) < 0.7:
         return Vertical(usual)
     sign = float(np.sign(mean[axis]))
-    along = "-" * (sign < 0.0) + _NAMES[axis]
-    places = points(slice(None, None, -(-len(trunk) // _FRAMES)))
-    heights = (sign * places[..., axis]).min(axis=1), places[..., own].min(axis=1)
-    rises, usual_rises = (_rise(one, height) for one in heights) if len(places) >= _FEWEST else (1.0, 1.0)
-    at_floor, usual_at_floor = (abs(float(np.median(one))) < _AT_FLOOR * height for one in heights)
-    steadier = usual_rises > _STEADIER * rises
+    along = "-" * (sign < 0.0) + "xyz"[axis]
+    places = points(thin_frames(len(trunk)))
+    lows = (sign * places[..., axis]).min(axis=1), places[..., usual_axis].min(axis=1)
+    ranges = (
+        (_range_on_floor(low, height) for low in lows) if len(places) >= 8 else (1.0, 1.0)
+    )  # fewer frames show none
+    low_range, usual_range = ranges
+    at_floor, usual_at_floor = (abs(float(np.median(low))) < 0.15 * height for low in lows)
+    steadier = usual_range > _FLOOR_STEADINESS_RATIO * low_range
     if is_stated and not steadier:
         return Vertical(usual)
-    if rises > _STEADIER * usual_rises or not (steadier or at_floor):
-        is_sure = rises > _STEADIER * usual_rises or usual_at_floor
+    usual_is_steadier = low_range > _FLOOR_STEADINESS_RATIO * usual_range
+    if usual_is_steadier or not (steadier or at_floor):
+        is_sure = usual_is_steadier or usual_at_floor
         found = usual if is_sure or along != "y" else "y"
-        return Vertical(found, "" if is_sure else _either(along))
+        return Vertical(found, "" if is_sure else _describe_doubt(along))
     if along not in ("y", "z"):
-        doubt = f"its people stand along {along}, which is up in no file that is read; turn it so that y or z is"
+        doubt = f"people stand along {along}, but only y or z can be up; turn the file"
         return Vertical(usual, doubt * steadier)
     is_sure = steadier or not usual_at_floor
-    return Vertical(along, "" if is_sure else _either(along))
+    return Vertical(along, "" if is_sure else _describe_doubt(along))
 
 
-def _either(along: str) -> str:
-    return f"its people lie, or stand along {along}, and nothing tells which (--up y or --up z does)"
+def _describe_doubt(along: str) -> str:
+    return f"people either lie or stand along {along}; choose with --up y or --up z"
 
 
-def _rise(lowest: Floats, height: float) -> float:
-    """Return by how much heights of the lowest point [T] vary while a body of a height is on the floor, metres."""
-    low, high = np.quantile(lowest, _RISES)
-    return max(float(high - low), _STILL * height)
+def _range_on_floor(lowest: Floats, height: float) -> float:
+    """Return the range of heights of the lowest point [T] while the body is on the floor, metres.
+
+    The body counts as on the floor between the quantiles 0.05 and 0.6, and 0.2 % of its height as still.
+    """
+    low, high = np.quantile(lowest, (0.05, 0.6))
+    return max(float(high - low), 0.002 * height)

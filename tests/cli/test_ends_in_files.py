@@ -15,7 +15,7 @@ from motionmind.body.motion import Motion
 from motionmind.formats import read_motion, write_motion
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.retarget import to_human23
-from motionmind.retarget.vertical import Z_UP
+from motionmind.retarget.vertical import Z_UP_TO_Y_UP
 from motionmind.tween.engine import Engine
 
 SLOW = ballet_clip("adagio").resample(30.0).slice(0, 120)
@@ -45,7 +45,7 @@ def ends_lying() -> Motion:
     lies = turned(stands.slice(0, 1), rot.from_axis_angle([1.0, 0.0, 0.0], -np.pi / 2))
     rotations, root = (np.concatenate([getattr(one, name) for one in (stands, lies)]) for name in ("rotations", "root"))
     whole = replace(stands, rotations=rotations, root=root, times=np.arange(61) / 30.0, keyframed=False)
-    return renamed(turned(whole, rot.inv(Z_UP)))
+    return renamed(turned(whole, rot.inv(Z_UP_TO_Y_UP)))
 
 
 def test_what_is_up_in_a_file_of_an_end_is_seen_in_all_of_its_movement(run: Run) -> None:
@@ -66,7 +66,7 @@ def test_which_axis_is_up_in_a_file_of_an_end_can_be_said(run: Run) -> None:
     assert run(*TWEEN, "z.bvh@60", "z.bvh@0", "--up", "y", "-o", "y.json").code == 0
     assert run(*TWEEN, "z.bvh@60", "z.bvh@0", "--up", "z", "-o", "z.json").code == 0
     stands, lies = (read_motion(f"{up}.json").rotations[0, 0] for up in "yz")
-    assert np.degrees(rot.angle(rot.mul(Z_UP, stands), lies)) == pytest.approx(0.0, abs=0.1)
+    assert np.degrees(rot.angle(rot.mul(Z_UP_TO_Y_UP, stands), lies)) == pytest.approx(0.0, abs=0.1)
 
 
 def test_a_unit_is_for_files_of_both_ends_of_the_way_and_of_its_movement(run: Run) -> None:

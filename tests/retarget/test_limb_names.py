@@ -153,8 +153,8 @@ def test_what_is_not_clear_is_no_rig(text: str) -> None:
 def test_what_is_not_clear_is_named(text: str, unclear: str) -> None:
     names, parents = read_tree(text)
     said = describe_unknown_rig(Skeleton("file", tuple(names), tuple(parents), np.zeros((len(names), 3))))
-    fault = f"names of limbs do not tell {unclear}"
-    assert (fault in said) if unclear else ("names of limbs" not in said)
+    fault = f"the joints' names do not show {unclear}"
+    assert (fault in said) if unclear else ("do not show" not in said)
 
 
 def test_which_of_five_toes_is_meant_is_not_said() -> None:

@@ -34,7 +34,7 @@ from motionmind.retarget.retarget import (
 )
 from motionmind.retarget.rig import plain_names, spine_shares, without_endings
 from motionmind.retarget.rigs import RIGS
-from motionmind.retarget.vertical import stood_up
+from motionmind.retarget.vertical import to_y_up
 
 # What each rig calls human23's joints; {0} is "left", {1} "Left", {2} "l", {3} "L".
 SIDED = {
@@ -270,7 +270,7 @@ def lying(limbs: float = 0.3) -> Motion:
     return Motion(BODY, turns, np.stack([0.0 * low, -low, 0.0 * low + 3.0], axis=1), np.arange(12) / 30.0, "rest")
 
 
-def test_a_body_that_lies_is_not_stood_up() -> None:
+def test_a_body_that_lies_is_not_to_y_up() -> None:
     source = disguise(lying(), rig_names("Mixamo"), spread())
     found = to_human23(source)
     np.testing.assert_allclose(found.root, source.root, atol=1e-9)
@@ -282,7 +282,9 @@ def test_who_lies_still_or_stands_is_asked_of_the_user() -> None:
     still = lying(0.0)
     low = still.skeleton.positions_and_tips(still.rotations, still.root)[..., 2].min()
     source = disguise(replace(still, root=still.root - [0.0, 0.0, low]), rig_names("Mixamo"), spread())
-    with pytest.warns(MotionMindWarning, match=r"x: taken with z up, which is doubtful: .* \(--up y or --up z does\)"):
+    with pytest.warns(
+        MotionMindWarning, match=r"x: taken with z up, which is doubtful: .*; choose with --up y or --up z"
+    ):
         to_human23(source)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -295,7 +297,7 @@ def test_people_who_stand_along_x_are_told() -> None:
     turn = about("z", -90.0)
     rotations = source.rotations.copy()
     rotations[:, 0] = rot.mul(turn, rotations[:, 0])
-    with pytest.warns(MotionMindWarning, match="its people stand along x, which is up in no file that is read"):
+    with pytest.warns(MotionMindWarning, match="people stand along x, but only y or z can be up"):
         to_human23(replace(source, rotations=rotations, root=rot.mul_vec(turn, source.root)))
 
 
@@ -316,7 +318,7 @@ def test_our_own_bodies_with_z_up_zero_pose_and_all(body: Skeleton, tmp_path: Pa
         assert found.skeleton.height == pytest.approx(body.height, abs=1e-6)
         assert np.max(rot.angle(found.rotations, wanted.rotations)) < 1e-5
         np.testing.assert_allclose(found.root, wanted.root, atol=1e-6)
-    stood = stood_up(source)  # as reading it with z up does
+    stood = to_y_up(source)  # as reading it with z up does
     assert np.max(rot.angle(own_skeleton(stood, up="y").rotations, wanted.rotations)) < 1e-5
     np.testing.assert_allclose(own_skeleton(stood, up="y").root, wanted.root, atol=1e-9)
     lying = root_turned(wanted)
@@ -526,7 +528,9 @@ def test_a_zero_pose_along_its_bones_is_seen_through(rig: str, axis: str, roll: 
 
 def test_limbs_that_hardly_bend_do_not_show_how_they_are_turned() -> None:
     source = disguise(stroll(0.0), rig_names("Mixamo"), {}, along_bones("x", 0.0))
-    with pytest.warns(MotionMindWarning, match="it does not stand, and left_hip, left_knee.* bend too little to show"):
+    with pytest.warns(
+        MotionMindWarning, match="it does not stand, and left_hip, left_knee.* bend too little to show their twist"
+    ):
         to_human23(source)
 
 
@@ -764,8 +768,8 @@ def test_mapping_files(tmp_path: Path, name: str, text: str) -> None:
     ("name", "text", "message"),
     [
         ("m.toml", 'Hips = "pelvsi"', "'Hips': no joint 'pelvsi' in human23; did you mean 'pelvis'?"),
-        ("m.toml", "Hips = 3", "'Hips' must be given the name of a joint"),
-        ("m.toml", 'leg.L = "left_hip"', "'leg' must be given the name of a joint of human23, as text (a name with"),
+        ("m.toml", "Hips = 3", "'Hips' must map to the name of a joint"),
+        ("m.toml", 'leg.L = "left_hip"', "'leg' must map to the name of a joint of human23, as text (a name with"),
         ("m.toml", "Hips: pelvis", "not a joint mapping: "),
         ("m.toml", "", "not a joint mapping: it must hold"),
         ("m.json", '["Hips"]', "not a joint mapping: it must hold"),
