@@ -119,35 +119,3 @@ def test_importing_motionmind_imports_nothing_heavy() -> None:
     assert (
         subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
     )
-
-
-# --- names of 0.1 ----------------------------------------------------------------------------------------------------
-
-
-# Imports modules under their old names, each in a process of its own that has imported NumPy and nothing of MotionMind.
-_IMPORT_MOVED = """
-import ast, importlib, os, sys, warnings
-import numpy
-for old, new in ast.literal_eval(sys.argv[1]):
-    if (child := os.fork()) == 0:
-        with warnings.catch_warnings(record=True) as seen:
-            warnings.simplefilter("always")
-            module = importlib.import_module(f"motionmind.{old}")
-        assert module is importlib.import_module(f"motionmind.{new}"), old
-        said = [str(w.message) for w in seen if w.category is DeprecationWarning and "old name" in str(w.message)]
-        assert len(said) == 1 and f"motionmind.{new};" in said[0], (old, said)
-        sys.exit()
-    print(old, os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
-"""
-
-
-def test_modules_that_moved_are_found_under_their_old_names_with_a_warning() -> None:
-    moved = sorted(motionmind._moved.MOVED.items())
-    words = [sys.executable, "-c", _IMPORT_MOVED, repr(moved)]
-    done = subprocess.run(words, capture_output=True, text=True, check=False)
-    assert done.stdout.splitlines() == [f"{old} 0" for old, _ in moved], done.stderr
-
-
-def test_a_module_that_never_was_is_not_found() -> None:
-    with pytest.raises(ModuleNotFoundError):
-        __import__("motionmind.motor")

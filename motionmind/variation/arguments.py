@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-from typing import Any
-
 import numpy as np
 
 from motionmind._typing import Floats
@@ -44,29 +41,6 @@ def check_number(name: str, value: object) -> float:
 def check_numbers(name: str, value: object) -> tuple[float, ...]:
     """Return finite numbers as floats [d], d = 1 for a single number; errors as for `check_number`."""
     return tuple(map(float, _numbers(name, value, "finite numbers").reshape(-1)))
-
-
-def take_renamed(options: dict[str, Any], old: str, new: str, value: Any) -> Any:
-    """Take a keyword's former name out of `options`, with a DeprecationWarning for the caller's caller.
-
-    Args:
-        options: keywords that a function collected; `old` is removed from them.
-        old: the former name.
-        new: the present name.
-        value: the value given by the present name; None if there is none.
-
-    Returns:
-        The value given by either name.
-
-    Raises:
-        WrongTypeError: both names were given.
-    """
-    if old not in options:
-        return value
-    if value is not None:
-        raise WrongTypeError(f"{old} is the former name of {new}: give {new} alone")
-    warnings.warn(f"the keyword {old} is deprecated: use {new}", DeprecationWarning, stacklevel=3)
-    return options.pop(old)
 
 
 def _numbers(name: str, value: object, wanted: str) -> Floats:

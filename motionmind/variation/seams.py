@@ -7,7 +7,6 @@ corpus (or, by whole bodies, the body does), or turns faster than it ever does t
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -133,12 +132,6 @@ class JudgedTransition(msgspec.Struct, Generic[C], frozen=True, eq=False, forbid
     def __repr__(self) -> str:
         found = f"abrupt joints {len(self.abrupt_joints)}, candidates {len(self.candidates)}"
         return f"<JudgedTransition from {self.start} to {self.end} by {displayed(self.corpus)}: {found}>"
-
-    @property
-    def breaks(self) -> tuple[AbruptJoint, ...]:
-        """The former name of `abrupt_joints`, which goes in 0.3."""
-        warnings.warn("breaks is now abrupt_joints; the old name goes in 0.3", DeprecationWarning, stacklevel=2)
-        return self.abrupt_joints
 
     @property
     def is_abrupt(self) -> bool:

@@ -23,7 +23,7 @@ from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.search.solve import Watch
 from motionmind.tween.engine import Engine
-from motionmind.variation.arguments import check_number, check_numbers, check_whole, take_renamed
+from motionmind.variation.arguments import check_number, check_numbers, check_whole
 from motionmind.variation.controls import Control, control_of
 from motionmind.variation.course import Course
 from motionmind.variation.departure import find_nudge, share_sought
@@ -272,7 +272,6 @@ class Variation:
             MotionMindError: an argument is out of its range.
             WrongTypeError: an argument is of another type, or there is no such argument.
         """
-        on_progress = take_renamed(options, "told", "on_progress", on_progress)
         check_type("engine", engine, Engine)
         _check_watchers(whole_body, on_progress, watch)
         check_asked(alternatives, options)
@@ -379,7 +378,6 @@ def vary(
     >>> len(variation.order)
     40
     """
-    on_progress = take_renamed(options, "told", "on_progress", on_progress)
     check_type("piece", piece, Motion, Piece)
     check_type("engine", engine, Engine, or_none=True)
     _check_watchers(whole_body, on_progress, watch)
