@@ -45,7 +45,7 @@ DOCUMENTS = [
     *sorted(path for path in (ROOT / "docs").rglob("*.md") if "_build" not in path.parts),
     *EXPERIMENTS,
 ]
-OTHER_PROGRAMS = ("pip", "pytest", "sphinx-build", "ruff", "npm", "bash", "pre-commit")
+OTHER_PROGRAMS = ("python -m tests.", "pip", "pytest", "sphinx-build", "ruff", "npm", "bash", "pre-commit")
 
 
 def name_of(path: Path) -> str:
