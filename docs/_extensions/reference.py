@@ -25,7 +25,17 @@ SUBJECTS = {
     "Tweens": ("Engine", "TweenRequest", "Tween", "Bridge", "Wait", "Source", "learned.Sighting", "credits.Credit"),
     "Reports": ("TweenReport", "read_report", "explain", "Explanation", "metrics.measure", "metrics.Figure"),
     "Corpora": ("list_corpora", "Corpus", "gaps.find_gaps", "gaps.Gaps"),
-    "Movement": ("Posture", "find_posture", "FoundPosture", "Motion", "Velocity", "Insertion", "Skeleton", "human23", "human44"),
+    "Movement": (
+        "Posture",
+        "find_posture",
+        "FoundPosture",
+        "Motion",
+        "Velocity",
+        "Insertion",
+        "Skeleton",
+        "human23",
+        "human44",
+    ),
     "Files": (
         "read_motion",
         "read_posture",

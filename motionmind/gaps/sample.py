@@ -59,7 +59,7 @@ def solve_pairs(learned: LearnedCorpus, pairs: Ints) -> Solved:
     bridged = np.zeros((len(pairs), len(learned.grammar.chains)), np.int64)
     for number, (a, b) in enumerate(pairs.tolist()):
         ends = bring_ends(learned.corpus, _posture(learned.corpus, a), _posture(learned.corpus, b))
-        formulation = formulate(learned, ends, PLAIN)
+        formulation = formulate(learned, ends, PLAIN_REQUEST)
         if not formulation.stays:
             found = solve(formulation.searched)
             costs[number], bounds[number], moves[number] = found.cost, found.lower_bound, len(found.path) - 1

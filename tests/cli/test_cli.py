@@ -128,7 +128,8 @@ def test_what_must_be_even_in_time_is_made_so_and_said(run: Run) -> None:
             assert ran.code == 0, ran.err
             frames = len(read_motion(file))
             assert re.search(
-                rf"note: {file}: this format needs evenly spaced frames: resampled \d+ frames to {frames}, 30 per second", ran.err
+                rf"note: {file}: this format needs evenly spaced frames: resampled \d+ frames to {frames}, 30 per",
+                ran.err,
             )
             again = run(*(word.format(file) for word in words), "--fps", 10)
             assert "must be even" not in again.err
