@@ -22,7 +22,17 @@ from sphinx.util.docutils import SphinxDirective
 _log = logging.getLogger(__name__)
 
 SUBJECTS = {
-    "Tweens": ("Engine", "TweenRequest", "Tween", "Bridge", "Wait", "Source", "learned.Sighting", "credits.Credit"),
+    "Tweens": (
+        "Engine",
+        "TweenRequest",
+        "SearchOptions",
+        "Tween",
+        "Bridge",
+        "Wait",
+        "Source",
+        "learned.Sighting",
+        "credits.Credit",
+    ),
     "Reports": ("TweenReport", "read_report", "explain", "Explanation", "metrics.measure", "metrics.Figure"),
     "Corpora": ("list_corpora", "Corpus", "gaps.find_gaps", "gaps.Gaps"),
     "Movement": (
