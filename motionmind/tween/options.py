@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from numbers import Integral
 from types import MappingProxyType
 from typing import Any, get_args
 
@@ -17,6 +18,7 @@ from motionmind.arguments import (
     check_mapping,
     check_real,
     check_text,
+    described,
 )
 from motionmind.body.rates import FASTEST
 from motionmind.errors import MotionMindError, WrongTypeError
@@ -35,10 +37,12 @@ def _whole(least: int, most: int | None = None) -> _Rule:
     limits = f"of at least {least}" if most is None else f"from {least} to {most}"
 
     def take(name: str, value: Any) -> Any:
-        check_integer(name, value)
-        if value < least or (most is not None and value > most):
-            raise MotionMindError(f"{name} must be a whole number {limits}, not {value}")
-        return value
+        is_whole = isinstance(value, Integral) and not isinstance(value, bool)
+        if is_whole and least <= value and (most is None or value <= most):
+            return value
+        raise (MotionMindError if is_whole else WrongTypeError)(
+            f"{name} must be a whole number {limits}, not {described(value)}"
+        )
 
     return take
 

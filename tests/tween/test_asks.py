@@ -505,7 +505,7 @@ def test_of_restrictions_that_leave_no_path_together_as_few_as_do_so_are_named(e
         ({"within": -0.1}, "within must be a number from 0 to 1, not -0.1"),
         ({"seed": -1}, "seed must be a whole number of at least 0, not -1"),
         ({"coordination": "all"}, "coordination must be 'posture', 'progression' or 'none', not 'all'"),
-        ({"memory": 10}, "memory of 10 bytes holds not one node"),
+        ({"memory": 10}, "memory=10 is too small"),
         ({"memory": 0}, "memory must be a whole number"),
     ],
 )
@@ -515,7 +515,7 @@ def test_what_cannot_be_asked_is_refused(engine: Engine, asked: dict[str, Any], 
 
 
 def test_a_via_is_on_the_corpus_skeleton_and_at_a_move(engine: Engine) -> None:
-    with pytest.raises(MotionMindError, match="via 1: the move must be a whole number from 1, not 0"):
+    with pytest.raises(MotionMindError, match="via 1: the move must be a whole number from 1 to 9999, not 0"):
         join(engine, via=[(posture("passe"), 0)])
 
 
