@@ -54,7 +54,7 @@ def constraints_of(
         chain = space.index(joint)
         if start[chain] != goal[chain]:
             a, b = (space.label(chain, int(end[chain])) for end in (start, goal))
-            raise NoPathError(f"hold {joint}: A and B differ there, {a} and {b}, so that it cannot be held")
+            raise NoPathError(f"hold {joint}: A and B have different states there, {a} and {b}")
         out.append(Constraint(f"hold {joint}", _only(space, chain, int(start[chain]))))
     for joint, wanted in avoid:
         chain = space.index(joint)
@@ -156,7 +156,7 @@ def _blocked_segments(chains: Sequence[str], problem: Problem) -> Iterator[str]:
         costs = costs_to_go(held, stops[segment + 1], longest)[1:, held.starts[:-1] + stops[segment]]
         stuck = [joint for chain, joint in enumerate(chains) if not np.isfinite(costs[:, chain]).any()]
         if stuck:
-            yield f"{', '.join(stuck)}: no way from {stop_names[segment]} to {stop_names[segment + 1]}"
+            yield f"{', '.join(stuck)}: no path from {stop_names[segment]} to {stop_names[segment + 1]}"
 
 
 def _via_name(problem: Problem, i: int) -> str:

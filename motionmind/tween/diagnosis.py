@@ -95,9 +95,9 @@ class Diagnosis:
         for fault in self.faults:
             if fault.gap:
                 yield (
-                    f"  {fault.joint}: of the {fault.ahead} states that {fault.start} leads to and the {fault.behind} "
-                    f"that lead to {fault.goal} none are the same; nearest are {fault.gap.before} and "
-                    f"{fault.gap.after}, {fault.gap.degrees:.1f} degrees apart"
+                    f"  {fault.joint}: {fault.start} leads to {fault.ahead} states, and {fault.behind} lead to "
+                    f"{fault.goal}, with none in common; the nearest are {fault.gap.before} and {fault.gap.after}, "
+                    f"{fault.gap.degrees:.1f} degrees apart"
                 )
             else:
                 yield f"  {fault.joint} needs {fault.needs} moves from {fault.start} to {fault.goal}"

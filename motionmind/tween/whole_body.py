@@ -161,7 +161,7 @@ def diagnose_whole_body(corpus: Corpus, bodies: Bodies, near: tuple[int, int], r
     if np.isfinite(ahead[goal]) and start != goal:
         needs = f"{ahead[goal]:.0f} moves lie between {ends}"
         if ahead[goal] <= rules.longest:
-            needs += f", but not in as many as were asked for, or the {FACING} does not come round in them"
+            needs += f", but not in the requested number, or the {FACING} cannot turn far enough in them"
         return f"{first}\n  {needs}"
     # One posture of each body is enough to measure distances.
     one = np.unique(bodies.of, return_index=True)[1]
@@ -173,8 +173,8 @@ def diagnose_whole_body(corpus: Corpus, bodies: Bodies, near: tuple[int, int], r
     i, k = np.unravel_index(int(np.argmax(squares[0] @ squares[1].T)), (len(some), len(others)))
     degrees = np.degrees(rot.angle(joints[some[i]], joints[others[k]])).mean()
     return (
-        f"{first}\n  of the {len(found)} postures that {_place(corpus, a)}, nearest to A, leads to and the {len(led)} "
-        f"that lead to {_place(corpus, b)}, nearest to B, none are the same; nearest are "
+        f"{first}\n  {_place(corpus, a)}, nearest to A, leads to {len(found)} postures, and {len(led)} lead to "
+        f"{_place(corpus, b)}, nearest to B, with none in common; the nearest are "
         f"{_place(corpus, some[i])} and {_place(corpus, others[k])}, {degrees:.1f} degrees a joint apart"
     )
 
