@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motionmind.arguments import check_type
+from motionmind.arguments import check_function, check_path, check_type
 from motionmind.body.motion import Motion, Posture
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_motion
@@ -59,6 +59,7 @@ def find_posture(
     Raises:
         MotionMindError: there is no such posture (the message suggests a similar name or lists all), or no movement
             around it for a ~.
+        WrongTypeError: an argument has the wrong type.
 
     >>> from motionmind import Engine, find_posture
     >>> engine = Engine.load("ballet")
@@ -66,6 +67,8 @@ def find_posture(
     7
     """
     check_type("name", name, str, PostureName)
+    check_path("home", home, or_none=True)
+    check_function("read", read)
     named = parse_posture(name, home) if isinstance(name, str) else name
     motion = find_motion(named.source, home, as_clip=named.is_moving or named.moment is not None, read=read)
     if not named.is_moving:
