@@ -114,6 +114,7 @@ class TweenRequest:
             WrongTypeError: an option does not exist, or `request` is not a TweenRequest.
             MotionMindError: as for the constructor.
 
+        >>> from motionmind import TweenRequest
         >>> TweenRequest.of(duration=2.0, tau=0.5).search.tau
         0.5
         """
