@@ -174,7 +174,7 @@ def _written_body(suffix: str, motion: Motion) -> tuple[int, str]:
         body = smpl_body_for(motion.skeleton)
         return len(body), body.name
     if suffix == ".vrma":
-        from motionmind.formats.vrma import JOINTS
+        from motionmind.formats.vrma import N_BONES
 
-        return JOINTS, "VRM"
+        return N_BONES, "VRM"
     return len(motion.skeleton), motion.skeleton.name

@@ -308,7 +308,7 @@ def _read(job: Job) -> Iterator[Motion]:
     """Read the movement of a file, on human23 where its joints map to it."""
     from motionmind.body.motion import Insertion
     from motionmind.formats import read_motion
-    from motionmind.formats.bvh import holds_made
+    from motionmind.formats.bvh import has_inserted_frames
     from motionmind.notation.compose import motions
     from motionmind.notation.read import read_score
     from motionmind.retarget.retarget import own_skeleton
@@ -323,7 +323,7 @@ def _read(job: Job) -> Iterator[Motion]:
         if options.taking.skip:  # which would drop it
             raise CorpusError(doubt)
         warnings.warn(doubt, MotionMindWarning, stacklevel=2)
-    if job.file.suffix.lower() == ".bvh" and holds_made(job.file):
+    if job.file.suffix.lower() == ".bvh" and has_inserted_frames(job.file):
         motion = replace(motion, insertions=(Insertion(motion.times),))
     yield own_skeleton(replace(motion, name=job.name), options.joints, up="y" if options.up else None)
 

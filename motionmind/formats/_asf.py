@@ -1,4 +1,4 @@
-"""Reads Acclaim's skeleton file (ASF): bones, their frames and their channels. `asf_amc` explains their meaning."""
+"""Reads Acclaim's skeleton file (ASF): bones, frames and channels. `asf_amc` explains their meaning."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from motionmind._typing import Floats
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath, name_of
-from motionmind.formats.text import MOST_JOINTS, read_lines, to_number, to_numbers
+from motionmind.formats.text import MAX_JOINTS, read_lines, to_number, to_numbers
+from motionmind.formats.units import UNITS
 from motionmind.geometry import rotations as rot
 
-_INCH = 0.0254
 _CHANNEL = re.compile(r"[TR][XYZ]|L")
 
 
@@ -28,7 +28,7 @@ class Bone:
         line: the line where it begins.
         direction: unit vector from its start to its end [3]; 0 for none.
         length: in the file's unit.
-        axis: quaternion of the frame in which its angles turn [4].
+        axis: orientation of the frame of its angles, quaternion [4].
         channels: "TX", "RX", ..., in the AMC's order.
     """
 
@@ -61,7 +61,7 @@ class Acclaim:
     degrees: bool
 
     def skeleton(self) -> Skeleton:
-        """Build the skeleton: a joint at each bone's start, which is its parent's end; metres."""
+        """Build the skeleton in metres: a joint at each bone's start, its parent's end."""
         index = {name: joint for joint, name in enumerate(self.bones)}
         parents = [index[self.parents[name]] if name in self.parents else -1 for name in self.bones]
         ends = np.array([bone.length * bone.direction for bone in self.bones.values()]) * self.scale
@@ -77,7 +77,7 @@ def fixed_axes(order: str, angles: Floats) -> Floats:
 
 
 def _tokenise(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
-    """Yield the number and words of each line with words; commas and parentheses are blanks, # begins a comment."""
+    """Yield number and words of each non-empty line; commas and parentheses are blanks, # begins a comment."""
     for number, line in enumerate(lines, start=1):
         words = re.sub(r"[(),]", " ", line.split("#")[0]).split()
         if words:
@@ -85,7 +85,7 @@ def _tokenise(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
 
 
 def read_asf(path: FilePath) -> Acclaim:
-    """Read an ASF file's skeleton; FormatError names file and line of anything missing or invalid."""
+    """Read an ASF file's skeleton; FormatError names the file and line of a fault."""
     lines = read_lines(path)
     sections: dict[str, list[tuple[int, list[str]]]] = {}
     section: list[tuple[int, list[str]]] = []
@@ -108,7 +108,7 @@ def read_asf(path: FilePath) -> Acclaim:
     bones = {bone.name: bone for bone in _read_bones(sections[":bonedata"], degrees, path)}
     bones["root"] = root
     order, parents = _read_hierarchy(sections[":hierarchy"], bones, path)
-    return Acclaim(path, {name: bones[name] for name in order}, parents, position, _INCH / length, degrees)
+    return Acclaim(path, {name: bones[name] for name in order}, parents, position, UNITS["in"] / length, degrees)
 
 
 def _read_root(section: list[tuple[int, list[str]]], degrees: bool, path: FilePath) -> tuple[Bone, Floats]:
@@ -145,8 +145,8 @@ def _read_bones(section: list[tuple[int, list[str]]], degrees: bool, path: FileP
                     fault = "a bone without a name" if bone is None or not bone.name else f"a second bone {bone.name!r}"
                     raise FormatError(fault, path=path, line=number if bone is None else bone.line)
                 names.add(bone.name)
-                if len(names) > MOST_JOINTS:
-                    raise FormatError(f"more than {MOST_JOINTS} bones: not a body", path=path, line=number)
+                if len(names) > MAX_JOINTS:
+                    raise FormatError(f"more than {MAX_JOINTS} bones: not a body", path=path, line=number)
                 yield bone
                 bone = None
             case _ if bone is not None:
@@ -156,7 +156,7 @@ def _read_bones(section: list[tuple[int, list[str]]], degrees: bool, path: FileP
 
 
 def _read_bone_line(bone: Bone, keyword: str, words: list[str], *, degrees: bool, path: FilePath, line: int) -> None:
-    """Read one line between begin and end; limits, masses and the like are ignored."""
+    """Read one line between begin and end; ignore limits, masses and the like."""
     if keyword == "name":
         bone.name = " ".join(words)
     elif keyword == "direction":

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from motionmind.errors import FormatError, quoted
 from motionmind.files import FilePath
-from motionmind.formats.text import MOST_JOINTS, to_number
+from motionmind.formats.text import MAX_JOINTS, to_number
 
 _CHANNEL = re.compile(r"([XYZ])(POSITION|ROTATION)")
 
@@ -23,7 +23,7 @@ class BvhJoint:
         line: the line where it begins.
         offset: its OFFSET [3]; None until it is read.
         channels: "XPOSITION", ..., in the file's order.
-        tip: OFFSET of its first End Site [3]; None for none.
+        tip: OFFSET of its first End Site [3]; None without one.
     """
 
     name: str
@@ -35,7 +35,7 @@ class BvhJoint:
 
 
 def _tokens(lines: list[str]) -> Iterator[tuple[str, int]]:
-    """Yield the hierarchy's words with their line numbers; braces need no blanks around them."""
+    """Yield the hierarchy's words with their line numbers; split braces from words."""
     for number, line in enumerate(lines, start=1):
         if not is_comment(line):
             for token in line.replace("{", " { ").replace("}", " } ").split():
@@ -43,12 +43,12 @@ def _tokens(lines: list[str]) -> Iterator[tuple[str, int]]:
 
 
 def is_comment(line: str) -> bool:
-    """Return whether the line begins with # or //; the format has no comments, but some tools write them."""
+    """Return whether the line begins with # or //; the format has no comments, but some programs write them."""
     return line.lstrip().startswith(("#", "//"))
 
 
 class _Words:
-    """A cursor over the hierarchy's words that knows its line."""
+    """A cursor over the hierarchy's words, with line numbers."""
 
     def __init__(self, lines: list[str], path: FilePath) -> None:
         self.words = list(_tokens(lines))
@@ -93,13 +93,13 @@ class _Words:
 def read_hierarchy(lines: list[str], path: FilePath) -> list[BvhJoint]:
     """Read the joints from the lines between HIERARCHY and MOTION.
 
-    Joints may nest to any depth: there is no recursion.
+    Joints may nest to any depth.
 
     Returns:
         The joints, parents before their children.
 
     Raises:
-        FormatError: the lines are not a whole hierarchy; names file and line.
+        FormatError: the hierarchy is invalid or incomplete; names file and line.
     """
     words = _Words(lines, path)
     if not words or words.take("HIERARCHY").upper() != "HIERARCHY":
@@ -157,8 +157,8 @@ def _open_joint(kind: str, words: _Words, joints: list[BvhJoint], open_blocks: l
     if not name:
         raise FormatError(f"a {kind} without a name", path=words.path, line=line)
     joints.append(BvhJoint(name, parent, line))
-    if len(joints) > MOST_JOINTS:
-        raise words.error(f"more than {MOST_JOINTS} joints: not a body")
+    if len(joints) > MAX_JOINTS:
+        raise words.error(f"more than {MAX_JOINTS} joints: not a body")
     open_blocks.append(len(joints) - 1)
 
 

@@ -1,4 +1,4 @@
-"""Normalises a BVH rig: joints may move against their parents there; a skeleton needs constant offsets."""
+"""Normalises a BVH rig, whose joints may move against their parents, to a skeleton of constant offsets."""
 
 from __future__ import annotations
 
@@ -13,20 +13,18 @@ from motionmind.errors import enumerated
 from motionmind.formats.units import bone_span
 from motionmind.geometry import rotations as rot
 
-# Shares of the body's span: below the first a joint counts as still (exporters print 6 digits); above the second it
-# moves by more than a joint gives or a rig stretches.
-_STILL = 1e-4
-_TRAVEL = 1e-2
+# A joint that moves by less counts as still: share of the body's span, or radians. Exporters print 6 digits.
+_STILL_SPAN_SHARE = 1e-4
 
 
 @dataclass(frozen=True)
 class Placed:
-    """Movement as a BVH file places it: each joint may move against its parent.
+    """Movement in a BVH file, where each joint may move against its parent.
 
     Attributes:
         skeleton: the file's tree with its OFFSETs, in the file's unit.
         rotations: local quaternions [T, J, 4].
-        places: by joint with position channels, its place in its parent's frame [T, 3], in the file's unit.
+        places: {joint with position channels: its place in its parent's frame [T, 3], in the file's unit}.
     """
 
     skeleton: Skeleton
@@ -34,7 +32,7 @@ class Placed:
     places: dict[int, Floats]
 
     def stray(self, joint: int) -> float:
-        """Return the joint's range of movement against its parent, along the axis of the largest; the file's unit."""
+        """Return the joint's largest range of movement against its parent along an axis, in the file's unit."""
         return float(np.max(np.ptp(self.places[joint], axis=0))) if joint in self.places else 0.0
 
     def turn(self, joint: int) -> float:
@@ -57,14 +55,14 @@ class Placed:
 
 @dataclass(frozen=True)
 class NormalisedRig:
-    """A BVH file's movement on a skeleton of constant offsets, with the repairs this took.
+    """A BVH file's movement on a skeleton of constant offsets, with the repairs made.
 
     Attributes:
         skeleton: offsets and tips in the file's unit.
         rotations: local quaternions [T, J, 4].
         root: places of the root [T, 3] in the file's unit.
         notes: the repairs in words.
-        strays: joints whose place was not constant, each with its largest distance from the mean, in the file's unit.
+        strays: joints whose place varies, each with its largest distance from the mean, in the file's unit.
     """
 
     skeleton: Skeleton
@@ -78,7 +76,7 @@ class NormalisedRig:
         yield from self.notes
         if self.strays:
             far = [f"{name} (by up to {1000.0 * scale * stray:.1f} mm)" for name, stray in self.strays]
-            yield f"joints that move against their parents are kept at their mean place: {enumerated(far)}"
+            yield f"joints that move against their parents stay at their mean place: {enumerated(far)}"
 
 
 def normalise(body: Placed) -> NormalisedRig:
@@ -87,10 +85,10 @@ def normalise(body: Placed) -> NormalisedRig:
     Position channels that the file adds to OFFSETs are resolved, and the joint that carries the body becomes the root.
     """
     notes: list[str] = []
-    if _are_added(body):
+    if _channels_add_to_offsets(body):
         offsets = body.skeleton.offsets
         body = replace(body, places={j: place + offsets[j] * (j > 0) for j, place in body.places.items()})
-        notes.append("its position channels stand near 0 and its OFFSETs do not: read as added to them")
+        notes.append("position channels near 0 are added to OFFSETs, which are not")
     span = bone_span(np.array(body.skeleton.parents), body.mean_offsets(), body.skeleton.tips)
     if top := _new_root(body, span):
         body = _fold(body, top, span, notes)
@@ -98,12 +96,12 @@ def normalise(body: Placed) -> NormalisedRig:
     strays = [
         (body.skeleton.names[joint], float(np.max(np.linalg.norm(place - offsets[joint], axis=-1))))
         for joint, place in body.places.items()
-        if joint > 0 and body.stray(joint) > _STILL * span
+        if joint > 0 and body.stray(joint) > _STILL_SPAN_SHARE * span
     ]
     return NormalisedRig(replace(body.skeleton, offsets=offsets), body.rotations, body.place(0), notes, strays)
 
 
-def _are_added(body: Placed) -> bool:
+def _channels_add_to_offsets(body: Placed) -> bool:
     """Return whether position channels add to OFFSETs: most still joints have channels near 0 but nonzero OFFSETs."""
     added = replaced = 0
     for joint, place in body.places.items():
@@ -118,11 +116,11 @@ def _are_added(body: Placed) -> bool:
 def _new_root(body: Placed, span: float) -> int:
     """Find the joint that should replace the file's root; 0 if none should.
 
-    It moves against its parent by more than a rig stretches, and everything that moves descends from it. All other
-    joints are its ancestors, or still and fewer than half of the body.
+    It moves against its parent by more than 1 % of the span, which exceeds the stretch of joints, and all moving joints
+    descend from it. Any other joint is an ancestor, or still; still ones make up less than half of the body.
     """
     skeleton = body.skeleton
-    far = [joint for joint in body.places if joint > 0 and body.stray(joint) > _TRAVEL * span]
+    far = [joint for joint in body.places if joint > 0 and body.stray(joint) > 0.01 * span]
     if not far:
         return 0
     top = max(far, key=lambda joint: (len(_descendants(skeleton, joint)), -joint))
@@ -130,7 +128,10 @@ def _new_root(body: Placed, span: float) -> int:
     aside = [joint for joint in range(len(skeleton)) if joint not in carried and joint not in above]
     if not aside:
         return top
-    still = all(body.stray(joint) <= _STILL * span and body.turn(joint) < _STILL for joint in above + aside)
+    still = all(
+        body.stray(joint) <= _STILL_SPAN_SHARE * span and body.turn(joint) < _STILL_SPAN_SHARE
+        for joint in above + aside
+    )
     return top if still and 2 * len(carried) > len(skeleton) else 0
 
 
@@ -152,7 +153,7 @@ def _descendants(skeleton: Skeleton, joint: int) -> list[int]:
 
 
 def _fold(body: Placed, top: int, span: float, notes: list[str]) -> Placed:
-    """Make `top` the root: fold the transforms of its ancestors into its own, and drop all that is not below it."""
+    """Make `top` the root: fold its ancestors' transforms into its own, and drop joints outside its subtree."""
     old = body.skeleton
     above, kept = _ancestors(old, top), _descendants(old, top)
     turned: Floats = np.broadcast_to(rot.IDENTITY, (len(body.rotations), 4))
@@ -173,8 +174,8 @@ def _fold(body: Placed, top: int, span: float, notes: list[str]) -> Placed:
     name = old.names[top]
     aside = [old.names[joint] for joint in range(len(old)) if joint not in new and joint not in above]
     if aside:
-        notes.append(f"{name} is taken as the root; what stands still beside it is left out: {enumerated(aside)}")
-    walking = [old.names[joint] for joint in above if body.stray(joint) > _STILL * span]
+        notes.append(f"{name} becomes the root; joints that stand still beside it are left out: {enumerated(aside)}")
+    walking = [old.names[joint] for joint in above if body.stray(joint) > _STILL_SPAN_SHARE * span]
     if walking:
-        notes.append(f"{name} is taken as the root, at its own place; the path of {enumerated(walking)} itself is lost")
+        notes.append(f"{name} becomes the root, at its own place; the path of {enumerated(walking)} itself is lost")
     return Placed(skeleton, rotations, {**{new[j]: p for j, p in body.places.items() if j in new}, 0: root})

@@ -1,4 +1,4 @@
-"""The frame step of formats that record one step instead of times."""
+"""The frame step of formats that record a single step, not times."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Builds a low-poly body for any skeleton: a tapered prism around each bone, with a ridge along its front.
 
-Some programs treat an armature without a mesh as empty, and it does not show which way a knee points. The body is
-plain; `motionmind.render` draws better ones, which a file could not hold.
+Some programs treat an armature without a mesh as empty, and it does not show which way a knee points.
+`motionmind.render` draws better bodies, which a file could not hold.
 """
 
 from __future__ import annotations
@@ -20,20 +20,18 @@ FRONT = "front"
 
 COLOURS: Mapping[str, Colour] = {**SIDE_COLOURS, FRONT: FRONT_COLOUR}
 
-# The prism's section: corners about the bone, starting at its front, in degrees. The two faces beside the first corner
-# are the ridge, narrow enough that a limb seen from the front still shows its side's colour.
-_CORNERS = np.radians([0.0, 22.0, 80.0, 140.0, 220.0, 280.0, 338.0])
-_RINGS = np.array([0.0, 0.5, 1.0])  # places of the sections, as shares of the bone
-_RIDGE, _NOSE = 1.3, 1.8  # distance of the first corner from the bone, in radii; of a head's at half its height
-_CAP = 0.5  # distance of the prism's ends beyond the bone's, in radii
+# The prism's section: corners about the bone, starting at its front. The two faces beside the first corner are the
+# ridge, narrow enough that a limb seen from the front still shows its side's colour.
+_CORNERS_RAD = np.radians([0.0, 22.0, 80.0, 140.0, 220.0, 280.0, 338.0])
+_RING_SHARES = np.array([0.0, 0.5, 1.0])  # places of the sections along the bone
 
 
 @dataclass(frozen=True, eq=False)
 class Bones:
-    """The B bones that the mesh covers: from each joint to its children, and from each leaf to its tip.
+    """The B bones under the mesh: from each joint to its children, and from each leaf to its tip.
 
     Attributes:
-        joints: the joint that each bone moves with [B].
+        joints: the joint that moves each bone [B].
         starts, ends: its ends at rest [B, 3], metres.
         radii: at its ends [B, 2], metres.
         sides: LEFT, RIGHT or MIDDLE for each bone.
@@ -50,12 +48,12 @@ class Bones:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """The body's V vertices at rest; triangles share none, which makes each flat.
+    """The body's V vertices at rest; triangles share no vertices, so each is flat.
 
     Attributes:
         positions, normals: of the vertices [V, 3]; metres, and unit vectors.
-        joints: the joint that each vertex moves with [V].
-        paints: by name in `COLOURS`, its vertices [n], at least one; three in a row are a triangle, counterclockwise
+        joints: the joint that moves each vertex [V].
+        paints: {name in `COLOURS`: its vertices [n], at least one}; three in a row are a triangle, counterclockwise
             from outside.
     """
 
@@ -68,7 +66,7 @@ class Mesh:
 def body_mesh(skeleton: Skeleton, root: Floats) -> Mesh:
     """Build the mesh of a body at rest with its root at `root` [3], metres.
 
-    Its front is towards +z, and on a bone that lies along z towards +y.
+    Its front points to +z, on a bone along z to +y.
     """
     bones = bones_of(skeleton, root)
     corners = _corners(bones)  # [B, P, 3]
@@ -87,9 +85,9 @@ def body_mesh(skeleton: Skeleton, root: Floats) -> Mesh:
 
 
 def bones_of(skeleton: Skeleton, root: Floats) -> Bones:
-    """Return the bones that have a length, of a body at rest with its root at `root` [3], metres.
+    """Return the bones with a length, of a body at rest with its root at `root` [3], metres.
 
-    If none has one, return a single bone pointing up.
+    If no bone has a length, return a single one that points up.
     """
     count, parents = len(skeleton), skeleton.parents
     both = skeleton.rest + root
@@ -122,7 +120,7 @@ def bones_of(skeleton: Skeleton, root: Floats) -> Bones:
 
 
 def _radii(skeleton: Skeleton, sides: list[str], span: float) -> Floats:
-    """Return the body's radii at its joints [J], metres: smaller towards a limb's end, by distance along the bones."""
+    """Return the body's radii at its joints [J], metres; they shrink towards a limb's end."""
     reach = np.linalg.norm(skeleton.tips, axis=-1)
     for joint in range(len(skeleton) - 1, 0, -1):
         parent = skeleton.parents[joint]
@@ -139,22 +137,23 @@ def _corners(bones: Bones) -> Floats:
     front = front - np.sum(front * axis, axis=-1, keepdims=True) * axis
     front /= np.linalg.norm(front, axis=-1, keepdims=True)
     across = np.cross(axis, front)
-    around = front[:, None] * np.cos(_CORNERS)[:, None] + across[:, None] * np.sin(_CORNERS)[:, None]  # [B, C, 3]
-    thick = bones.radii[:, :1] + _RINGS * (bones.radii[:, 1:] - bones.radii[:, :1])  # [B, R]
-    stand_out = np.ones((len(axis), len(_RINGS), len(_CORNERS)))
-    stand_out[:, :, 0] = _RIDGE
-    stand_out[bones.heads, 1, 0] = _NOSE
-    middles = bones.starts[:, None] + _RINGS[:, None] * along[:, None]  # [B, R, 3]
+    around = (
+        front[:, None] * np.cos(_CORNERS_RAD)[:, None] + across[:, None] * np.sin(_CORNERS_RAD)[:, None]
+    )  # [B, C, 3]
+    thick = bones.radii[:, :1] + _RING_SHARES * (bones.radii[:, 1:] - bones.radii[:, :1])  # [B, R]
+    stand_out = np.ones((len(axis), len(_RING_SHARES), len(_CORNERS_RAD)))
+    stand_out[:, :, 0] = 1.3  # the ridge, in radii
+    stand_out[bones.heads, 1, 0] = 1.8  # the nose, at half the head's height
+    middles = bones.starts[:, None] + _RING_SHARES[:, None] * along[:, None]  # [B, R, 3]
     rings = middles[:, :, None] + (thick[:, :, None] * stand_out)[..., None] * around[:, None]
-    ends = np.stack(
-        [bones.starts - _CAP * bones.radii[:, :1] * axis, bones.ends + _CAP * bones.radii[:, 1:] * axis], axis=1
-    )
+    # Caps end half a radius beyond the bone.
+    ends = np.stack([bones.starts - 0.5 * bones.radii[:, :1] * axis, bones.ends + 0.5 * bones.radii[:, 1:] * axis], 1)
     return np.concatenate([rings.reshape(len(axis), -1, 3), ends], axis=1)
 
 
 def _template() -> tuple[Indices, list[bool]]:
     """Return the prism's triangles [F, 3] as indices of its corners, and whether each belongs to the ridge [F]."""
-    count, rings = len(_CORNERS), len(_RINGS)
+    count, rings = len(_CORNERS_RAD), len(_RING_SHARES)
     bottom, top, last = rings * count, rings * count + 1, (rings - 1) * count
     triangles: list[tuple[int, int, int]] = []
     ridge: list[bool] = []

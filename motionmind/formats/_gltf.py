@@ -1,7 +1,7 @@
-"""Reads glTF's containers, and the numbers in them: what a file states, without what it means.
+"""Reads glTF's containers and the numbers in them, without interpreting them.
 
-Section numbers refer to "glTF 2.0 Specification", version 2.0.1, The Khronos Group (2021). Only what movement needs is
-read: meshes, materials and pictures are not, so that extensions which compress those do no harm.
+Section numbers refer to "glTF 2.0 Specification", version 2.0.1, The Khronos Group (2021). Meshes, materials and
+pictures are not read, so extensions that compress them do no harm.
 """
 
 from __future__ import annotations
@@ -22,14 +22,13 @@ from motionmind._typing import Floats
 from motionmind.errors import FormatError, quoted
 from motionmind.files import FilePath, read_bytes
 from motionmind.formats import _json
-from motionmind.formats.text import LARGEST
+from motionmind.formats.text import MAX_NUMBER
 from motionmind.geometry import rotations as rot
 
 # 3.6.2.2, 5.1.3; the largest value of a type is 1 where integers are normalised (3.11).
-_COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-_SMALLEST = 1e-9  # scale, or volume, of a frame
-_JSON, _BINARY = b"JSON", b"BIN\0"
+COMPONENT_DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+N_COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+MIN_SCALE_RATIO = 1e-9  # of a frame, or of its volume; frames that mirror or flatten have less
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -44,7 +43,7 @@ class Asset(msgspec.Struct):
 
 
 class Buffer(msgspec.Struct):
-    """Bytes: in the file's binary chunk, in the text, or in a file beside."""
+    """Bytes: in the file's binary chunk, in the JSON text, or in another file."""
 
     uri: str | None = None
 
@@ -93,21 +92,21 @@ class Skin(msgspec.Struct, rename="camel"):
 
 
 class Target(msgspec.Struct):
-    """The node that a channel moves, and whether it turns or moves it."""
+    """A channel's node, and the property that it animates."""
 
     path: str
     node: _Index = None
 
 
 class Channel(msgspec.Struct):
-    """A sampler, and what it moves."""
+    """A sampler and its target."""
 
     sampler: int
     target: Target
 
 
 class Sampler(msgspec.Struct):
-    """Accessors of times and values, and how to go from one to the next."""
+    """Accessors of times and values, and the interpolation between them."""
 
     input: int
     output: int
@@ -136,13 +135,13 @@ class Bones(msgspec.Struct, rename="camel"):
 
 
 class Humanoid(msgspec.Struct):
-    """An extension that says which nodes are a person's bones."""
+    """An extension that lists the nodes of a person's bones."""
 
     humanoid: Bones = msgspec.field(default_factory=Bones)
 
 
 class Document(msgspec.Struct, rename="camel"):
-    """The file's JSON, as far as movement needs it."""
+    """The parts of the file's JSON that describe movement."""
 
     asset: Asset
     nodes: list[Node] = []
@@ -159,9 +158,9 @@ class Gltf:
     """A glTF file.
 
     Attributes:
-        path: the file, for messages and for files beside it.
+        path: the file, for messages and to find other files by relative paths.
         document: its JSON.
-        binary: the bytes of its first buffer, if they are in the file.
+        binary: the bytes of its first buffer, if the file holds them.
     """
 
     path: FilePath
@@ -177,9 +176,9 @@ class Gltf:
         """Return an accessor's numbers [n, components], checked to be finite.
 
         Args:
-            index: the accessor.
-            kind: the type that it must have, such as "VEC3".
-            what: what to call it in an error.
+            index: the accessor's.
+            kind: the required type, such as "VEC3".
+            what: its name in errors.
 
         Raises:
             FormatError: there is no such accessor, it has another type, or it is compressed, sparse or beyond its data.
@@ -188,26 +187,26 @@ class Gltf:
         numbers = array.astype(np.float64)
         if accessor.normalized and array.dtype.kind in "iu":
             numbers = np.maximum(numbers / np.iinfo(array.dtype.str).max, -1.0)
-        if not np.all(np.abs(numbers) <= LARGEST):
-            row = int(np.argwhere(~(np.abs(numbers) <= LARGEST))[0][0])
-            raise self.fault(f"{what}: number {row} of accessor {index} is no place, time or rotation")
+        if not np.all(np.abs(numbers) <= MAX_NUMBER):
+            row = int(np.argwhere(~(np.abs(numbers) <= MAX_NUMBER))[0][0])
+            raise self.fault(f"{what}: number {row} of accessor {index} is out of range")
         return numbers
 
     def _raw(self, index: int, kind: str, what: str) -> tuple[NDArray[np.generic], Accessor]:
-        """Return an accessor's numbers as they are stored [n, components], and the accessor."""
+        """Return an accessor's stored numbers [n, components], and the accessor."""
         accessor = self.member(self.document.accessors, index, f"{what}: accessor")
-        if accessor.type != kind or accessor.component_type not in _COMPONENTS:
+        if accessor.type != kind or accessor.component_type not in COMPONENT_DTYPES:
             raise self.fault(
                 f"{what}: accessor {index} holds {quoted(accessor.type)} of {accessor.component_type}, not {kind}"
             )
         if bytes(accessor.sparse) or accessor.buffer_view is None:
-            raise self.fault(f"{what}: accessor {index} is sparse, which is not read: export without that")
+            raise self.fault(f"{what}: accessor {index} is sparse, which cannot be read: export without that")
         view = self.member(self.document.buffer_views, accessor.buffer_view, f"{what}: buffer view")
         compressed = [name for name in view.extensions if "meshopt" in name]
         if compressed:
-            raise self.fault(f"{what}: compressed ({compressed[0]}), which is not read: export without that")
-        dtype = np.dtype(_COMPONENTS[accessor.component_type])
-        width, data = _WIDTHS[kind], self._buffer(view.buffer, what)
+            raise self.fault(f"{what}: compressed ({compressed[0]}), which cannot be read: export without that")
+        dtype = np.dtype(COMPONENT_DTYPES[accessor.component_type])
+        width, data = N_COMPONENTS[kind], self._buffer(view.buffer, what)
         size = width * dtype.itemsize
         stride = view.byte_stride or size
         length = stride * (accessor.count - 1) + size
@@ -226,18 +225,18 @@ class Gltf:
     def member(self, rows: list[Row], index: int, what: str) -> Row:
         """Return the row at `index`; FormatError if there is none."""
         if not 0 <= index < len(rows):
-            raise self.fault(f"{what} {index}: there is none, the file has {len(rows)}")
+            raise self.fault(f"{what} {index} does not exist: the file has {len(rows)}")
         return rows[index]
 
     def _buffer(self, index: int, what: str) -> bytes:
-        """Return a buffer's bytes; those of a file beside are read when they are first needed."""
+        """Return a buffer's bytes; read another file on first use."""
         if index not in self._buffers:
             uri = self.member(self.document.buffers, index, f"{what}: buffer").uri
             self._buffers[index] = self.binary if uri is None and index == 0 else self._fetch(uri or "")
         return self._buffers[index]
 
     def _fetch(self, uri: str) -> bytes:
-        """Return the bytes of a data URI, or of a file in the folder of this one or below it (3.6.1.1)."""
+        """Return the bytes of a data URI, or of a file in this one's folder or below (3.6.1.1)."""
         if uri.startswith("data:"):
             kind, _, text = uri.partition(",")
             try:
@@ -247,21 +246,21 @@ class Gltf:
         name = unquote(uri)
         beside = Path(name)
         if not name or "\0" in name or ":" in name or "\\" in name or beside.is_absolute() or ".." in beside.parts:
-            raise self.fault(f"a buffer is at {quoted(uri)}: buffers are read from files beside this one alone")
+            raise self.fault(f"a buffer is at {quoted(uri)}: buffers must be in this file's folder or below")
         return read_bytes(Path(self.path).parent / beside)
 
 
 def read_container(path: FilePath) -> Gltf:
-    """Read a glTF file's JSON and the binary chunk beside it: `.glb` or, whatever its suffix, text.
+    """Read the JSON and the binary chunk of a glTF file: binary (`.glb`) or text, whatever its suffix.
 
     Raises:
-        FormatError: the file cannot be read, or is no glTF 2.
+        FormatError: the file cannot be read, or is not glTF 2.
     """
     data = read_bytes(path)
     text, binary = _chunks(data, path) if data.startswith(b"glTF") else (data, b"")
     document = _json.decode(text, Document, path)
     if document.asset.version.split(".")[0] != "2":
-        raise FormatError(f"glTF of version {quoted(document.asset.version)}; version 2 is read", path=path)
+        raise FormatError(f"glTF of version {quoted(document.asset.version)}; only version 2 can be read", path=path)
     return Gltf(path, document, binary)
 
 
@@ -280,16 +279,16 @@ def _chunks(data: bytes, path: FilePath) -> tuple[bytes, bytes]:
             raise FormatError(f"a chunk of {size} bytes does not fit into the file", path=path)
         found.setdefault(kind, data[at + 8 : at + 8 + size])
         at += 8 + size + -size % 4
-    if _JSON not in found:
+    if b"JSON" not in found:
         raise FormatError("a GLB without JSON", path=path)
-    return found[_JSON], found.get(_BINARY, b"")
+    return found[b"JSON"], found.get(b"BIN\0", b"")
 
 
 def to_trs(node: Node) -> tuple[Floats, Floats, Floats]:
     """Return a node's translation [3], rotation [4] and scale [3] (3.5.3).
 
     Raises:
-        ValueError: its matrix is none of a translation, a rotation and a scale, or its rotation is zero.
+        ValueError: its matrix is not a translation, a rotation and a scale, or its rotation is zero.
     """
     if not node.matrix:
         return np.array(node.translation), rot.normalise(node.rotation), np.array(node.scale)
@@ -297,15 +296,15 @@ def to_trs(node: Node) -> tuple[Floats, Floats, Floats]:
 
 
 def from_matrix(numbers: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the translation [3], rotation [4] and scale [3] of a matrix [16] that is stored column by column.
+    """Return the translation [3], rotation [4] and scale [3] of a matrix [16], stored column by column.
 
     Raises:
-        ValueError: there are none.
+        ValueError: the matrix has another size, mirrors or has no volume.
     """
-    if numbers.shape != (16,) or not np.all(np.abs(numbers) <= LARGEST):
+    if numbers.shape != (16,) or not np.all(np.abs(numbers) <= MAX_NUMBER):
         raise ValueError("a matrix has 16 numbers")
     matrix = numbers.reshape(4, 4).T
     scale = np.linalg.norm(matrix[:3, :3], axis=0)
-    if not np.all(scale > _SMALLEST) or np.linalg.det(matrix[:3, :3] / scale) < _SMALLEST:
+    if not np.all(scale > MIN_SCALE_RATIO) or np.linalg.det(matrix[:3, :3] / scale) < MIN_SCALE_RATIO:
         raise ValueError("a matrix mirrors, or has no volume")
     return matrix[:3, 3], rot.from_matrix(matrix[:3, :3] / scale), scale

@@ -1,4 +1,4 @@
-"""Poses of a glTF file's joints in the world: while it moves, and at rest.
+"""Poses of a glTF file's joints in the world, in motion and at rest.
 
 Section numbers refer to "glTF 2.0 Specification", version 2.0.1, The Khronos Group (2021).
 """
@@ -13,14 +13,13 @@ import numpy as np
 from motionmind._typing import Floats
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindWarning
-from motionmind.formats._gltf import Gltf, from_matrix, to_trs
+from motionmind.formats._gltf import MIN_SCALE_RATIO, Gltf, from_matrix, to_trs
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.fitting import zero_pose_rests
 
-KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
-MOMENT = 1e-5  # seconds: keys no further apart are one; times have seven digits
-_SAME_POSE = 1e-3  # radians
-_LEAST_SCALE = 1e-9
+PATH_TYPES = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
+SAME_KEY_S = 1e-5  # keys no further apart are one; times have seven digits
+_SAME_POSE_RAD = 1e-3
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,7 @@ class Track:
 
     Attributes:
         times: of the keys [K], seconds, increasing.
-        values: at the keys [K, 3 or 4]; for a curve [K, 3, 3 or 4], each between its tangents.
+        values: at the keys [K, 3 or 4]; for CUBICSPLINE [K, 3, 3 or 4]: in-tangent, value, out-tangent.
         kind: "LINEAR", "STEP" or "CUBICSPLINE" (3.11).
     """
 
@@ -41,13 +40,15 @@ class Track:
         """Return the values at `times` [T], seconds; constant before the first key and after the last (appendix C)."""
         turns = self.values.shape[-1] == 4
         values = self.values[:, 1] if self.kind == "CUBICSPLINE" else self.values
-        after = np.searchsorted(self.times, times + MOMENT, side="right").clip(1, max(len(self.times) - 1, 1))
+        after = np.searchsorted(self.times, times + SAME_KEY_S, side="right").clip(1, max(len(self.times) - 1, 1))
         before = after - 1
         if len(self.times) == 1:
             return np.asarray(values[np.zeros(len(times), dtype=int)])
         span = self.times[after] - self.times[before]
         share = ((times - self.times[before]) / span).clip(0.0, 1.0)
-        share = np.where(share * span < MOMENT, 0.0, np.where((1.0 - share) * span < MOMENT, 1.0, share))[:, None]
+        share = np.where(share * span < SAME_KEY_S, 0.0, np.where((1.0 - share) * span < SAME_KEY_S, 1.0, share))[
+            :, None
+        ]
         if self.kind == "STEP":
             return np.asarray(values[np.where(share[:, 0] == 1.0, after, before)])
         if self.kind == "CUBICSPLINE":
@@ -61,11 +62,11 @@ class Track:
         return np.asarray(values[before] + share * (values[after] - values[before]))
 
 
-Tracks = dict[tuple[int, str], Track]  # by node, and by what moves
+Tracks = dict[tuple[int, str], Track]  # by node and animated path
 
 
 def lineage(parents: list[int], nodes: list[int] | set[int]) -> list[int]:
-    """Return nodes and all that they hang from, each after its parent."""
+    """Return nodes and their ancestors, each after its parent."""
     found: dict[int, None] = {}
     for last in sorted(nodes):
         path, node = [], last
@@ -91,12 +92,12 @@ def globals_at(
             raise gltf.fault(f"node {node}: {error}") from error
         moved = [
             tracks[node, path].at(times) if (node, path) in tracks else value[None]
-            for path, value in zip(KINDS, local, strict=True)
+            for path, value in zip(PATH_TYPES, local, strict=True)
         ]
         place, turn, scale = frames[parents[node]]
         least = np.prod(moved[2], axis=-1).min()
-        if not least > _LEAST_SCALE:
-            raise gltf.fault(f"node {node} has a scale that mirrors it, or leaves nothing of it")
+        if not least > MIN_SCALE_RATIO:
+            raise gltf.fault(f"node {node} has a scale that mirrors or flattens it")
         frames[node] = (
             place + rot.mul_vec(turn, scale * moved[0]),
             rot.mul(turn, moved[1]),
@@ -116,7 +117,7 @@ def rest_pose(
         gltf: the file.
         parents: of its nodes, -1 for none.
         joints: the body's nodes, each after its parent.
-        names: the joints' names [J], by which nodes that do not stand at rest are noticed; None if they are known to.
+        names: the joints' names [J], to check that the nodes stand at rest; None if they are known to.
     """
     turns, places = globals_at(gltf, parents, joints, {}, np.zeros(1))
     turns, places = turns[0], places[0]
@@ -134,7 +135,7 @@ def rest_pose(
     if len(known) < len(joints) - 1:
         return turns, places
     to_world = rot.mul_inv(turns[known], np.array([bound[i][1] for i in known]))
-    if np.all(rot.angle(to_world, to_world[:1]) < _SAME_POSE):  # the nodes stand as they were bound
+    if np.all(rot.angle(to_world, to_world[:1]) < _SAME_POSE_RAD):  # the nodes stand as they were bound
         return turns, places
     there = np.array([bound[i][0] for i in known])
     above = [known.index(i) if (i := joints.index(parents[joints[one]])) in bound else -1 for one in known[1:]]
@@ -150,10 +151,10 @@ def rest_pose(
 def _unbound_rest(
     gltf: Gltf, parents: list[int], joints: list[int], names: tuple[str, ...], standing: tuple[Floats, Floats]
 ) -> tuple[Floats, Floats]:
-    """Return the rest pose of joints that no skin binds: where the nodes stand, if a person rests so, or unturned ones.
+    """Return the rest pose of joints without a skin: the nodes' pose, if a person stands in it, else zero rotations.
 
-    Without a skin, programs write the nodes as they stand in a frame of the movement. Where joints' axes lie along
-    bones, the pose of no rotations does not stand either; their axes then follow from it and from the movement
+    Without a skin, programs write the nodes in the pose of a frame of the movement. If joints' axes lie along bones,
+    the pose of zero rotations does not stand either; their axes then follow from it and from the movement
     (`motionmind.retarget.standing`).
 
     Args:
@@ -161,10 +162,10 @@ def _unbound_rest(
         parents: of its nodes, -1 for none.
         joints: the body's nodes, each after its parent.
         names: the joints' names [J].
-        standing: orientations [J, 4] and places [J, 3] of the nodes as they stand.
+        standing: orientations [J, 4] and places [J, 3] in the nodes' pose.
 
     Warns:
-        MotionMindWarning: a person does not stand at rest in either pose.
+        MotionMindWarning: a person stands in neither pose.
     """
     turns, places = standing
     rows = [joints.index(parents[node]) if i else -1 for i, node in enumerate(joints)]
@@ -178,23 +179,26 @@ def _unbound_rest(
         straight[joint] = straight[parent] + rot.mul_vec(unturned, offset)
     if not zero_pose_rests(skeleton_at("", names, rows, straight)):
         message = (
-            f"{gltf.path}: no skin shows its rest pose, and its nodes stand in none: how joints are turned is found "
-            "from the movement, of head and feet roughly (export it with a mesh)"
+            f"{gltf.path}: neither a skin nor the nodes show the rest pose: joints are aligned by the movement, head "
+            "and feet roughly (export it with a mesh)"
         )
         warnings.warn(message, MotionMindWarning, 6)
     return np.tile(unturned, (len(joints), 1)), straight
 
 
 def skeleton_at(name: str, names: tuple[str, ...], parents: list[int], rest: Floats) -> Skeleton:
-    """Return the skeleton of places [J, 3] at rest."""
+    """Build the skeleton from the joints' places at rest [J, 3]."""
     offsets = rest - rest[[max(parent, 0) for parent in parents]]
     return Skeleton(name, names, tuple(parents), offsets, np.zeros_like(offsets))
 
 
 def heading_of(gltf: Gltf, parents: list[int], top: int) -> Floats:
-    """Return the turn [4] of what the body hangs from, which is none of its rest pose, if it is about the vertical."""
+    """Return the rotation [4] of the body's parent node if it is about the vertical, else the identity.
+
+    Such a rotation is not a part of the rest pose.
+    """
     if parents[top] < 0:
         return rot.IDENTITY
     turn = globals_at(gltf, parents, [parents[top]], {}, np.zeros(1))[0][0, 0]
     heading = rot.about_vertical(rot.heading(turn))
-    return heading if rot.angle(turn, heading) < _SAME_POSE else rot.IDENTITY
+    return heading if rot.angle(turn, heading) < _SAME_POSE_RAD else rot.IDENTITY

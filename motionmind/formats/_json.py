@@ -1,4 +1,4 @@
-"""Shared by the JSON of postures and motions: the header, skeletons, quaternions, and errors in plain words."""
+"""JSON of postures and motions: the header, skeletons, quaternions, and errors in plain words."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.credits.credit import Credit
 from motionmind.errors import FormatError, MotionMindWarning, SkeletonError, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath
-from motionmind.formats.text import LARGEST, MOST_JOINTS
+from motionmind.formats.text import MAX_JOINTS, MAX_NUMBER
 from motionmind.geometry import rotations as rot
 
 Vector = tuple[float, float, float]
@@ -29,10 +29,9 @@ POSTURE = "motionmind-posture"
 MOTION = "motionmind-motion"
 VERSION = 1
 
-# Decimals written: read back, no number is off by more than 5e-11, and no unit length by more than 1e-9.
-DECIMALS = 10
-_WRITTEN_TOLERANCE = 1e-9
-_UNIT_TOLERANCE = 1e-6
+# Lengths of quaternions written with ten decimals are off 1 by less; what this code wrote stays bit-identical.
+WRITTEN_LENGTH_TOLERANCE = 1e-9
+_LENGTH_TOLERANCE = 1e-6  # without a warning
 
 
 class Header(msgspec.Struct):
@@ -59,18 +58,18 @@ class SkeletonSchema(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class InsertionSchema(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
-    """A stretch that the engine inserted: the times of its postures, (joint, move) for each bridge, and its credits."""
+    """An insertion by the engine: the times of its postures, (joint, move) for each bridge, and its credits."""
 
     times: list[float]
     bridged: list[tuple[str, int]] = []  # msgspec copies it for each object
     credits: list[Credit] = []
 
 
-MARKS = "motionmind"  # where glTF keeps MarksSchema: the key in a node's extras
+MARKS_KEY = "motionmind"  # of MarksSchema in a glTF node's extras
 
 
 class MarksSchema(msgspec.Struct, omit_defaults=True):
-    """Text in other programs' formats: marks (see `Motion`), and the far ends of bones by joint, metres."""
+    """Text in other programs' formats: marks (see `Motion`), and tips by joint, metres."""
 
     insertions: list[InsertionSchema] = []
     keyframed: bool = False
@@ -94,17 +93,17 @@ def kind_of(data: bytes, path: FilePath) -> str:
 
 
 def to_insertion(schema: InsertionSchema) -> Insertion:
-    """Build an insertion; MotionMindError if its times do not increase, or it bridges a move that it does not have."""
+    """Build an insertion; MotionMindError if its times do not increase, or it bridges a move that does not exist."""
     return Insertion(np.array(schema.times), tuple(schema.bridged), tuple(schema.credits))
 
 
 def insertion_schema(insertion: Insertion, start: float = 0.0) -> InsertionSchema:
-    """Return what a file holds of an insertion, with its times counted from `start`, seconds."""
+    """Return an insertion's schema, with times counted from `start`, seconds."""
     return InsertionSchema(rounded(insertion.times - start).tolist(), list(insertion.bridged), list(insertion.credits))
 
 
 def decode(data: bytes, schema: type[T], path: FilePath) -> T:
-    """Decode `data` as `schema`; FormatError says what is wrong and where."""
+    """Decode `data` as `schema`; FormatError names the fault and its place."""
     data = data.removeprefix(codecs.BOM_UTF8)
     try:
         return msgspec.json.decode(data, type=schema)
@@ -120,7 +119,7 @@ def _malformed(message: str, data: bytes, path: FilePath) -> FormatError:
     """Build the FormatError for text that is not valid JSON, with its line."""
     place = re.search(r"\(byte (\d+)\)", message)
     end = len(data.rstrip())
-    # To msgspec a number cut short is not "truncated", but wrong at its last byte.
+    # msgspec reports a truncated number as malformed at its last byte.
     if "truncated" in message or (place and int(place[1]) >= end):
         line = data.count(b"\n", 0, end) + 1
         return FormatError("the JSON is cut short: the file ends before it does", path=path, line=line)
@@ -163,8 +162,8 @@ def to_skeleton(schema: str | SkeletonSchema, path: FilePath) -> Skeleton:
                 f"skeleton {quoted(schema)} has no description here; only {built_in} are known by name alone", path=path
             )
         return BODIES[schema]()
-    if len(schema.joints) > MOST_JOINTS:
-        raise FormatError(f"more than {MOST_JOINTS} joints: not a body", path=path)
+    if len(schema.joints) > MAX_JOINTS:
+        raise FormatError(f"more than {MAX_JOINTS} joints: not a body", path=path)
     index: dict[str, int] = {}
     parents = []
     for joint in schema.joints:
@@ -178,8 +177,8 @@ def to_skeleton(schema: str | SkeletonSchema, path: FilePath) -> Skeleton:
         index[joint.name] = len(index)
     offsets = np.array([joint.offset for joint in schema.joints], dtype=np.float64).reshape(-1, 3)
     tips = np.array([joint.tip or (0.0, 0.0, 0.0) for joint in schema.joints], dtype=np.float64).reshape(-1, 3)
-    if not (np.all(np.abs(offsets) <= LARGEST) and np.all(np.abs(tips) <= LARGEST)):
-        raise FormatError(f"skeleton {quoted(schema.name)} has an offset beyond {LARGEST:g} m", path=path)
+    if not (np.all(np.abs(offsets) <= MAX_NUMBER) and np.all(np.abs(tips) <= MAX_NUMBER)):
+        raise FormatError(f"skeleton {quoted(schema.name)} has an offset beyond {MAX_NUMBER:g} m", path=path)
     try:
         return Skeleton(schema.name, tuple(joint.name for joint in schema.joints), tuple(parents), offsets, tips)
     except SkeletonError as error:
@@ -214,31 +213,31 @@ def text(value: str) -> str:
 
 
 def rounded(array: Floats) -> Floats:
-    """Round `array` to the decimals written, with -0 as 0."""
-    return np.asarray(np.round(array, DECIMALS) + 0.0, dtype=np.float64)
+    """Round `array` to the ten decimals of a file, with -0 as 0."""
+    return np.asarray(np.round(array, 10) + 0.0, dtype=np.float64)
 
 
 def check_lengths(array: Floats, what: str, path: FilePath) -> None:
-    """Raise FormatError if a length or time in `array` [..., n] is larger than any body's."""
-    wrong = ~(np.abs(array) <= LARGEST)
+    """Raise FormatError if a length or time in `array` [..., n] is out of range."""
+    wrong = ~(np.abs(array) <= MAX_NUMBER)
     if wrong.any():
         where = tuple(np.argwhere(wrong)[0])
         place = f" in frame {where[0]}" if array.ndim > 1 else ""
-        raise FormatError(f"{what}{place} is {array[where]:g}, beyond {LARGEST:g}", path=path)
+        raise FormatError(f"{what}{place} is {array[where]:g}, beyond {MAX_NUMBER:g}", path=path)
 
 
-def unit_rotations(array: Floats, names: Sequence[str], path: FilePath) -> Floats:
-    """Normalise quaternions [J, 4] or [T, J, 4] in place; FormatError for zero, a warning for one off by > 1e-6."""
-    if not np.all(np.abs(array) <= LARGEST):
-        joint = names[np.argwhere(~(np.abs(array) <= LARGEST))[0][-2]]
-        raise FormatError(f"the rotation of {joint} has a number beyond {LARGEST:g}", path=path)
+def normalise_rotations(array: Floats, names: Sequence[str], path: FilePath) -> Floats:
+    """Normalise quaternions [J, 4] or [T, J, 4] in place; FormatError for zero, a warning if off by > 1e-6."""
+    if not np.all(np.abs(array) <= MAX_NUMBER):
+        joint = names[np.argwhere(~(np.abs(array) <= MAX_NUMBER))[0][-2]]
+        raise FormatError(f"the rotation of {joint} has a number beyond {MAX_NUMBER:g}", path=path)
     length = np.linalg.norm(array, axis=-1)
     if np.any(length < 1e-6):
         where = np.argwhere(length < 1e-6)[0]
         raise FormatError(f"{_place(where, names)} is zero, which is not a rotation (identity is 0 0 0 1)", path=path)
     off = np.abs(length - 1.0)
-    if np.any(off > _UNIT_TOLERANCE):
-        wrong = np.argwhere(off > _UNIT_TOLERANCE)
+    if np.any(off > _LENGTH_TOLERANCE):
+        wrong = np.argwhere(off > _LENGTH_TOLERANCE)
         first = tuple(wrong[0])
         more = f", and {len(wrong) - 1} more like it" if len(wrong) > 1 else ""
         warnings.warn(
@@ -246,8 +245,7 @@ def unit_rotations(array: Floats, names: Sequence[str], path: FilePath) -> Float
             MotionMindWarning,
             stacklevel=4,
         )
-    # What this code wrote stays bit-identical.
-    changed = off > _WRITTEN_TOLERANCE
+    changed = off > WRITTEN_LENGTH_TOLERANCE
     if changed.any():
         array[changed] = rot.normalise(array[changed])
     return array
@@ -260,7 +258,7 @@ def _place(where: Indices, names: Sequence[str]) -> str:
 
 
 def check_joints(found: Sequence[str], skeleton: Skeleton, path: FilePath) -> None:
-    """Raise FormatError if `found` names a joint that `skeleton` does not have, or lacks one that it has."""
+    """Raise FormatError if `found` names a joint that `skeleton` does not have, or lacks one of its joints."""
     unknown = [name for name in found if name not in skeleton.names]
     if unknown:
         raise FormatError(

@@ -1,8 +1,8 @@
-"""Reads tables of plain decimal numbers, compiled: many times as fast as a parser that takes all that programs write.
+"""Reads tables of plain decimal numbers in compiled code, many times faster than a general parser.
 
-A number of at most 2^53 without its point, and a power of ten up to 10^22, are numbers that double precision holds; so
-one division, or one product, rounds as it should (Clinger, "How to read floating point numbers accurately", PLDI 1990).
-What is longer, or written otherwise, is left to others.
+Double precision holds the digits exactly up to 2^53, and powers of ten up to 10^22; so a single division, or product,
+rounds correctly (Clinger, "How to read floating point numbers accurately", PLDI 1990). Longer numbers and other
+notations are left to the general parser.
 """
 
 from __future__ import annotations
@@ -14,26 +14,26 @@ import numpy as np
 from motionmind._typing import Floats, Pixels
 from motionmind.jit import jit
 
-_TENS = np.array([10.0**power for power in range(23)])
+_POWERS_OF_TEN = np.array([10.0**power for power in range(23)])
 
 
 def read_plain(rows: Sequence[str], columns: int) -> Floats | None:
     """Read a table [rows, columns], one row a line.
 
     Returns:
-        The numbers; None if they are not so many in each row, or one is not plain.
+        The numbers; None if a row has another count, or a number is not plain.
     """
     try:
         text = np.frombuffer("\n".join((*rows, "")).encode("ascii"), np.uint8)
     except UnicodeEncodeError:
         return None
     out = np.empty((len(rows), columns))
-    return out if _parse(text, _TENS, out) else None
+    return out if _parse(text, _POWERS_OF_TEN, out) else None
 
 
 @jit
 def _parse(text: Pixels, tens: Floats, out: Floats) -> bool:
-    """Write the numbers of a text, each line of which ends, to `out` [rows, columns]; return whether all are plain."""
+    """Parse a text of terminated lines into `out` [rows, columns]; return whether all numbers are plain."""
     row, column, at, end = 0, 0, 0, len(text)
     while at < end:
         sign = text[at]

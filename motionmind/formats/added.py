@@ -16,7 +16,7 @@ _GROUP: Group = "motionmind.formats"
 
 @runtime_checkable
 class MotionReader(Protocol):
-    """A format that can be read; packages add one by an entry point in `motionmind.formats`, named after its suffix.
+    """A format to read; packages add one by an entry point in `motionmind.formats`, named after its suffix.
 
     >>> from motionmind.formats import MotionReader
     >>> class Dots:
@@ -31,7 +31,7 @@ class MotionReader(Protocol):
 
         Args:
             path: the file.
-            fps: frames a second, in place of the file's own; None for those.
+            fps: frames a second; None takes the file's own.
 
         Returns:
             The motion, in metres and seconds, Y up, on the file's own skeleton.
@@ -44,7 +44,7 @@ class MotionReader(Protocol):
 
 @runtime_checkable
 class MotionWriter(Protocol):
-    """A format that can be written; the object of one entry point may be a `MotionReader` too.
+    """A format to write; the object of one entry point may also be a `MotionReader`.
 
     >>> from motionmind.formats import MotionWriter
     >>> class Dots:
@@ -57,7 +57,7 @@ class MotionWriter(Protocol):
     """
 
     def motion_bytes(self, motion: Motion) -> bytes:
-        """Return a motion as the bytes of a file, which is written whole or not at all.
+        """Encode a motion as the bytes of a file, which is written whole or not at all.
 
         Raises:
             MotionMindError: the format cannot hold this motion.
@@ -65,21 +65,21 @@ class MotionWriter(Protocol):
         ...
 
     def lossy_fields(self, motion: Motion) -> Sequence[str]:
-        """Name what the format has no place for, in words; nothing if a motion is read again as it was."""
+        """Name in words the parts of a motion that the format cannot hold; empty if nothing is lost."""
         ...
 
 
 def added_suffixes() -> list[str]:
-    """Return the suffixes that installed packages add, sorted; none of the packages is imported."""
+    """Return the suffixes that installed packages add, sorted, without importing the packages."""
     return [f".{name}" for name in added(_GROUP)]
 
 
 def read_added(path: FilePath, fps: float | None) -> Motion:
-    """Read a motion by the added format of the suffix.
+    """Read a motion with the added format of the suffix.
 
     Raises:
         FormatError: the file cannot be read, or the format fails; the message names its package.
-        MotionMindError: the format cannot be imported, or cannot be read.
+        MotionMindError: the format cannot be imported, or does not read.
     """
     name, found = _format(path)
     if not isinstance(found, MotionReader):
@@ -96,10 +96,10 @@ def read_added(path: FilePath, fps: float | None) -> Motion:
 
 
 def write_added(path: FilePath, motion: Motion) -> None:
-    """Write a motion by the added format of the suffix, whole or not at all.
+    """Write a motion with the added format of the suffix, whole or not at all.
 
     Raises:
-        MotionMindError: the format cannot hold this motion, cannot be imported, fails, or cannot be written.
+        MotionMindError: the format cannot hold this motion, cannot be imported, fails, or does not write.
     """
     name, writer = _writer(path)
     try:
@@ -114,7 +114,7 @@ def write_added(path: FilePath, motion: Motion) -> None:
 
 
 def lossy_added(path: FilePath, motion: Motion) -> list[str]:
-    """Name what the added format of the suffix has no place for."""
+    """Name the parts of a motion that the added format of the suffix cannot hold."""
     name, writer = _writer(path)
     try:
         return [str(field) for field in writer.lossy_fields(motion)]
@@ -130,7 +130,7 @@ def _writer(path: FilePath) -> tuple[str, MotionWriter]:
 
 
 def _format(path: FilePath) -> tuple[str, object]:
-    """Return the name of the added format of the suffix, and its object; a class is called to make one."""
+    """Return the name of the suffix's added format, and its object, or an instance if the object is a class."""
     name = Path(path).suffix.lower().removeprefix(".")
     found = load(_GROUP, name)
     try:

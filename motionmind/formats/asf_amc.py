@@ -1,11 +1,11 @@
-"""Reads Acclaim's pair of files, as in CMU's database: a skeleton (ASF) and the movement of that skeleton (AMC).
+"""Reads Acclaim's pair of files, as in CMU's database: a skeleton (ASF) and its movement (AMC).
 
 Sources: M. Schafer, "Acclaim Skeleton File Definition V1.10" (1994), and the note on its lines kept by CMU's graphics
 group, "Acclaim Format - ASF line details" (graphics.cs.cmu.edu/nsp/course/cs229/info/ACCLAIMdef.html).
 
-Each bone becomes a joint where the bone starts. In the joint's frame the bone's end, where its children start, is
-`length * direction`; at rest all joints' axes are the world's. `axis` gives the frame C in which the AMC's angles
-turn by R, so the joint's local rotation is `C R inv(C)`.
+Each bone becomes a joint at its start. In the joint's frame the bone's end, where its children start, is
+`length * direction`; at rest all joints' axes are the world's. `axis` gives the frame C of the AMC's rotation R, so the
+joint's local rotation is `C R inv(C)`.
 
 Rotations apply in the listed order (`dof`, the root's `order`), about fixed axes: "rx ry rz" is Rz Ry Rx.
 
@@ -40,10 +40,10 @@ def read_amc(path: FilePath, asf: FilePath | None = None, *, fps: float = 120.0)
 
     Args:
         path: the AMC file; its stem becomes the motion's name.
-        asf: the skeleton. None takes the ASF in the same folder with the same stem, or with its part before "_"
-            (135_06.amc: 135.asf), or the only one there.
-        fps: frames per second, which the format does not record; CMU recorded at 120. A frame number missing from
-            the file leaves a gap in time.
+        asf: the skeleton. None takes the ASF in the same folder with the same stem, or with the stem's part before "_"
+            (135_06.amc: 135.asf), or the only ASF there.
+        fps: frames per second, which the format does not record; CMU recorded at 120. A missing frame number leaves a
+            gap in time.
 
     Returns:
         The motion, in metres and seconds, starting at time 0.
@@ -59,10 +59,10 @@ def read_amc(path: FilePath, asf: FilePath | None = None, *, fps: float = 120.0)
     lines = read_lines(path)
     acclaim = read_asf(asf if asf is not None else _find_asf(path))
     numbers, values, degrees = _read_frames(lines, acclaim, path)
-    check_size(len(values), max(len(acclaim.bones) - values.shape[1], 1), str(path))  # the rest are written out
+    check_size(len(values), max(len(acclaim.bones) - values.shape[1], 1), str(path))  # the file holds the rest
     rotations, root, ignored = _assemble(acclaim, values, degrees)
     if ignored:
-        message = f"{path}: changes of the length or place of {enumerated(ignored)} are left out"
+        message = f"{path}: changes of the length or place of {enumerated(ignored)} are ignored"
         warnings.warn(message, MotionMindWarning, stacklevel=2)
     times = (numbers - numbers[0]) / fps
     return Motion(acclaim.skeleton(), rotations, root * acclaim.scale, times, name=name_of(path))
@@ -108,7 +108,7 @@ def _find_asf(path: FilePath) -> Path:
     if len(found) == 1:
         return found[0]
     there = f"there are {enumerated(file.name for file in found)}" if found else "there is none"
-    raise FormatError(f"its skeleton, an .asf file, was not found in {folder} ({there}): name it", path=path)
+    raise FormatError(f"its skeleton, an .asf file, was not found in {folder} ({there}): give its path", path=path)
 
 
 def _read_frames(lines: list[str], acclaim: Acclaim, path: FilePath) -> tuple[Floats, Floats, bool]:
@@ -165,7 +165,7 @@ def _frame_number(word: str, before: list[int], path: FilePath, line: int) -> in
 def _refuse_bone(
     words: list[str], columns: dict[str, slice], *, acclaim: Acclaim, path: FilePath, line: int
 ) -> NoReturn:
-    """Raise FormatError for a line that gives none of the bones that its frame still lacks."""
+    """Raise FormatError for a line that does not match any bone missing from its frame."""
     name = words[0]
     if name not in columns:
         if name in acclaim.bones:

@@ -1,9 +1,9 @@
 """Reads and writes BVH (Biovision hierarchy) files: movement of any tree of joints.
 
-The format has no standard. The reader accepts what programs write, after the description by M. Meredith and
-S. Maddock, "Motion capture file formats explained", University of Sheffield, CS-01-11 (2001): rotation channels apply
-in the listed order, each about axes turned by those before it; position channels, wherever they are listed, move the
-joint in its parent's frame and replace its OFFSET.
+The format has no standard. The reader accepts programs' files, after the description by M. Meredith and S. Maddock,
+"Motion capture file formats explained", University of Sheffield, CS-01-11 (2001): rotation channels apply in the listed
+order, each about axes turned by the previous ones; position channels, anywhere in the list, move the joint in its
+parent's frame and replace its OFFSET.
 """
 
 from __future__ import annotations
@@ -24,17 +24,13 @@ from motionmind.files import FilePath, name_of, write_atomically
 from motionmind.formats._bvh_hierarchy import BvhJoint, is_comment, read_hierarchy
 from motionmind.formats._bvh_rig import NormalisedRig, Placed, normalise
 from motionmind.formats._clock import even_step
-from motionmind.formats.text import LARGEST, read_lines, to_number, to_numbers
+from motionmind.formats.text import MAX_NUMBER, read_lines, to_number, to_numbers
 from motionmind.formats.units import guess_unit, metres_per_unit
 from motionmind.geometry import rotations as rot
 
 _FRAMES = re.compile(r"\s*Frames\s*:?\s*(\S*)\s*", re.IGNORECASE)
 _FRAME_TIME = re.compile(r"\s*Frame\s*Time\s*:?\s*(\S*)\s*", re.IGNORECASE)
-
-_SEVERAL = 12  # frames, and joints, of which one expects some movement
-_SLOWEST = 2.0  # seconds from frame to frame of a movement
-_HARDLY = (1.0, 5.5)  # degrees that some joint turns by at most, if these are radians: pi about each of three axes
-_MANY = 10_000  # numbers that compiled code reads, if all are plain
+_MIN_MOVING_COUNT = 12  # this many frames, and joints, should show some movement
 
 _log = logging.getLogger(__name__)
 
@@ -47,9 +43,9 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None, fps: float | No
 
     Constant position channels of a joint other than the root replace its OFFSET. If they vary and the joint carries
     most of the body, it becomes the root, with its ancestors folded in (Bandai-Namco's `joint_Root` stays at the
-    origin while `Hips` moves); otherwise its mean place is kept, and a warning gives its largest departure. If
-    position channels are near 0 while the offsets are not, the two are added, as old exporters of Blender meant; a
-    warning says so.
+    origin while `Hips` moves); otherwise the joint stays at its mean place, and a warning gives its largest distance
+    from there. If position channels are near 0 while the offsets are not, the two are added, with a warning, as old
+    exporters of Blender meant.
 
     Args:
         path: the file; its stem becomes the name of the skeleton and of the motion.
@@ -65,8 +61,7 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None, fps: float | No
         MotionMindError: `unit` or `fps` is invalid.
 
     Warns:
-        MotionMindWarning: something was repaired, as described above; or the frame time, or all angles, are such as
-            nobody means.
+        MotionMindWarning: something was repaired, as described above; or the frame time or all angles are implausible.
     """
     if fps is not None and not 0.0 < fps <= FASTEST:
         raise MotionMindError(f"fps must be a positive number of frames a second, {FASTEST:g} at most, not {fps}")
@@ -77,7 +72,7 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None, fps: float | No
         _log.info("%s: one unit taken as %.5g m (%s), by the height of the body", path, scale, name)
     else:
         scale = metres_per_unit(unit)
-    for message in (*body.repairs(scale), *_doubts(body, stated if fps is None else 0.0)):
+    for message in (*body.repairs(scale), *_implausible(body, stated if fps is None else 0.0)):
         warnings.warn(f"{path}: {message}", MotionMindWarning, stacklevel=2)
     raw = body.skeleton
     return Motion(
@@ -89,21 +84,21 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None, fps: float | No
     )
 
 
-def _doubts(body: NormalisedRig, frame_time: float) -> Iterator[str]:
-    """Say what nobody can have meant: frames that are seconds apart, and angles that are no degrees."""
-    if len(body.root) >= _SEVERAL and frame_time > _SLOWEST:
+def _implausible(body: NormalisedRig, frame_time: float) -> Iterator[str]:
+    """Describe faults of the units: frames more than 2 seconds apart, and angles in radians."""
+    if len(body.root) >= _MIN_MOVING_COUNT and frame_time > 2.0:
         yield (
-            f"Frame Time is {frame_time:g}, the seconds from frame to frame: milliseconds, or frames a second, do not "
-            "belong there (--source-fps sets it right)"
+            f"Frame Time is {frame_time:g} seconds; is it in milliseconds, or frames a second? (--source-fps "
+            "overrides it)"
         )
-    if min(body.rotations.shape[:2]) < _SEVERAL:
+    if min(body.rotations.shape[:2]) < _MIN_MOVING_COUNT:
         return
-    for step in (-(-len(body.root) // _SEVERAL), 1):  # some frames show of most files that angles are degrees
-        most = float(np.degrees(rot.angle(body.rotations[::step], rot.IDENTITY).max()))
-        if not most < _HARDLY[1]:
+    for step in (-(-len(body.root) // _MIN_MOVING_COUNT), 1):  # in most files some frames prove degrees
+        largest = float(np.degrees(rot.angle(body.rotations[::step], rot.IDENTITY).max()))
+        if not largest < 5.5:  # pi about each of three axes, read as degrees
             return
-    if most > _HARDLY[0]:
-        yield f"no joint turns by more than {most:.2g} degrees: are its angles in radians? BVH has degrees"
+    if largest > 1.0:
+        yield f"no joint turns by more than {largest:.2g} degrees: are its angles in radians? BVH has degrees"
 
 
 def bvh_unit(path: FilePath) -> tuple[str, float]:
@@ -123,7 +118,7 @@ def _read_body(path: FilePath) -> tuple[NormalisedRig, float]:
         raise FormatError("no joint has CHANNELS: nothing can move", path=path, line=start + 1)
     declared, frame_time, first = _read_motion_header(lines, start + 1, path)
     values = _read_frames(lines, first, channels, declared, path)
-    check_size(len(values), max(len(joints) - channels, 1), str(path))  # the rest are as many as the file is long
+    check_size(len(values), max(len(joints) - channels, 1), str(path))  # the file holds the rest
     body = normalise(_assemble(joints, values, name_of(path)))
     if declared != len(values):
         body.notes.append(
@@ -170,30 +165,30 @@ def _read_frames(lines: list[str], first: int, channels: int, declared: int, pat
     rows = [(n, line) for n, line in enumerate(lines[first:], start=first + 1) if line.strip() and not is_comment(line)]
     if not rows:
         raise FormatError("no frames after the header", path=path, line=len(lines))
-    if len(rows) * channels >= _MANY:
+    if len(rows) * channels >= 10_000:
         from motionmind.formats._numbers import read_plain  # numba is slow to import
 
         plain = read_plain([line for _, line in rows], channels)
-        if plain is not None and np.all(np.abs(plain) <= LARGEST):
+        if plain is not None and np.all(np.abs(plain) <= MAX_NUMBER):
             return plain
     try:
         frames = np.loadtxt([line for _, line in rows], dtype=np.float64, comments=None, ndmin=2)
     except ValueError:  # a word that is not a number, or lines of different lengths
-        return _read_odd_frames(rows, channels, declared, path)
-    if frames.shape[1] != channels or not np.all(np.abs(frames) <= LARGEST):  # false for NaN too
-        return _read_odd_frames(rows, channels, declared, path)
+        return _read_irregular_frames(rows, channels, declared, path)
+    if frames.shape[1] != channels or not np.all(np.abs(frames) <= MAX_NUMBER):  # false for NaN too
+        return _read_irregular_frames(rows, channels, declared, path)
     return frames
 
 
-def _read_odd_frames(rows: list[tuple[int, str]], channels: int, declared: int, path: FilePath) -> Floats:
+def _read_irregular_frames(rows: list[tuple[int, str]], channels: int, declared: int, path: FilePath) -> Floats:
     """Read frames word by word, to name the first fault or accept frames that wrap over lines."""
     values = [to_numbers(line.split(), path, number) for number, line in rows]
     flat = np.array([value for row in values for value in row])
-    odd = next((i for i, row in enumerate(values) if len(row) != channels), None)
-    if odd is None or len(flat) == declared * channels:
+    irregular = next((i for i, row in enumerate(values) if len(row) != channels), None)
+    if irregular is None or len(flat) == declared * channels:
         return flat.reshape(-1, channels)
-    fault = f"the line holds {len(values[odd])} numbers, a frame of this file has {channels}"
-    raise FormatError(fault, path=path, line=rows[odd][0])
+    fault = f"the line holds {len(values[irregular])} numbers, a frame of this file has {channels}"
+    raise FormatError(fault, path=path, line=rows[irregular][0])
 
 
 def _assemble(joints: list[BvhJoint], values: Floats, name: str) -> Placed:
@@ -232,10 +227,7 @@ def _assemble(joints: list[BvhJoint], values: Floats, name: str) -> Placed:
 # --- writing -------------------------------------------------------------------------------------------------------
 
 
-# The commonest order (MotionBuilder's, Bandai-Namco's), which most readers have met. Euler angles lock where the middle
-# rotation is 90 degrees; about x that is rarer in arms, which a T-pose stretches along x.
-_ORDER = "ZXY"
-_MADE = " "  # ends the line of a frame that the engine made
+_INSERTED_LINE_END = " "  # of a frame that the engine inserted
 
 
 def write_bvh(path: FilePath, motion: Motion, unit: str | float = "cm") -> None:
@@ -244,7 +236,7 @@ def write_bvh(path: FilePath, motion: Motion, unit: str | float = "cm") -> None:
     Read back with the same unit, rotations agree to 1e-6 rad and positions to 1e-6 m. Joints come in depth-first
     order, as the format requires. Each leaf has an End Site at its tip (0 0 0 for none). The first time becomes 0.
     Angles are unwrapped: a reader that blends neighbouring frames sees no jump of 360 degrees. The line of a frame that
-    the engine made ends in a blank, which readers pass over, and by which `holds_made` knows it.
+    the engine inserted ends in a blank, which readers skip and `has_inserted_frames` recognises.
 
     Args:
         path: the file to write.
@@ -264,24 +256,26 @@ def write_bvh(path: FilePath, motion: Motion, unit: str | float = "cm") -> None:
     digits = max(0, int(np.ceil(8.0 - np.log10(scale))))
     lines = ["HIERARCHY", *_hierarchy_lines(skeleton, order, scale, digits), "MOTION"]
     lines += [f"Frames: {len(motion)}", f"Frame Time: {step:.12g}"]
-    degrees = np.degrees(np.unwrap(rot.to_euler(_ORDER, motion.rotations[:, order]), axis=0))
+    # ZXY is the commonest order (MotionBuilder's, Bandai-Namco's). Euler angles lock where the middle rotation is 90
+    # degrees; about x that is rarer in arms, which a T-pose stretches along x.
+    degrees = np.degrees(np.unwrap(rot.to_euler("ZXY", motion.rotations[:, order]), axis=0))
     # Adding 0 turns -0, printed with its sign, into 0.
     root = np.round(motion.root * scale, digits) + 0.0
     values = np.concatenate([root, np.round(degrees, 6).reshape(len(motion), -1) + 0.0], axis=1)
     row = " ".join([f"%.{digits}f"] * 3 + ["%.6f"] * (3 * len(skeleton)))
-    ends = [_MADE if made else "" for made in motion.inserted()]
+    ends = [_INSERTED_LINE_END if inserted else "" for inserted in motion.inserted()]
     lines += [row % tuple(frame.tolist()) + end for frame, end in zip(values, ends, strict=True)]
     write_atomically(path, ("\n".join(lines) + "\n").encode())
 
 
-def holds_made(path: FilePath) -> bool:
-    """Return whether lines of a file say that the engine made some of its frames.
+def has_inserted_frames(path: FilePath) -> bool:
+    """Return whether the ends of a file's lines mark frames that the engine inserted.
 
-    The first frame, which it never made, ends in no blank then; some exporters end all lines so.
+    The engine never inserts the first frame; if its line ends in a blank too, an exporter ends all lines this way.
     """
     lines = read_lines(path)
     start = next((n for n, line in enumerate(lines, 1) if line.startswith("Frame Time:")), len(lines))
-    frames = [line.endswith(_MADE) for line in lines[start:] if line.strip()]
+    frames = [line.endswith(_INSERTED_LINE_END) for line in lines[start:] if line.strip()]
     return any(frames) and not frames[0]
 
 

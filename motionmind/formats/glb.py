@@ -5,17 +5,16 @@ glTF's world is ours (3.4): metres, y up, a person faces +z; its quaternions are
 
 The layout makes programs recognise an armature:
 
-- One node per joint, with the joint's name, in the skeleton's tree; these nodes alone are the skin's joints. Leaves get
-  no end bones: a bone in glTF is a frame without a length, readers choose lengths themselves, and extra bones would
-  come back from every program that the file passes through. Tips show in the mesh.
+- One node per joint, with the joint's name, in the skeleton's tree; only these nodes are the skin's joints. Leaves get
+  no end bones: a bone in glTF is a frame without a length, readers choose lengths themselves, and every program that
+  rewrites the file would return extra bones. Tips show in the mesh.
 - The skin's inverse bind matrices define the rest pose: identity rotations, the lowest point on the floor, x = z = 0.
-  Nodes stand there too, for programs that take the rest pose from them.
+  Nodes have this pose too, for programs that take the rest pose from them.
 - A mesh on that skin (`_glb_body`): an unused skin is a fault, and an animation without a skin is not an armature.
-- One animation that rotates all joints and moves the root. A single frame has no animation; its nodes stand in the
-  posture instead, where programs show it without playing anything. The skin still holds the rest pose.
-- What glTF has no place for (the stretches that the engine made, credits, whether frames are keyframes, far ends of
-  bones) is text in the root joint's `extras` (3.12): Blender keeps it there, as a custom property of the bone, and
-  writes it again if asked to.
+- One animation that rotates all joints and moves the root. A single frame has no animation: its nodes have the posture
+  instead, which programs show without playing. The skin still holds the rest pose.
+- Text in the root joint's `extras` (3.12) holds the rest (insertions, credits, whether frames are keyframes, tips of
+  bones): Blender keeps it as a custom property of the bone, and exports it on request.
 """
 
 from __future__ import annotations
@@ -34,28 +33,25 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, name_of, write_atomically
 from motionmind.formats._glb_body import COLOURS, Mesh, body_mesh
-from motionmind.formats._json import MARKS, MarksSchema, insertion_schema, rounded
+from motionmind.formats._gltf import COMPONENT_DTYPES, N_COMPONENTS
+from motionmind.formats._json import MARKS_KEY, MarksSchema, insertion_schema, rounded
 from motionmind.geometry import rotations as rot
 
-# The format's constants: 3.6.2.2 and 5.11.5.
-_UNSIGNED_SHORT, _UNSIGNED_INT, _FLOAT = 5123, 5125, 5126
-_VERTICES, _INDICES = 34962, 34963  # the target of a buffer view
-_TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
-_LONGEST = 1e6  # metres; single precision is off by centimetres there, and by more beyond
+_VERTICES, _INDICES = 34962, 34963  # targets of a buffer view (5.11.5)
 
 
 def write_glb(path: FilePath, motion: Motion, *, has_root: bool = False) -> None:
     """Write `motion` as binary glTF.
 
-    Interpolated (rotations by slerp, root linearly), all joints are where `motion` has them, to the seven digits of
-    single precision. The first time becomes 0. Neighbouring quaternions lie in the same hemisphere, so readers that
-    blend their components never turn the long way round. The same motion gives the same bytes.
+    Interpolated (rotations by slerp, root linearly), all joints agree with `motion` to the seven digits of single
+    precision. The first time becomes 0. Neighbouring quaternions lie in the same hemisphere, so readers that blend
+    their components never turn the long way round. The same motion gives the same bytes.
 
     Args:
         path: the file to write.
         motion: the movement, on any skeleton.
-        has_root: whether to hang the body from a bone called "root", which stays on the floor at the origin, unless its
-            own root is called so.
+        has_root: whether to put the body under a bone "root" that stays on the floor at the origin, unless its own
+            root has this name.
 
     Raises:
         MotionMindError: the body or its path is longer than 1000 km, times are too close together for single
@@ -64,7 +60,7 @@ def write_glb(path: FilePath, motion: Motion, *, has_root: bool = False) -> None
     skeleton = motion.skeleton
     name = motion.name or skeleton.name
     for what, lengths in (("root", motion.root), ("offsets", skeleton.offsets), ("tips", skeleton.tips)):
-        if np.abs(lengths).max() > _LONGEST:
+        if np.abs(lengths).max() > 1e6:  # metres; single precision is off by centimetres there
             raise MotionMindError(f"{name}: {what}: GLB cannot hold {np.abs(lengths).max():.3g} metres")
     rest = at_rest(skeleton)
     moving, has_root = len(motion) > 1, has_root and skeleton.names[0].lower() != "root"
@@ -91,7 +87,7 @@ def write_glb(path: FilePath, motion: Motion, *, has_root: bool = False) -> None
     }
     if moving:
         document["animations"] = [animation_of(buffer, motion, name)]
-    document["nodes"][0]["extras"] = {MARKS: _marks(path, motion)}
+    document["nodes"][0]["extras"] = {MARKS_KEY: _marks(path, motion)}
     if has_root:
         document["scenes"][0]["nodes"] = [len(skeleton) + 1, len(skeleton)]
         document["nodes"].append({"name": "root", "children": [0]})
@@ -107,8 +103,8 @@ def write_glb(path: FilePath, motion: Motion, *, has_root: bool = False) -> None
 
 
 def _marks(path: FilePath, motion: Motion) -> str:
-    """Return what glTF has no place for, as JSON of MarksSchema, times from the first frame's on; "{}" if nothing."""
-    # Movement is read under the file's name, and given movement is credited by its own.
+    """Return JSON of MarksSchema: all that glTF cannot hold, with times from the first frame on; "{}" if nothing."""
+    # A file's movement takes the file's name, but credits of given movement its own.
     recorded = motion.own_credits if motion.name and motion.name != name_of(path) else motion.recorded
     insertions = [insertion_schema(one, float(motion.times[0])) for one in motion.insertions]
     body = motion.skeleton
@@ -141,13 +137,14 @@ class GlbBuffer:
     def accessor(self, view: int, array: NDArray[Any], *, offset: int = 0, bounds: bool = False) -> int:
         """Add an accessor to a view from byte `offset` on, for an array of this shape and type; return its index."""
         rows = array.reshape(len(array), -1)
-        component_types = {"<u2": _UNSIGNED_SHORT, "<u4": _UNSIGNED_INT, "<f4": _FLOAT}
+        component_types = {dtype: code for code, dtype in COMPONENT_DTYPES.items()}
+        types = {count: name for name, count in N_COMPONENTS.items()}
         accessor = {
             "bufferView": view,
             "byteOffset": offset,
             "componentType": component_types[array.dtype.str],
             "count": len(rows),
-            "type": _TYPES[rows.shape[1]],
+            "type": types[rows.shape[1]],
         }
         if bounds:
             accessor |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
@@ -177,7 +174,7 @@ def container(document: dict[str, Any], data: bytes, name: str) -> bytes:
 
 
 def at_rest(skeleton: Skeleton) -> Floats:
-    """Return the joints' places at rest [J, 3], metres: the root above the origin, the body's lowest point at 0."""
+    """Return the joints' places at rest [J, 3], metres: the root above the origin, the lowest point at height 0."""
     lowest = skeleton.rest[:, 1].min()
     return np.asarray(skeleton.rest[: len(skeleton)] - np.array([0.0, lowest, 0.0]))
 

@@ -1,12 +1,12 @@
-"""Reads glTF 2.0 (`.glb`, `.gltf`) and what is made of it: VRM bodies (`.vrm`) and VRM animations (`.vrma`).
+"""Reads glTF 2.0 (`.glb`, `.gltf`) and formats based on it: VRM bodies (`.vrm`) and VRM animations (`.vrma`).
 
 Section numbers refer to "glTF 2.0 Specification", version 2.0.1, The Khronos Group (2021).
 
-The body is the nodes that are a person's bones, if the file says so (VRM), else the joints of its skins, else the nodes
-that move; with all nodes between them. Frames of bones are turned in every direction at rest, so that the movement is
-read onto joints whose axes at rest are the world's: with all rotations 0 the skeleton is in the file's rest pose. That
-is the pose in which the mesh was bound to the joints (3.7.3), or, without one, the one in which the nodes stand; or, if
-these stand as in a frame of the movement, that of no rotations.
+The body consists of the nodes that the file lists as a person's bones (VRM), else of the joints of its skins, else of
+the animated nodes; with all nodes between them. Frames of bones may point anywhere at rest, so the movement is read
+onto joints whose axes at rest are the world's: with all rotations 0 the skeleton is in the file's rest pose. This is
+the pose in which the mesh was bound to the joints (3.7.3); without a mesh, the nodes' pose; or, if that is a frame of
+the movement, the pose of zero rotations.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from motionmind.formats import _json
 from motionmind.formats._bvh_rig import NormalisedRig, Placed, normalise
 from motionmind.formats._gltf import Animation, Gltf, Humanoid, read_container
 from motionmind.formats._gltf_poses import (
-    KINDS,
-    MOMENT,
+    PATH_TYPES,
+    SAME_KEY_S,
     Track,
     Tracks,
     globals_at,
@@ -38,25 +38,20 @@ from motionmind.formats._gltf_poses import (
     rest_pose,
     skeleton_at,
 )
-from motionmind.formats._json import MARKS, MarksSchema
-from motionmind.formats.text import LARGEST, MOST_JOINTS
+from motionmind.formats._json import MARKS_KEY, MarksSchema
+from motionmind.formats.text import MAX_JOINTS, MAX_NUMBER
 from motionmind.formats.units import bone_span, metres_per_unit
 from motionmind.geometry import rotations as rot
 
-_HUMANOIDS = ("VRMC_vrm", "VRMC_vrm_animation", "VRM")  # extensions that name a person's bones
-_SAMPLED = 30.0  # frames a second of curves and jumps, where the file has no even clock that is faster
-_UNEVEN = 0.02  # share of a step by which keys may be off an even clock
-_SPARSE = 4  # keys may lack from an even clock so that it has so many times as many
-_STILL = 1e-5  # share of the body's span by which a joint may be off its place at rest
-_UPRIGHT = 0.8  # likeness of a body's bones at rest to ours, if it stands as ours does
+_CURVE_FPS = 30.0  # of curves and jumps, unless the file has a faster even clock
 
 
 def read_gltf(path: FilePath, *, unit: str | float | None = None) -> Motion:
     """Read a motion from glTF, on the file's own bones; a file without animation is a posture, one frame.
 
-    Frames stand at the file's keys, on an even clock where these lie on one; curves and jumps between keys are sampled,
-    at the clock's rate or 30 frames a second. Of several animations the first that moves the body is read, with a
-    warning. What MotionMind wrote comes back, marks of insertions included.
+    There is a frame at each key, or at each tick of the even clock that the keys lie on; curves and jumps between keys
+    are sampled at the clock's rate or 30 frames a second. If there are several animations, the first that moves the
+    body is read, with a warning. MotionMind's own files come back whole, marks of insertions included.
 
     Args:
         path: the file; its stem becomes the motion's name.
@@ -66,7 +61,7 @@ def read_gltf(path: FilePath, *, unit: str | float | None = None) -> Motion:
         The motion, in metres and seconds, starting at time 0.
 
     Raises:
-        FormatError: the file does not exist, is not glTF 2, holds no body, or compresses what is needed.
+        FormatError: the file does not exist, is not glTF 2, holds no body, or compresses its movement.
         MotionMindError: `unit` is invalid, or there are too many frames.
 
     Warns:
@@ -82,7 +77,7 @@ def read_gltf(path: FilePath, *, unit: str | float | None = None) -> Motion:
 
 
 def _read(gltf: Gltf, scale: float) -> Motion:
-    """Read the motion; lengths in units of `scale` metres."""
+    """Read the motion; lengths are in units of `scale` metres."""
     parents = _parents(gltf)
     names, skins = _bone_names(gltf), _skins(gltf)
     is_person = bool(names)
@@ -99,8 +94,8 @@ def _read(gltf: Gltf, scale: float) -> Motion:
     rest_turns, rest = rot.inv_mul(heading, rest_turns), rot.mul_vec(rot.inv(heading), rest)
     turns, places = globals_at(gltf, parents, joints, tracks, times)
     for what, array in (("rest pose", rest), ("movement", places)):
-        if not np.all(np.abs(array) <= LARGEST):
-            raise gltf.fault(f"its {what} reaches beyond {LARGEST:g} m")
+        if not np.all(np.abs(array) <= MAX_NUMBER):
+            raise gltf.fault(f"its {what} reaches beyond {MAX_NUMBER:g} m")
     if others:
         warnings.warn(
             f"{gltf.path}: the first animation that moves is read, not {enumerated(others)}", MotionMindWarning, 5
@@ -149,8 +144,8 @@ def _parents(gltf: Gltf) -> list[int]:
 
 
 def _bone_names(gltf: Gltf) -> dict[int, str]:
-    """Return the nodes that are bones of a person, as VRM says, with VRM's names; empty if it does not."""
-    for extension in _HUMANOIDS:
+    """Return {node: VRM's name} of a person's bones, as VRM's extensions list them; empty without them."""
+    for extension in ("VRMC_vrm", "VRMC_vrm_animation", "VRM"):
         if extension in gltf.document.extensions:
             bones = _json.decode(bytes(gltf.document.extensions[extension]), Humanoid, gltf.path).humanoid.human_bones
             rows = bones.items() if isinstance(bones, dict) else [(bone.bone, bone) for bone in bones]
@@ -174,26 +169,26 @@ def _find_joints(
             warnings.warn(message, MotionMindWarning, 6)
     wanted = wanted or moving
     if not wanted:
-        raise gltf.fault("no skin, no person's bones and no animation of nodes: nothing that moves")
-    if len(wanted) > MOST_JOINTS:
-        raise gltf.fault(f"{len(wanted)} joints are more than a body has, {MOST_JOINTS}")
+        raise gltf.fault("nothing moves: there is no skin, no person's bone and no animation of nodes")
+    if len(wanted) > MAX_JOINTS:
+        raise gltf.fault(f"{len(wanted)} joints are more than a body has, {MAX_JOINTS}")
     line = lineage(parents, wanted)
     tops = [node for node in line if parents[node] < 0]
     if len(tops) > 1:
-        raise gltf.fault(f"its joints hang from {len(tops)} roots, not from one")
-    # Nodes above the body move it, and are not joints: from the first that is one, or that two branches hang from.
+        raise gltf.fault(f"its joints have {len(tops)} roots; a body has one")
+    # The body begins at the first joint or branch; nodes above it move it but are not joints.
     below = dict.fromkeys(line, 0)
     for node in line[1:]:
         below[parents[node]] += 1
     top = next(node for node in line if node in wanted or below[node] > 1)
     joints = line[line.index(top) :]
-    if len(joints) > MOST_JOINTS:
-        raise gltf.fault(f"{len(joints)} joints are more than a body has, {MOST_JOINTS}")
+    if len(joints) > MAX_JOINTS:
+        raise gltf.fault(f"{len(joints)} joints are more than a body has, {MAX_JOINTS}")
     return joints, name
 
 
 def _skins(gltf: Gltf) -> list[tuple[str, set[int]]]:
-    """Return the names and joints of bodies, the largest first: skins that share joints are one body's."""
+    """Return the names and joints of bodies, the largest first; skins that share joints belong to one body."""
     groups: list[tuple[str, set[int]]] = []
     for number, skin in enumerate(gltf.document.skins):
         for node in skin.joints:
@@ -207,7 +202,7 @@ def _skins(gltf: Gltf) -> list[tuple[str, set[int]]]:
 
 
 def _distinct(names: list[str]) -> tuple[str, ...]:
-    """Return names of which none is another's, by numbers after those that are."""
+    """Make names unique by appending numbers to repeated ones."""
     found: dict[str, None] = {}
     for name in names:
         unique, number = name, 1
@@ -222,14 +217,17 @@ def _distinct(names: list[str]) -> tuple[str, ...]:
 
 
 def _find_tracks(gltf: Gltf, body: set[int]) -> tuple[Tracks, list[str]]:
-    """Return the tracks of the first animation that moves nodes of `body`, any if that is empty; and others' names.
+    """Return the tracks of the first animation that moves nodes of `body`, and the other animations' names.
 
-    Animations of one key are poses: they count where there is nothing else. Several of one node each are one movement.
+    If `body` is empty, any nodes count. Animations of one key are poses, read only if there is nothing else. Several
+    animations of one node each make up one movement.
     """
     animations = [
         one
         for one in gltf.document.animations
-        if any(channel.target.path in KINDS and (channel.target.node in body or not body) for channel in one.channels)
+        if any(
+            channel.target.path in PATH_TYPES and (channel.target.node in body or not body) for channel in one.channels
+        )
     ]
     animations.sort(key=lambda one: _is_pose(gltf, one))  # keeps their order otherwise
     moving = [one for one in animations if not _is_pose(gltf, one)]
@@ -237,7 +235,7 @@ def _find_tracks(gltf: Gltf, body: set[int]) -> tuple[Tracks, list[str]]:
     if (
         len(moving) > 1
         and len({*targets}) == len(targets)
-        and all(len({way.target.node for way in one.channels}) == 1 for one in moving)
+        and all(len({channel.target.node for channel in one.channels}) == 1 for one in moving)
     ):
         return {key: track for one in moving for key, track in _tracks(gltf, one).items()}, []
     names = [one.name or "one without a name" for one in animations[1:]]
@@ -245,7 +243,7 @@ def _find_tracks(gltf: Gltf, body: set[int]) -> tuple[Tracks, list[str]]:
 
 
 def _is_pose(gltf: Gltf, animation: Animation) -> bool:
-    """Return whether an animation has one key alone."""
+    """Return whether an animation has only one key."""
     rows = gltf.document.accessors
     return all(not 0 <= one.input < len(rows) or rows[one.input].count <= 1 for one in animation.samplers)
 
@@ -255,13 +253,13 @@ def _tracks(gltf: Gltf, animation: Animation) -> Tracks:
     found: Tracks = {}
     for number, channel in enumerate(animation.channels):
         node, path = channel.target.node, channel.target.path
-        if node is None or path not in KINDS:
+        if node is None or path not in PATH_TYPES:
             continue
         what = f"animation {animation.name or 'without a name'}, channel {number}"
         gltf.member(gltf.document.nodes, node, f"{what}: node")
         sampler = gltf.member(animation.samplers, channel.sampler, f"{what}: sampler")
         times = gltf.numbers(sampler.input, "SCALAR", what)[:, 0]
-        values = gltf.numbers(sampler.output, KINDS[path], what)
+        values = gltf.numbers(sampler.output, PATH_TYPES[path], what)
         if sampler.interpolation not in ("LINEAR", "STEP", "CUBICSPLINE"):
             raise gltf.fault(f"{what}: interpolation {sampler.interpolation!r} is unknown")
         if np.any(np.diff(times) <= 0.0):
@@ -272,7 +270,7 @@ def _tracks(gltf: Gltf, animation: Animation) -> Tracks:
         values = values.reshape(len(times), 3, -1) if curve else values
         if path == "rotation":
             keys = values[:, 1] if curve else values
-            if not np.all(rot.norm(keys) > _STILL):
+            if not np.all(rot.norm(keys) > 1e-5):
                 raise gltf.fault(f"{what}: a rotation is zero")
             values = values if curve else rot.normalise(values)
         found[node, path] = Track(times, values, sampler.interpolation)
@@ -284,22 +282,23 @@ def _clock(tracks: Tracks, joints: int, name: str) -> Floats:
     if not tracks:
         return np.zeros(1)
     times = np.unique(np.concatenate([track.times for track in tracks.values()]))
-    times = times[np.concatenate([[True], np.diff(times) > max(MOMENT, 1e-6 * float(np.abs(times).max()))])]
+    times = times[np.concatenate([[True], np.diff(times) > max(SAME_KEY_S, 1e-6 * float(np.abs(times).max()))])]
     check_size(len(times), joints, name)
     if len(times) == 1:
         return np.asarray(times)
     span, step = float(times[-1] - times[0]), float(np.median(np.diff(times)))
     frames = np.round((times - times[0]) / step)
-    even = bool(np.all(np.abs(times - times[0] - frames * step) <= _UNEVEN * step))
-    even = even and len(np.unique(frames)) == len(frames) and frames[-1] < _SPARSE * len(times)
+    # Keys are even within 2 % of a step, and fill a quarter of the clock's ticks.
+    even = bool(np.all(np.abs(times - times[0] - frames * step) <= 0.02 * step))
+    even = even and len(np.unique(frames)) == len(frames) and frames[-1] < 4 * len(times)
     check_size(frames[-1] + 1.0 if even else 1.0, joints, name)
-    rate = frames[-1] / span if even else _SAMPLED
+    rate = frames[-1] / span if even else _CURVE_FPS
     if abs(round(rate, 2) - rate) < 1e-5 * rate:
         rate = round(rate, 2)  # times have seven digits
     if all(track.kind == "LINEAR" or len(track.times) == 1 for track in tracks.values()):
         return np.asarray(times[0] + np.arange(frames[-1] + 1) / rate if even else times)
     if rate < FILM_RATE:
-        rate *= float(np.ceil(_SAMPLED / rate))
+        rate *= float(np.ceil(_CURVE_FPS / rate))
     count = np.floor(span * rate + 1e-3)
     check_size(count + 1.0, joints, name)
     return np.asarray(times[0] + np.arange(count + 1) / rate)
@@ -311,32 +310,33 @@ def _placed(skeleton: Skeleton, turned: Floats, places: Floats) -> NormalisedRig
     moved = {0: places[:, 0]}
     for joint, parent in enumerate(skeleton.parents[1:], start=1):
         place = rot.mul_vec(rot.inv(turned[:, parent]), places[:, joint] - places[:, parent])
-        if np.abs(place - skeleton.offsets[joint]).max() > _STILL * span:
+        if np.abs(place - skeleton.offsets[joint]).max() > 1e-5 * span:
             moved[joint] = place
     return normalise(Placed(skeleton, skeleton.local_rotations(turned), moved))
 
 
-# --- what glTF has no place for -------------------------------------------------------------------------------------
+# --- marks ----------------------------------------------------------------------------------------------------------
 
 
 def _marks(gltf: Gltf) -> MarksSchema:
-    """Return the marks in a node's extras; none if there are none, or others than ours."""
+    """Return the marks in a node's extras; empty ones if there are none of MotionMind's."""
     for node in gltf.document.nodes:
-        if MARKS.encode() in bytes(node.extras):
+        if MARKS_KEY.encode() in bytes(node.extras):
             try:
-                return msgspec.json.decode(msgspec.json.decode(node.extras)[MARKS], type=MarksSchema)
+                return msgspec.json.decode(msgspec.json.decode(node.extras)[MARKS_KEY], type=MarksSchema)
             except (msgspec.MsgspecError, KeyError, TypeError, RecursionError, ValueError):
                 continue
     return MarksSchema()
 
 
 def _with_tips(skeleton: Skeleton, marks: MarksSchema, scale: float) -> Skeleton:
-    """Return the skeleton in metres, with far ends: as in the marks, or as on a body of ours that it is."""
+    """Return the skeleton in metres, with tips from the marks, or from the built-in body with the same joints."""
     body = replace(skeleton, offsets=skeleton.offsets * scale)
     tips = np.array([marks.tips.get(name, (0.0, 0.0, 0.0)) for name in body.names])
     ours = next((make() for make in BODIES.values() if make().difference(body) is None), None)
     if not marks.tips and ours is not None:
         lengths = np.linalg.norm(body.offsets, axis=-1).sum(), np.linalg.norm(ours.offsets, axis=-1).sum()
-        if np.sum(body.offsets * ours.offsets) > _UPRIGHT * np.linalg.norm(body.offsets) * np.linalg.norm(ours.offsets):
+        # Only if it rests in the built-in body's pose: cosine of all offsets above 0.8.
+        if np.sum(body.offsets * ours.offsets) > 0.8 * np.linalg.norm(body.offsets) * np.linalg.norm(ours.offsets):
             tips = ours.tips * float(lengths[0] / lengths[1])
     return replace(body, tips=tips)

@@ -1,4 +1,4 @@
-"""Names what a format cannot hold: no loss is silent."""
+"""Names the parts of a motion that a format cannot hold, so that no loss is silent."""
 
 from __future__ import annotations
 
@@ -16,22 +16,20 @@ from motionmind.files import FilePath
 from motionmind.formats.added import added_suffixes, lossy_added
 from motionmind.geometry import rotations as rot
 
-WRITABLE = (".json", ".bvh", ".txt", ".glb", ".npz", ".vrma")  # suffixes of the formats that are written
-
-_TINY = 1e-6  # seconds and metres
+WRITABLE = (".json", ".bvh", ".txt", ".glb", ".npz", ".vrma")  # suffixes
 
 
 def lossy_fields(motion: Motion, path: FilePath, source: FilePath | None = None) -> list[str]:
-    """Name what a file at `path` cannot hold of `motion`, as phrases: "times", "the body's proportions".
+    """Name the parts of `motion` that a file at `path` cannot hold: "times", "the body's proportions".
 
-    Only what this motion has is named. JSON holds all movement. Names are not a loss: formats without them use the
-    file's name. Motions that a format cannot hold at all (uneven times in BVH and .npz, a body that does not map to
-    SMPL's in .npz, or to a person's in .vrma) are refused by its writer.
+    JSON holds all movement. Names are not a loss: formats without them use the file's name. A format's writer refuses
+    motions that it cannot hold at all (uneven times in BVH and .npz, a body that does not map to SMPL's in .npz, or to
+    a person's in .vrma).
 
     Args:
         motion: the movement to write.
         path: the file to write; its suffix determines the format.
-        source: the file that the motion was read from, if any; what else it holds is lost too.
+        source: the file that the motion comes from, if any; other content of it is lost too.
 
     Returns:
         The phrases; empty if nothing is lost.
@@ -59,7 +57,7 @@ def lossy_fields(motion: Motion, path: FilePath, source: FilePath | None = None)
         return lossy
     if suffix == ".txt" and not motion.is_even:
         lossy.append("times")
-    elif abs(motion.times[0]) > _TINY:
+    elif abs(motion.times[0]) > 1e-6:
         lossy.append(f"the time when it begins, {motion.times[0]:.6g} s")
     if suffix == ".txt":
         lossy.append("where the body is")
@@ -69,7 +67,7 @@ def lossy_fields(motion: Motion, path: FilePath, source: FilePath | None = None)
 
 
 def _lossy_marks(motion: Motion) -> list[str]:
-    """Name the marks of what frames are."""
+    """Name the marks of frames that are lost."""
     lossy = []
     if motion.keyframed and motion.fps >= FILM_RATE:
         lossy.append("that its frames are postures of a score, not of a recording")
@@ -83,16 +81,16 @@ def _lossy_marks(motion: Motion) -> list[str]:
 
 
 def _lossy_body(motion: Motion, suffix: str) -> list[str]:
-    """Name what is lost of the body."""
+    """Name the properties of the body that are lost."""
     skeleton = motion.skeleton
     lossy = []
     if suffix in (".txt", ".npz"):
         known = [body() for body in BODIES.values()]
         if suffix == ".npz":
-            from motionmind.formats._smpl import joints_without_place, smpl_bodies
+            from motionmind.formats._smpl import smpl_bodies, unmapped_joints
 
             known += smpl_bodies().values()
-            missing = joints_without_place(motion)
+            missing = unmapped_joints(motion)
             lossy = [f"the turns of joints that SMPL does not have ({enumerated(missing)})"] if missing else []
         if not any(_same_proportions(body, skeleton) for body in known):
             lossy.insert(0, "the body's proportions")
@@ -100,19 +98,24 @@ def _lossy_body(motion: Motion, suffix: str) -> list[str]:
         from motionmind.retarget.joint_mapping import joint_mapping
 
         kept = joint_mapping(skeleton) or skeleton.names
-        turned = rot.angle(motion.rotations, rot.IDENTITY).max(axis=0) > _TINY
-        missing = [name for name, turns in zip(skeleton.names, turned, strict=True) if turns and name not in kept]
+        missing = [name for name in turning_joints(motion) if name not in kept]
         lossy = [f"the turns of joints that VRM does not have ({enumerated(missing)})"] if missing else []
     elif suffix == ".bvh":
         inner = [joint for joint in set(skeleton.parents[1:]) if skeleton.tips[joint].any()]
         ends = [skeleton.names[joint] for joint in sorted(inner)]
-        lossy = [f"the far ends of joints on which others hang ({enumerated(ends)})"] if ends else []
+        lossy = [f"the tips of joints with children ({enumerated(ends)})"] if ends else []
     return lossy
+
+
+def turning_joints(motion: Motion) -> list[str]:
+    """Return the names of joints that ever turn from rest by more than 1e-6 rad."""
+    turns = rot.angle(motion.rotations, rot.IDENTITY).max(axis=0) > 1e-6
+    return [motion.skeleton.names[joint] for joint in np.flatnonzero(turns)]
 
 
 def _same_proportions(one: Skeleton, other: Skeleton) -> bool:
     return (
         one.difference(other) is None
-        and np.allclose(one.offsets, other.offsets, atol=_TINY)
-        and np.allclose(one.tips, other.tips, atol=_TINY)
+        and np.allclose(one.offsets, other.offsets, atol=1e-6)  # metres
+        and np.allclose(one.tips, other.tips, atol=1e-6)
     )

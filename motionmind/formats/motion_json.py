@@ -18,13 +18,13 @@
 
 `times` are seconds, increasing; `root` the root's places in metres; `rotations` each joint's quaternion x, y, z, w
 against its parent, in the skeleton's order. `skeleton` is "human23", "human44" or a description, as in a posture's
-JSON. What the engine inserted, if anything, is given by the times of the postures that its moves connect, with the
-joints' moves that no corpus attests (bridges):
+JSON. `insertions`, if the engine made any, gives the times of the postures that its moves connect, and the joints'
+moves that no corpus attests (bridges):
 
     "insertions": [{"times": [0.0, 0.4, 0.8], "bridged": [["left_hip", 1]]}],
 
-`"keyframed": true` says that each frame is a posture that someone chose, as in a score. `recorded` holds the credits of
-what the engine did not insert, where they are known.
+`"keyframed": true` marks frames that someone chose, as in a score. `recorded` holds the credits of frames that the
+engine did not insert, if known.
 
 A variation's file is its current movement with one more field, `variation`, which holds the rest
 (`motionmind.variation.variation_json`).
@@ -133,7 +133,7 @@ def motion_of(schema: FramesSchema, skeleton: Skeleton, path: FilePath, *, mend:
         frame = late[0] + 1
         raise FormatError(f"times: {times[frame]:g} of frame {frame} is not after {times[frame - 1]:g}", path=path)
     if mend:
-        rotations = _json.unit_rotations(rotations, skeleton.names, path)
+        rotations = _json.normalise_rotations(rotations, skeleton.names, path)
     try:
         insertions = tuple(_json.to_insertion(one) for one in schema.insertions)
         recorded = tuple(schema.recorded)

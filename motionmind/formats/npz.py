@@ -8,16 +8,16 @@ holds numpy arrays; those of movement are
     trans            [T, 3]    the body's place, metres
     mocap_framerate  []        frames per second; mocap_frame_rate in SMPL-X files
 
-Other programs keep the poses in parts (`motionmind.formats._smpl_parts`), and the rate as fps. Those are read, too.
+Files in which poses are in parts (`motionmind.formats._smpl_parts`), or the rate is `fps`, are read too.
 
-The world is z up; y in files of some programs, which people who stand along y show. At rest SMPL stands in a T-pose, y
-up, facing +z, and all its joints' axes are the world's, like human23's. So rotations are copied unchanged, and only the
+The world is z up, or y up in some programs' files, whose people stand along y. At rest SMPL stands in a T-pose, y up,
+facing +z, and all its joints' axes are the world's, like human23's. So rotations are copied unchanged, and only the
 root's is turned upright.
 
 SMPL's joint positions are not in the file: they follow from `betas` and `gender` by the body model, whose licence
 forbids bundling it. Files are read onto joints placed as in human44, so soles may be some centimetres off the floor.
-`betas` and `gender` are not read; files are written with those of SMPL's mean body. `trans` is the pelvis's place up
-to a constant of the body model (about 3 cm in height), which is ignored both ways.
+`betas` and `gender` are not read; written files have those of SMPL's mean body. `trans` is the pelvis's place up to a
+constant of the body model (about 3 cm in height), which both reading and writing ignore.
 """
 
 from __future__ import annotations
@@ -40,24 +40,16 @@ from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.files import FilePath, name_of, read_bytes, write_atomically
 from motionmind.formats._clock import even_step
 from motionmind.formats._smpl import smpl_bodies, to_smpl
-from motionmind.formats._smpl_parts import NAMES, gather_poses
-from motionmind.formats.text import LARGEST
+from motionmind.formats._smpl_parts import ARRAY_NAMES, gather_poses
+from motionmind.formats.text import MAX_NUMBER
 from motionmind.formats.units import metres_per_unit
 from motionmind.geometry import rotations as rot
-from motionmind.retarget.vertical import find_vertical
+from motionmind.retarget.vertical import Z_UP_TO_Y_UP, find_vertical
 
-_RATES = ("mocap_framerate", "mocap_frame_rate", "fps", "frame_rate", "framerate")
+_RATE_NAMES = ("mocap_framerate", "mocap_frame_rate", "fps", "frame_rate", "framerate")
 
-# Bytes of an array as it is read: as many as the largest motion has that is made, or twice as many as its file, but no
-# more than two hours take at 120 frames per second. A compressed array that claims more is meant to exhaust memory.
-_LARGE_ARRAY = 24 * MOST_PLACES
-_LARGEST_ARRAY = 2**30
-
-# From a world with z up, where a body faces -y, to ours, where it faces +z.
-_UPRIGHT = rot.from_axis_angle([1.0, 0.0, 0.0], -np.pi / 2)
-
-_HIGH = 20.0  # metres above or below 0, in the median frame, at which nobody is
-_TURNS = 20.0  # radians, in the median frame, by which no joint is turned
+# Two hours at 120 frames per second. A compressed array that claims more is meant to exhaust memory.
+_MAX_ARRAY_BYTES = 2**30
 
 _log = logging.getLogger(__name__)
 
@@ -67,8 +59,8 @@ def read_npz(
 ) -> Motion:
     """Read a motion from an AMASS file, on SMPL's joints, placed as in human44.
 
-    `to_human23` knows these joints; `write_npz` writes the same orientations and places again. A log entry says that
-    the body's shape is not read (logger "motionmind.formats.npz", level INFO).
+    `to_human23` maps these joints; `write_npz` restores the same orientations and places. A log entry warns that the
+    body's shape is not read (logger "motionmind.formats.npz", level INFO).
 
     Args:
         path: the file; its stem becomes the motion's name.
@@ -92,13 +84,13 @@ def read_npz(
     rate = _rate(arrays, fps, path)
     _log.info("%s: joints stand where human44's do; the file's body shape (betas) is not read", path)
     vectors = poses.reshape(len(poses), -1, 3)
-    if (longest := float(np.median(rot.norm(vectors).max(axis=1)))) > _TURNS:
+    if (longest := float(np.median(rot.norm(vectors).max(axis=1)))) > 20.0:  # radians
         raise FormatError(f"'poses' turns by {longest:.3g} radians: are these degrees?", path=path)
     rotations = rot.exp(vectors)
     if (up or _vertical(skeleton, rotations, trans, path)) == "z":
-        rotations[:, 0] = rot.mul(_UPRIGHT, rotations[:, 0])
-        trans = rot.mul_vec(_UPRIGHT, trans)
-    if (height := float(np.median(np.abs(trans[:, 1])))) > _HIGH:
+        rotations[:, 0] = rot.mul(Z_UP_TO_Y_UP, rotations[:, 0])
+        trans = rot.mul_vec(Z_UP_TO_Y_UP, trans)
+    if (height := float(np.median(np.abs(trans[:, 1])))) > 20.0:  # metres
         message = f"{path}: the body is {height:.0f} m off 0; is its place in centimetres (--unit cm)?"
         warnings.warn(message, MotionMindWarning, stacklevel=2)
     times = np.arange(len(poses), dtype=np.float64) / rate
@@ -124,11 +116,11 @@ def write_npz(path: FilePath, motion: Motion) -> None:
     if 1.0 / step > FASTEST:
         raise MotionMindError(f"{path}: {1.0 / step:g} frames a second are more than {FASTEST:g}")
     body, rotations, root = to_smpl(motion)
-    rotations[:, 0] = rot.inv_mul(_UPRIGHT, rotations[:, 0])
+    rotations[:, 0] = rot.inv_mul(Z_UP_TO_Y_UP, rotations[:, 0])
     arrays: dict[str, Any] = {
-        "trans": rot.mul_vec(rot.inv(_UPRIGHT), root),
+        "trans": rot.mul_vec(rot.inv(Z_UP_TO_Y_UP), root),
         "gender": np.array("neutral"),
-        _RATES[body.name == "SMPL-X"]: np.array(round(1.0 / step, 9)),
+        _RATE_NAMES[body.name == "SMPL-X"]: np.array(round(1.0 / step, 9)),
         "betas": np.zeros(16),
         "dmpls": np.zeros((len(motion), 8)),  # soft tissue's dynamics, which AMASS's files have too
         "poses": rot.log(rotations).reshape(len(motion), -1),
@@ -142,7 +134,7 @@ def write_npz(path: FilePath, motion: Motion) -> None:
 
 
 def _read_arrays(path: FilePath) -> dict[str, Floats]:
-    """Read the file's arrays of movement, checked to be finite numbers; nothing else is unpacked."""
+    """Read only the file's arrays of movement, checked to be finite numbers."""
     found: dict[str, Floats] = {}
     data = read_bytes(path)
     if not data.startswith(b"PK"):
@@ -152,7 +144,7 @@ def _read_arrays(path: FilePath) -> dict[str, Floats]:
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
             members = file.zip.NameToInfo
             whole = "poses" in file  # AMASS's SMPL-X has its parts, too
-            for name in (*(("poses", "trans") if whole else NAMES), *_RATES):
+            for name in (*(("poses", "trans") if whole else ARRAY_NAMES), *_RATE_NAMES):
                 if name in file:
                     _check_claim(file.zip, members.get(name) or members[f"{name}.npy"], name, len(data), path)
                     found[name] = checked_numbers(file[name], repr(name), path)
@@ -165,28 +157,28 @@ def _read_arrays(path: FilePath) -> dict[str, Floats]:
 
 
 def _check_claim(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str, size: int, path: FilePath) -> None:
-    """Raise FormatError if an array is too large for a file of `size` bytes, as is said before it is unpacked.
+    """Raise FormatError before unpacking if an array claims too much for a file of `size` bytes.
 
-    No more is unpacked than is claimed: zipfile ends a member at its size, numpy an array at its shape.
+    Unpacking never exceeds the claim: zipfile ends a member at its size, numpy an array at its shape.
     """
     with archive.open(member) as stream:
         check_array(stream, size, repr(name), path)
-    if member.file_size > 2 * _most(size):
+    if member.file_size > 2 * _max_array_bytes(size):
         raise FormatError(f"{name!r} is too large to be movement", path=path)
 
 
 def check_array(stream: IO[bytes], size: int, what: str, path: FilePath) -> None:
-    """Raise FormatError if the header of an array says that it is too large for a file of `size` bytes."""
+    """Raise FormatError if an array's header claims too much for a file of `size` bytes."""
     version = np.lib.format.read_magic(stream)
     read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, _, _ = read_header(stream)
-    if 8 * math.prod(shape) > _most(size):
+    if 8 * math.prod(shape) > _max_array_bytes(size):
         raise FormatError(f"{what} is too large to be movement: {list(shape)}", path=path)
 
 
-def _most(size: int) -> int:
-    """Return the bytes that an array in a file of `size` bytes may take."""
-    return min(max(_LARGE_ARRAY, 2 * size), _LARGEST_ARRAY)
+def _max_array_bytes(size: int) -> int:
+    """Return the bytes allowed for an array: twice the file's `size`, or the largest made motion's, up to a limit."""
+    return min(max(24 * MOST_PLACES, 2 * size), _MAX_ARRAY_BYTES)
 
 
 def checked_numbers(array: NDArray[np.generic], what: str, path: FilePath) -> Floats:
@@ -194,7 +186,7 @@ def checked_numbers(array: NDArray[np.generic], what: str, path: FilePath) -> Fl
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
         raise FormatError(f"{what} holds no numbers", path=path)
     numbers = array.astype(np.float64, copy=False)
-    bad = np.argwhere(~(np.abs(numbers) <= LARGEST))  # NaN too
+    bad = np.argwhere(~(np.abs(numbers) <= MAX_NUMBER))  # NaN too
     if len(bad):
         value = numbers[tuple(bad[0])]
         raise FormatError(f"{what}{bad[0].tolist()} is {value:g}, not a place or an angle", path=path)
@@ -202,7 +194,7 @@ def checked_numbers(array: NDArray[np.generic], what: str, path: FilePath) -> Fl
 
 
 def _vertical(skeleton: Skeleton, rotations: Floats, root: Floats, path: FilePath) -> str:
-    """Return the axis that is up in a file of rotations [T, J, 4] and places of the root [T, 3], metres: "y" or "z"."""
+    """Return the vertical axis, "y" or "z", by rotations [T, J, 4] and places of the root [T, 3], metres."""
     trunk = rot.mul_vec(rotations[:, 0], np.array([0.0, 1.0, 0.0]))
     axis, doubt = find_vertical(
         lambda some: skeleton.positions_and_tips(rotations[some], root[some]),
@@ -219,17 +211,15 @@ def _vertical(skeleton: Skeleton, rotations: Floats, root: Floats, path: FilePat
 
 def _rate(arrays: dict[str, Floats], fps: float | None, path: FilePath) -> float:
     """Return `fps`, or the file's frames per second if it is None."""
-    name = "fps" if fps is not None else next((name for name in _RATES if name in arrays), None)
+    name = "fps" if fps is not None else next((name for name in _RATE_NAMES if name in arrays), None)
     if name is None:
-        raise FormatError(
-            f"no array {_RATES[0]!r}: say how many frames per second there are (--source-fps, or fps=)", path=path
-        )
+        raise FormatError(f"no array {_RATE_NAMES[0]!r}: give the frames per second (--source-fps, or fps=)", path=path)
     rate = arrays.get(name, np.array(fps, dtype=np.float64))
-    if rate.size != 1 or not 1.0 / LARGEST <= rate.item() <= FASTEST:
+    if rate.size != 1 or not 1.0 / MAX_NUMBER <= rate.item() <= FASTEST:
         raise FormatError(f"{name!r} must be one number of frames per second, not {in_one_line(rate)}", path=path)
     return float(rate.item())
 
 
 def in_one_line(what: object) -> str:
-    """Return an error's words, or an array's numbers, in one line of at most 200 characters."""
+    """Return an error's text, or an array's numbers, in one line of at most 200 characters."""
     return " ".join(str(what).split())[:200] or type(what).__name__

@@ -1,4 +1,4 @@
-"""Reads and writes the notation of the papers: text that holds only rotations.
+"""Reads and writes the papers' notation: text that holds only rotations.
 
 The brace form is from Bradley and Stuart, "Using chaos to generate variations on movement sequences", Chaos 8:800
 (1998): each posture in braces, with each joint's name and quaternion x, y, z, w, separated by semicolons:
@@ -13,7 +13,7 @@ its listing; this is our reading:
 
 In both, names are written with blanks, underscores or hyphens, in either case, and # begins a comment. There are no
 times and no places: postures come at an even rate, and the body stands on the floor at the origin. The papers have no
-rate; a comment before the first posture states it, if it is not one a second:
+rate; a comment before the first posture states one other than 1 posture a second:
 
     # 30 postures a second
 """
@@ -34,18 +34,14 @@ from motionmind.body.rates import FASTEST
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath, name_of, write_atomically
+from motionmind.formats._json import WRITTEN_LENGTH_TOLERANCE
 from motionmind.formats.text import read_lines, to_numbers
 from motionmind.geometry import rotations as rot
 
-# A word that begins like a number; joints' names do not.
-_NUMBER = re.compile(r"[+-]?(\.?[0-9]|(inf|infinity|nan)\b)", re.IGNORECASE)
-
-# Numbers printed with five digits, as in the papers, are off unit length by about 1e-5; only more needs a warning.
-_PRINTED_TOLERANCE = 1e-3
-_WRITTEN_TOLERANCE = 1e-9
+_NUMBER = re.compile(r"[+-]?(\.?[0-9]|(inf|infinity|nan)\b)", re.IGNORECASE)  # begins no joint's name
 _RATE = re.compile(r"\s*#\s*([0-9.]+(?:e[+-]?[0-9]+)?) postures a second\s*", re.IGNORECASE)
 
-# One joint of a posture in the file: its name, the four words that should be numbers, and their line.
+# One joint of a posture in the file: its name, the words of its four numbers, and their line.
 _Entry = tuple[str, list[str], int]
 
 Form = Literal["braces", "lines"]
@@ -55,13 +51,13 @@ def read_papers(path: FilePath, *, skeleton: Skeleton | None = None, rate: float
     """Read a motion from a file in the papers' notation, in either form.
 
     Joints that the file never names stay at rest, with a warning (the papers' bodies had no fingers or toes). A joint
-    that only some postures name is an error. The root stands above the origin, at the height where each posture's
+    that only some postures name is an error. The root stays above the origin, at such a height that each posture's
     lowest joint or tip touches the floor, y = 0.
 
     Args:
         path: the file; its stem becomes the motion's name.
         skeleton: the body whose joints are named; None takes human23, or human44 if it has more of the named joints.
-        rate: postures per second; None takes what a comment before the first posture says, or 1.
+        rate: postures per second; None takes the rate in a comment before the first posture, or 1.
 
     Returns:
         The motion, in metres and seconds.
@@ -89,7 +85,7 @@ def read_papers(path: FilePath, *, skeleton: Skeleton | None = None, rate: float
 
 
 def write_papers(path: FilePath, motion: Motion, *, form: Form = "braces") -> None:
-    """Write the rotations of `motion` in the papers' notation; the root is lost, and times if they are not even.
+    """Write the rotations of `motion` in the papers' notation; the root and uneven times are lost.
 
     Read back, rotations agree to 1e-9. A comment states the rate, if it is even and not one posture a second.
 
@@ -102,8 +98,8 @@ def write_papers(path: FilePath, motion: Motion, *, form: Form = "braces") -> No
         MotionMindError: the notation cannot hold a joint's name, or the file cannot be written.
     """
     names = [_name_as_written(name, motion.skeleton, form) for name in motion.skeleton.names]
-    is_told = len(motion) > 1 and motion.is_even and abs(motion.fps - 1.0) > _WRITTEN_TOLERANCE
-    lines = [f"# {motion.fps:.9g} postures a second"] * is_told
+    states_rate = len(motion) > 1 and motion.is_even and abs(motion.fps - 1.0) > 1e-9
+    lines = [f"# {motion.fps:.9g} postures a second"] * states_rate
     for rotation in np.asarray(np.round(motion.rotations, 10) + 0.0).tolist():
         numbers = [[f"{value:.10f}".rstrip("0").rstrip(".") for value in quaternion] for quaternion in rotation]
         if form == "braces":
@@ -114,14 +110,12 @@ def write_papers(path: FilePath, motion: Motion, *, form: Form = "braces") -> No
 
 
 def _name_as_written(name: str, skeleton: Skeleton, form: str) -> str:
-    """Return a joint's name in the given form; MotionMindError if it would not be read back as the same joint."""
+    """Return a joint's name in the given form; MotionMindError if reading would not restore the joint."""
     words = name.replace("_", " ").split()
     plain = " ".join(words)
     clash = sum(_key(other) == _key(name) for other in skeleton.names) > 1
     if not words or set(plain) & set("{};,#") or any(_NUMBER.match(word) for word in words) or clash:
-        raise MotionMindError(
-            f"{skeleton.name}: the papers' notation has no way to write the joint name {quoted(name)}"
-        )
+        raise MotionMindError(f"{skeleton.name}: the papers' notation cannot hold the joint name {quoted(name)}")
     return plain if form == "braces" else "_".join(words)
 
 
@@ -134,14 +128,14 @@ def _key(name: str) -> str:
 
 
 def _stated_rate(lines: list[str], path: FilePath) -> float:
-    """Return the postures a second that a comment before the first posture states; 1 if none does."""
+    """Return the postures a second stated by a comment before the first posture; 1 without one."""
     for number, line in enumerate(lines, start=1):
         if line.split("#")[0].strip():
             break
         if match := _RATE.fullmatch(line):
             (rate,) = to_numbers([match[1]], path, number)
             if not 0.0 < rate <= FASTEST:
-                message = f"{match[1]} postures a second: more than 0 are wanted, and {FASTEST:g} at most"
+                message = f"{match[1]} postures a second: must be more than 0, and at most {FASTEST:g}"
                 raise FormatError(message, path=path, line=number)
             return rate
     return 1.0
@@ -150,17 +144,17 @@ def _stated_rate(lines: list[str], path: FilePath) -> float:
 def _split_braces(lines: list[str], path: FilePath) -> Iterator[list[_Entry]]:
     """Yield the postures of the brace form."""
     entries: list[_Entry] = []
-    said: list[str] = []  # the current joint's text
+    pieces: list[str] = []  # the current joint's text
     start, opened = 0, 0  # its line, and the line of the open brace
     for number, line in enumerate(lines, start=1):
         for piece in re.split(r"([{};])", line):
             if piece == "{" and not opened:
-                entries, said, opened = [], [], number
+                entries, pieces, opened = [], [], number
             elif piece in ("}", ";") and opened:
-                if said:
-                    name, *numbers = (word.strip() for word in " ".join(said).split(","))
+                if pieces:
+                    name, *numbers = (word.strip() for word in " ".join(pieces).split(","))
                     entries.append((name, numbers, start))
-                said = []
+                pieces = []
                 if piece == "}":
                     if not entries:
                         raise FormatError("a posture without joints", path=path, line=number)
@@ -169,14 +163,14 @@ def _split_braces(lines: list[str], path: FilePath) -> Iterator[list[_Entry]]:
             elif piece in ("{", "}", ";") or (piece.strip() and not opened):
                 raise FormatError(f"{quoted(piece.strip())} may not appear here", path=path, line=number)
             elif piece.strip():
-                start = start if said else number
-                said.append(piece)
+                start = start if pieces else number
+                pieces.append(piece)
     if opened:
         raise FormatError("the posture's '}' is missing: is the file cut short?", path=path, line=opened)
 
 
 def _split_lines(lines: list[str], path: FilePath) -> Iterator[list[_Entry]]:
-    """Yield the postures of the line form: words up to a number are a name, numbers up to a word its rotation."""
+    """Yield the postures of the line form: words before a number are a name, numbers before a word its rotation."""
     for number, line in enumerate(lines, start=1):
         entries: list[_Entry] = []
         name: list[str] = []
@@ -249,12 +243,12 @@ def _normalise(rotations: Floats, lines: Indices, skeleton: Skeleton, path: File
         frame, joint = np.argwhere(length < 1e-6)[0]
         fault = f"the rotation of {skeleton.names[joint]} is zero, which is not a rotation (identity is 0 0 0 1)"
         raise FormatError(fault, path=path, line=int(lines[frame, joint]))
-    off = np.argwhere(np.abs(length - 1.0) > _PRINTED_TOLERANCE)
+    off = np.argwhere(np.abs(length - 1.0) > 1e-3)  # numbers with five digits, as in the papers, are off by about 1e-5
     if len(off):
         frame, joint = off[0]
         more = f", and {len(off) - 1} more like it" if len(off) > 1 else ""
         where = f"{path}:{lines[frame, joint]}: the rotation of {skeleton.names[joint]}"
         message = f"{where} has length {length[frame, joint]:.6g}, not 1{more}; made 1"
         warnings.warn(message, MotionMindWarning, stacklevel=4)
-    # What this module wrote stays bit-identical.
-    return np.where(np.abs(length - 1.0)[..., None] > _WRITTEN_TOLERANCE, rotations / length[..., None], rotations)
+    off_written = np.abs(length - 1.0)[..., None] > WRITTEN_LENGTH_TOLERANCE
+    return np.where(off_written, rotations / length[..., None], rotations)

@@ -12,7 +12,7 @@
       }
     }
 
-`recorded`, if it is there, holds the credits of the movement that it was taken from (`motionmind.credits.credit`).
+`recorded`, if present, holds the credits of the movement that the posture comes from (`motionmind.credits.credit`).
 `root` is the root's place in metres, `rotations` each joint's quaternion x, y, z, w against its parent.
 `skeleton` is "human23", "human44", or a description in metres, parents before their children, `tip` optional:
 `{"name": ..., "joints": [{"name": ..., "parent": NAME or null, "offset": [x, y, z], "tip": [x, y, z]}, ...]}`.
@@ -64,9 +64,9 @@ def posture_from_json(data: bytes, path: FilePath) -> Posture:
     rotations = np.array([schema.rotations[name] for name in skeleton.names], dtype=np.float64)
     root = np.array(schema.root, dtype=np.float64)
     _json.check_lengths(root, "root", path)
-    turned = _json.unit_rotations(rotations, skeleton.names, path)
+    rotations = _json.normalise_rotations(rotations, skeleton.names, path)
     try:
-        return Posture(skeleton, turned, root, tuple(schema.recorded))
+        return Posture(skeleton, rotations, root, tuple(schema.recorded))
     except MotionMindError as error:  # of the credits' shares
         raise FormatError(str(error), path=path) from None
 

@@ -1,8 +1,8 @@
-"""Movement for other programs: the unit, rate and root with which each takes a file as it comes, without settings.
+"""Movement for other programs: the unit, rate and root that each expects with its default settings.
 
-Read from the sources of Blender 5.0 (io_anim_bvh): its import takes one unit as a metre, y as up and -z as forward, and
-each frame as one of the scene's, 24 a second in a new one; Scale multiplies lengths, Update Scene FPS sets the scene's
-rate to the file's. glTF has metres, y up and seconds everywhere, and is turned by whoever reads it.
+By the sources of Blender 5.0 (io_anim_bvh), its import takes one unit as a metre, y as up and -z as forward, and each
+frame as one of the scene's, 24 a second in a new one; Scale multiplies lengths, Update Scene FPS sets the scene's rate
+to the file's. glTF has metres, y up and seconds everywhere; readers turn it.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Program:
-    """A program that movement is written for.
+    """A program that reads written movement.
 
     Attributes:
         title: its name.
-        rates: by suffix of a file that it reads, the frames a second that it expects; None if the file's count.
-        other: the suffixes that it does not read, each with what to do.
-        unit: the unit of BVH's lengths that it takes as they are.
-        has_root: whether bodies have a bone of their own on the floor at the origin, below the one that moves.
-        advice: by suffix, how to open the file.
+        rates: {suffix that it reads: frames a second that it expects}; None takes the file's rate.
+        other: {suffix that it does not read: remedy}.
+        unit: the unit of BVH's lengths that needs no scaling.
+        has_root: whether bodies have an extra bone on the floor at the origin, above the moving root.
+        advice: {suffix: how to open the file}.
     """
 
     title: str
@@ -41,13 +41,12 @@ class Program:
     advice: Mapping[str, str] = field(default_factory=dict)
 
 
-_SCENE_RATE = 24.0  # frames a second of a new scene in Blender, and in Maya
-_TINY = 1e-6
+_SCENE_FPS = 24.0  # of a new scene in Blender, and in Maya
 
 PROGRAMS = {
     "blender": Program(
         "Blender",
-        {".bvh": _SCENE_RATE, ".glb": None},
+        {".bvh": _SCENE_FPS, ".glb": None},
         {},
         advice={
             ".bvh": "File, Import, Motion Capture (.bvh)",
@@ -63,7 +62,7 @@ PROGRAMS = {
     ),
     "maya": Program(
         "Maya",
-        {".bvh": _SCENE_RATE},
+        {".bvh": _SCENE_FPS},
         {".glb": "it reads no glTF: write .bvh for MotionBuilder, or open the .glb in Blender and export FBX"},
         unit="cm",
         advice={".bvh": "open it in MotionBuilder (File, Motion File Import), or by a script: Maya alone reads no BVH"},
@@ -72,10 +71,10 @@ PROGRAMS = {
 
 
 def program_for(name: str, path: FilePath) -> Program:
-    """Return the program called `name` in `PROGRAMS`, which reads the format of `path`.
+    """Return the program `name` of `PROGRAMS`, if it reads the format of `path`.
 
     Raises:
-        MotionMindError: it does not; the message names the format to take.
+        MotionMindError: it does not; the message names the right format.
     """
     program, suffix = PROGRAMS[name], Path(path).suffix.lower()
     if suffix not in program.rates:
@@ -85,7 +84,7 @@ def program_for(name: str, path: FilePath) -> Program:
 
 
 def write_for(path: FilePath, motion: Motion, program: Program, *, unit: str | None = None) -> None:
-    """Write `motion` for a program, with its unit (`unit`, if given) and root; the rate is as the motion has it.
+    """Write `motion` for a program, with its unit (or `unit`) and root, at the motion's own rate.
 
     Raises:
         MotionMindError: as `write_motion`.
@@ -103,18 +102,18 @@ def write_for(path: FilePath, motion: Motion, program: Program, *, unit: str | N
 
 
 def note_settings(path: FilePath, motion: Motion, unit: str | float) -> None:
-    """Log what to set in Blender's import of BVH in `unit`, if anything.
+    """Log the settings that Blender's import of BVH needs, if any.
 
     The logger is "motionmind.formats.programs", the level INFO.
 
     Args:
-        path: the file that was written.
+        path: the written file.
         motion: the movement in it.
         unit: the unit of its lengths.
     """
     scale = metres_per_unit(unit)
-    settings = [f"set Scale to {scale:.5g}"] if abs(scale - 1.0) > _TINY else []
-    if len(motion) > 1 and abs(motion.fps / _SCENE_RATE - 1.0) > _TINY:
+    settings = [f"set Scale to {scale:.5g}"] if abs(scale - 1.0) > 1e-6 else []
+    if len(motion) > 1 and abs(motion.fps / _SCENE_FPS - 1.0) > 1e-6:
         settings.append("tick Update Scene FPS")
     if settings:
         _log.info("%s: in Blender's import, %s (or write it by convert --for blender)", path, " and ".join(settings))

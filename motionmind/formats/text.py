@@ -1,4 +1,4 @@
-"""Shared by the text formats: lines in any encoding and with any line ends, and strict parsing of numbers."""
+"""Text formats: lines in any encoding and with any line ends, and strict parsing of numbers."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from motionmind.errors import FormatError, quoted
 from motionmind.files import FilePath, read_bytes
 
 # Larger than any length of a body in any unit, and any angle; below it no sum or product can overflow.
-LARGEST = 1e9
+MAX_NUMBER = 1e9
 
-# The largest hand-made rigs have some hundreds; a file with more joints than this is damaged or not a body.
-MOST_JOINTS = 4000
+# The largest hand-made rigs have some hundreds; a file with more joints is damaged or not a body.
+MAX_JOINTS = 4000
 
 
 def read_lines(path: FilePath) -> list[str]:
@@ -37,7 +37,7 @@ def to_number(token: str, path: FilePath, line: int) -> float:
         value = float(token) if "_" not in token else math.nan
     except ValueError:
         value = math.nan
-    if not abs(value) <= LARGEST:  # false for NaN too
+    if not abs(value) <= MAX_NUMBER:  # false for NaN too
         raise FormatError(f"{quoted(token)} where a number was expected", path=path, line=line)
     return value
 
@@ -48,6 +48,6 @@ def to_numbers(tokens: Sequence[str], path: FilePath, line: int) -> list[float]:
         values = list(map(float, tokens))
     except ValueError:
         values = [math.nan]
-    if sum(map(abs, values)) <= LARGEST and "_" not in "".join(tokens):  # then none is greater, nor NaN
+    if sum(map(abs, values)) <= MAX_NUMBER and "_" not in "".join(tokens):  # so no value is larger, or NaN
         return values
-    return [to_number(token, path, line) for token in tokens]  # one by one; names the faulty token
+    return [to_number(token, path, line) for token in tokens]  # names the faulty token

@@ -1,4 +1,4 @@
-"""Units of length: their names, and a guess for files that do not state theirs."""
+"""Units of length: their names, and a guess for files that do not state the unit."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from motionmind._typing import Floats, Indices
+from motionmind.body.anatomy import SIDES
 from motionmind.body.human import human23
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 
-# Metres in one unit. "cmu" is the unit of the CMU Motion Capture Database, whose ASF files say `length 0.45`: a length
-# divided by 0.45 is in inches (mocap.cs.cmu.edu/faqs.php gives the conversion "(1.0/0.45)*2.54/100.0"). Its
-# conversions to BVH keep the numbers.
+# Metres in one unit. "cmu" is the unit of the CMU Motion Capture Database, whose ASF files state `length 0.45`: a
+# length divided by 0.45 is in inches (mocap.cs.cmu.edu/faqs.php gives the conversion "(1.0/0.45)*2.54/100.0").
+# Conversions of them to BVH keep the numbers.
 UNITS: dict[str, float] = {
     "cm": 0.01,
     "m": 1.0,
@@ -25,11 +26,11 @@ UNITS: dict[str, float] = {
     "cmu": 0.0254 / 0.45,
 }
 
-PERSON_HEIGHT = 1.70
+_PERSON_HEIGHT_M = 1.70
 
 # Height as a share of the longest path along the bones, mostly fingertip to toe: 1.70 m to 2.49 m in human23; 0.62 to
 # 0.71 in recordings whose rest pose stands. The spread is smaller than the ratio of any two units.
-HEIGHT_PER_SPAN = 0.68
+HEIGHT_PER_SPAN_RATIO = 0.68
 
 
 def metres_per_unit(unit: str | float) -> float:
@@ -51,7 +52,7 @@ def metres_per_unit(unit: str | float) -> float:
 
 
 def guess_unit(skeleton: Skeleton) -> tuple[str, float]:
-    """Guess the unit of length: the one in which this body's height is nearest, by ratio, to 1.70 m.
+    """Guess the unit of length that brings this body's height nearest, by ratio, to 1.70 m.
 
     Many rest poses do not stand, so the height is estimated from the bones alone: 0.68 times `bone_span`. A skeleton
     without length gives centimetres, the commonest unit. The closest two units, decimetres and CMU's, differ by a
@@ -63,30 +64,30 @@ def guess_unit(skeleton: Skeleton) -> tuple[str, float]:
     Returns:
         The unit's name, and its length in metres.
     """
-    height = HEIGHT_PER_SPAN * bone_span(np.array(skeleton.parents), skeleton.offsets, skeleton.tips)
+    height = HEIGHT_PER_SPAN_RATIO * bone_span(np.array(skeleton.parents), skeleton.offsets, skeleton.tips)
     if height <= 0.0:
         return "cm", UNITS["cm"]
-    name = min(UNITS, key=lambda unit: abs(math.log(height * UNITS[unit] / PERSON_HEIGHT)))
+    name = min(UNITS, key=lambda unit: abs(math.log(height * UNITS[unit] / _PERSON_HEIGHT_M)))
     return name, UNITS[name]
 
 
 def person_height(skeleton: Skeleton, mapping: Mapping[str, str]) -> float:
-    """Estimate a person's height by the length of the legs, which no prop in a hand and no zero pose changes.
+    """Estimate a person's height from the legs' length, which no prop in a hand and no zero pose changes.
 
     Args:
         skeleton: the file's.
         mapping: {file's joint: human23's joint}, as `joint_mapping` returns it.
 
     Returns:
-        The height of a person of human23's proportions with such legs, metres.
+        The height of a person with human23's proportions and legs of this length, metres.
     """
 
-    def legs(body: Skeleton, of: Mapping[str, str]) -> float:
+    def legs(body: Skeleton, target: Mapping[str, str]) -> float:
         first: dict[str, int] = {}
         for index, name in enumerate(body.names):
-            first.setdefault(of.get(name, ""), index)
+            first.setdefault(target.get(name, ""), index)
         length = 0.0
-        for side in ("left", "right"):
+        for side in SIDES:
             joint, hip = first[f"{side}_ankle"], first[f"{side}_hip"]
             while joint > hip:
                 length += float(np.linalg.norm(body.offsets[joint]))
@@ -94,13 +95,13 @@ def person_height(skeleton: Skeleton, mapping: Mapping[str, str]) -> float:
         return length
 
     body = human23()
-    return PERSON_HEIGHT * legs(skeleton, mapping) / legs(body, {name: name for name in body.names})
+    return _PERSON_HEIGHT_M * legs(skeleton, mapping) / legs(body, {name: name for name in body.names})
 
 
 def bone_span(parents: Indices, offsets: Floats, tips: Floats) -> float:
     """Return the length of the longest path along a body's bones, in the unit of `offsets`.
 
-    This is the diameter of the tree; it depends neither on the pose nor on the choice of root.
+    This is the diameter of the tree; it is independent of the pose and of the choice of root.
 
     Args:
         parents: index of each joint's parent [J], -1 for the root; parents come before their children.

@@ -1,8 +1,8 @@
 """Writes VRM animations (`.vrma`): movement of a person for any VRM body, with no body of its own.
 
-A VRM animation is a GLB whose extension says which nodes are which of VRM's bones: "VRMC_vrm_animation-1.0", VRM
-Consortium (2024). Its rest pose must be VRM's T-pose (upright, facing +z, palms down), as human23's is; its bones turn,
-and only the hips move.
+A VRM animation is a GLB whose extension maps nodes to VRM's bones: "VRMC_vrm_animation-1.0", VRM Consortium (2024). Its
+rest pose must be VRM's T-pose (upright, facing +z, palms down), like human23's; its bones rotate, and only the hips
+move.
 """
 
 from __future__ import annotations
@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from motionmind.body.anatomy import SIDES
 from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.formats._json import rounded
+from motionmind.formats._smpl import FINGERS_AHEAD_M
 from motionmind.formats.glb import GlbBuffer, animation_of, at_rest, container, joint_nodes
 from motionmind.retarget.retarget import to_human23
 
@@ -26,7 +28,7 @@ _BONES = {
     "atlantal": "head",
     **{
         f"{side}_{joint}": f"{side}{bone}"
-        for side in ("left", "right")
+        for side in SIDES
         for joint, bone in {
             "clavicle": "Shoulder",
             "shoulder": "UpperArm",
@@ -40,15 +42,15 @@ _BONES = {
         }.items()
     },
 }
-# human23's fingers stand for four: the others turn with the middle one, metres ahead of it (as in `_smpl`).
-_BESIDE = {"IndexProximal": 0.021, "RingProximal": -0.021, "LittleProximal": -0.042}
-JOINTS = len(_BONES) + 2 * len(_BESIDE)  # bones in a file
+# human23's fingers represent four; index, ring and little finger turn with the middle one, ahead of or behind it.
+_OTHER_FINGERS = dict(zip(("IndexProximal", "RingProximal", "LittleProximal"), FINGERS_AHEAD_M.values(), strict=True))
+N_BONES = len(_BONES) + 2 * len(_OTHER_FINGERS)  # in a file
 
 
 def write_vrma(path: FilePath, motion: Motion) -> None:
     """Write a person's movement as a VRM animation, retargeted to human23 first.
 
-    Players scale the hips' path by the height of the hips of the body that they show.
+    Players scale the hips' path by the height of the hips of the displayed body.
 
     Args:
         path: the file to write.
@@ -67,9 +69,9 @@ def write_vrma(path: FilePath, motion: Motion) -> None:
         node["name"] = _BONES[joint]
     buffer = GlbBuffer()
     animation = animation_of(buffer, motion, name)
-    for side in ("left", "right"):
+    for side in SIDES:
         finger, hand = skeleton.index(f"{side}_fingers"), skeleton.index(f"{side}_wrist")
-        for bone, ahead in _BESIDE.items():
+        for bone, ahead in _OTHER_FINGERS.items():
             nodes[hand]["children"] = [*nodes[hand]["children"], len(nodes)]
             channel = {"sampler": finger + 1, "target": {"node": len(nodes), "path": "rotation"}}
             animation["channels"].append(channel)

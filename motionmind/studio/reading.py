@@ -255,7 +255,7 @@ def _understand(order: Order, motions: list[Motion]) -> Facts:
     from motionmind.body.human import human23, human44
     from motionmind.body.tempo import question_tempo
     from motionmind.corpus.flips import find_flips
-    from motionmind.formats.units import HEIGHT_PER_SPAN, bone_span
+    from motionmind.formats.units import HEIGHT_PER_SPAN_RATIO, bone_span
     from motionmind.retarget.joint_mapping import filled_joints, known_rig
     from motionmind.retarget.retarget import own_skeleton
 
@@ -285,7 +285,7 @@ def _understand(order: Order, motions: list[Motion]) -> Facts:
         rig=known[0].name if known else "",
         people=any(human().difference(body) is None for human in (human23, human44)),
         filled=tuple(filled_joints(known[1])) if known and len(body) == 23 else (),
-        height=HEIGHT_PER_SPAN * bone_span(np.array(raw.parents), raw.offsets, raw.tips),
+        height=HEIGHT_PER_SPAN_RATIO * bone_span(np.array(raw.parents), raw.offsets, raw.tips),
         unit=unit,
         is_guessed=is_guessed,
         doubt=next(filter(None, map(question_tempo, own)), ""),

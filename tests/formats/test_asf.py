@@ -262,7 +262,7 @@ def test_changes_of_a_bones_length_are_left_out_and_said(tmp_path: Path) -> None
     still = read_amc(pair(tmp_path, asf, AMC.replace("40 50", "0 40 0 50").replace("41 51", "0 41 0 51")))
     np.testing.assert_array_equal(still.rotations, plain.rotations)
     path = pair(tmp_path, asf, AMC.replace("40 50", "0 40 7 50").replace("41 51", "0 41 0 51"))
-    with pytest.warns(MotionMindWarning, match="changes of the length or place of head are left out"):
+    with pytest.warns(MotionMindWarning, match="changes of the length or place of head are ignored"):
         longer = read_amc(path)
     np.testing.assert_array_equal(longer.rotations, plain.rotations)
 
@@ -300,7 +300,7 @@ def test_no_asf_or_too_many(tmp_path: Path) -> None:
     assert "its skeleton, an .asf file, was not found" in fails(path)
     (tmp_path / "a.asf").write_text(ASF)
     (tmp_path / "b.asf").write_text(ASF)
-    assert "(there are a.asf, b.asf): name it" in fails(path)
+    assert "(there are a.asf, b.asf): give its path" in fails(path)
     with pytest.raises(FormatError, match=r"c\.asf: cannot be read: there is no such file"):
         read_amc(path, tmp_path / "c.asf")
 

@@ -20,7 +20,7 @@ from motionmind.body.motion import Insertion, Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.formats import read_motion, write_motion
-from motionmind.formats.bvh import bvh_unit, holds_made, read_bvh, write_bvh
+from motionmind.formats.bvh import bvh_unit, has_inserted_frames, read_bvh, write_bvh
 from motionmind.formats.units import UNITS, guess_unit
 from motionmind.geometry import rotations as rot
 
@@ -176,7 +176,7 @@ def test_positions_agree_with_matrices_built_from_the_file(shared_data: Path, na
 
 def test_a_root_that_walks_is_folded_into_the_hips_with_a_warning(shared_data: Path) -> None:
     path = shared_data / "bandai" / "run_normal_001.bvh"
-    with pytest.warns(MotionMindWarning, match="Hips is taken as the root.*path of joint_Root itself is lost"):
+    with pytest.warns(MotionMindWarning, match="Hips becomes the root.*path of joint_Root itself is lost"):
         motion = read_bvh(path)
     where, _ = oracle(path, [0, 23])
     for joint, found in positions(motion).items():
@@ -185,7 +185,7 @@ def test_a_root_that_walks_is_folded_into_the_hips_with_a_warning(shared_data: P
 
 def test_positions_near_zero_are_added_to_offsets(shared_data: Path) -> None:
     path = shared_data / "importer" / "makehuman_tpose.bvh"
-    with pytest.warns(MotionMindWarning, match="read as added"):
+    with pytest.warns(MotionMindWarning, match="are added to OFFSETs"):
         motion = read_bvh(path)
     assert (len(motion), len(motion.skeleton)) == (1, 173)
     where, _ = oracle(path, [0], added=True)
@@ -350,7 +350,7 @@ Frame Time: 1
 0 0 90 0 90 0 1 2 3 4 5 6 7 8 9
 0 0 90 0 95 50 1 2 3 4 5 6 7 8 9
 """
-    with pytest.warns(MotionMindWarning, match="Hips is taken as the root.*left out: floor"):
+    with pytest.warns(MotionMindWarning, match="Hips becomes the root.*left out: floor"):
         motion = read_bvh(write(tmp_path, text), unit="cm")
     assert motion.skeleton.names == ("Hips", "Leg", "Head")
     np.testing.assert_allclose(motion.root, [[0.01, 0.9, 0], [0.51, 0.95, 0]], atol=1e-12)  # z turned to x
@@ -601,17 +601,17 @@ def test_frames_that_the_engine_made_are_known_by_the_ends_of_their_lines(tmp_pa
     path.write_text(SMALL, "utf-8")
     motion = read_bvh(path)
     write_bvh(path, motion)
-    assert not holds_made(path)
+    assert not has_inserted_frames(path)
     made = Motion(motion.skeleton, motion.rotations, motion.root, motion.times, insertions=(Insertion(motion.times),))
     write_bvh(path, made)
     assert [line[-1] == " " for line in path.read_text("utf-8").split("\n")[-4:-1]] == [False, True, False]
-    assert holds_made(path)
+    assert has_inserted_frames(path)
     np.testing.assert_allclose(read_bvh(path).rotations, motion.rotations, atol=1e-6)
     # As Blender writes it, and others but for the last line.
     for end in (" ", ""):
         lines = SMALL.strip().split("\n")
         path.write_text("\n".join([*(f"{line} " for line in lines[:-1]), lines[-1] + end]), "utf-8")
-        assert not holds_made(path)
+        assert not has_inserted_frames(path)
 
 
 def test_a_leaf_without_tip_has_an_end_site(tmp_path: Path) -> None:
@@ -702,7 +702,7 @@ def test_a_clock_and_angles_that_nobody_means_are_told(tmp_path: Path) -> None:
     text = (tmp_path / "a.bvh").read_text()
     slow = re.sub(r"Frame Time: .*", "Frame Time: 33.333", text)
     (tmp_path / "slow.bvh").write_text(slow)
-    with pytest.warns(MotionMindWarning, match=r"slow\.bvh: Frame Time is 33\.333, the seconds from frame to frame"):
+    with pytest.warns(MotionMindWarning, match=r"slow\.bvh: Frame Time is 33\.333 seconds; is it in milliseconds"):
         assert read_bvh(tmp_path / "slow.bvh", unit="cm").fps == pytest.approx(1 / 33.333)
     head, _, rows = text.partition("Frame Time")
     lines = [line.split() for line in rows.splitlines()[1:]]

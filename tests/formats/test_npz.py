@@ -22,7 +22,7 @@ from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, SkeletonError
 from motionmind.formats import npz, read_motion, write_motion, write_posture
-from motionmind.formats._smpl import joints_without_place, smpl_bodies
+from motionmind.formats._smpl import smpl_bodies, unmapped_joints
 from motionmind.formats.npz import read_npz, write_npz
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.retarget import to_human23
@@ -195,8 +195,8 @@ def test_hands_of_another_form_are_left_out(tmp_path: Path) -> None:
         ("body_pose", (5, 60), r"'body_pose' has the shape [5, 60], not [5, 63 or 69] as 'global_orient' has"),
         ("body_pose", (4, 63), r"'body_pose' has the shape [4, 63], not [5, 63 or 69] as 'global_orient' has"),
         ("transl", (4, 3), r"'transl' has the shape [4, 3], not [5, 3] as 'global_orient' and 'body_pose' has"),
-        ("transl", None, "no array 'trans': not movement as AMASS writes it"),
-        ("body_pose", None, "no array 'poses': not movement as AMASS writes it"),
+        ("transl", None, "no array 'trans': not movement in AMASS's form"),
+        ("body_pose", None, "no array 'poses': not movement in AMASS's form"),
     ],
 )
 def test_a_fault_in_a_part_is_named(tmp_path: Path, name: str, shape: tuple[int, ...] | None, message: str) -> None:
@@ -228,7 +228,7 @@ def test_a_rate_that_is_not_said_must_be_given(tmp_path: Path) -> None:
     found = arrays()
     del found["mocap_framerate"]
     saved(tmp_path / "a.npz", found)
-    with pytest.raises(FormatError, match=r"no array 'mocap_framerate': say how many frames per second .*--source-fps"):
+    with pytest.raises(FormatError, match=r"no array 'mocap_framerate': give the frames per second .*--source-fps"):
         read_motion(tmp_path / "a.npz")
     assert read_motion(tmp_path / "a.npz", fps=60).fps == pytest.approx(60.0)
     assert read_motion(saved(tmp_path / "b.npz", arrays()), fps=60).fps == pytest.approx(60.0)  # in place of the file's
@@ -351,14 +351,14 @@ def test_what_cannot_be_written(tmp_path: Path) -> None:
 
 def test_what_has_no_place_is_what_turns(tmp_path: Path) -> None:
     motion = moving(human44())
-    assert set(joints_without_place(motion)) == {
+    assert set(unmapped_joints(motion)) == {
         *(f"{side}_toes_{row}" for side in ("left", "right") for row in ("middle", "end")),
         *("lumbar_middle", "cervical_middle", "axial"),
     }
     still = Motion(human44(), np.tile(rot.IDENTITY, (1, 44, 1)), np.zeros((1, 3)), np.zeros(1))
-    assert joints_without_place(still) == []
+    assert unmapped_joints(still) == []
     for body in (human23(), *smpl_bodies().values()):
-        assert joints_without_place(moving(body)) == []
+        assert unmapped_joints(moving(body)) == []
 
 
 # --- files that are none --------------------------------------------------------------------------------------------
@@ -428,7 +428,7 @@ def test_what_would_fill_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert claims == "'poses' is too large to be movement: [10000000000000, 156]"
     nested = b"\x93NUMPY\x01\x00" + struct.pack("<H", 6000) + b"(" * 6000
     assert "'poses' cannot be read" in fails(packed(tmp_path / "nested.npz", nested))
-    monkeypatch.setattr(npz, "_LARGEST_ARRAY", 100_000)
+    monkeypatch.setattr(npz, "_MAX_ARRAY_BYTES", 100_000)
     header = io.BytesIO()
     np.save(header, np.zeros((1000, 156)))
     for name in ("poses.npy", "poses"):
@@ -461,7 +461,7 @@ def test_any_bytes(tmp_path_factory: pytest.TempPathFactory, data: bytes) -> Non
 def test_small_numbers_do_not_swell_on_reading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found = arrays(frames=100)
     found["poses"] = np.zeros((100, 156), dtype=np.uint8)
-    monkeypatch.setattr(npz, "_LARGEST_ARRAY", 8 * found["poses"].size - 1)
+    monkeypatch.setattr(npz, "_MAX_ARRAY_BYTES", 8 * found["poses"].size - 1)
     assert fails(saved(tmp_path / "a.npz", found)) == "'poses' is too large to be movement: [100, 156]"
 
 
