@@ -78,8 +78,9 @@ def find_vertical(
 
     >>> import numpy as np
     >>> ahead = np.tile([0.0, 0.0, 1.0], (60, 1))
-    >>> lying = np.stack([0.0 * ahead, ahead + np.linspace(0.0, 1.0, 60)[:, None] * ahead], axis=1)
-    >>> find_vertical(lambda some: lying[some], ahead, usual="y", height=1.7).axis
+    >>> path = np.linspace(0.0, 1.0, 60)[:, None] * ahead
+    >>> crawling = np.stack([path, path + ahead], axis=1)
+    >>> find_vertical(lambda some: crawling[some], ahead, usual="y", height=1.7).axis
     'y'
     """
     mean, usual_axis = trunk.mean(axis=0), "xyz".index(usual)
