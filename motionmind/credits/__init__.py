@@ -1,4 +1,4 @@
-"""Credits: whose movement a movement is made of, and under which licences."""
+"""Credits: the performers, corpora and licences behind a movement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Credits: shares of a movement, each with the clip, the performer and the corpus that it is made of."""
+"""Credits: shares of a movement, each with its clip, performer and corpus."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from motionmind.errors import MotionMindError
 
-_ROUNDING = 1e-6  # of shares that a file holds, in sum
+_SHARE_TOLERANCE = 1e-6  # of the sum of rounded shares in a file
 
 
 @dataclass(frozen=True)
@@ -29,14 +29,14 @@ class Credit:
 
     Attributes:
         share: from 0 to 1; all credits of a movement add up to 1.
-        clip: the name of the clip that it is made of; of the given movement, where there is no corpus; "" for what the
-            engine made and no clip attests.
-        performer: who performs the clip; "" where that is not known.
-        corpus: the corpus that the clip comes from; "" for given movement, and for what no clip attests.
+        clip: the name of its clip, or of given movement, which has no corpus; "" for movement that the engine made and
+            no clip attests.
+        performer: the clip's performer; "" if unknown.
+        corpus: the clip's corpus; "" for given movement, and for movement that no clip attests.
         title: of the corpus.
         author: of the corpus.
         source: of the corpus.
-        licence: of the corpus; "" where none is stated.
+        licence: of the corpus; "" if it states none.
 
     >>> from motionmind.credits import Credit
     >>> Credit(0.75, "plies", performer="Ada", corpus="ballet", licence="CC0-1.0").share
@@ -54,7 +54,7 @@ class Credit:
 
     @property
     def is_given(self) -> bool:
-        """Whether the movement was given, and the engine made nothing of it."""
+        """Whether the movement was given to the engine."""
         return bool(self.clip) and not self.corpus
 
     @property
@@ -64,16 +64,16 @@ class Credit:
 
 
 def credit_clip(origin: Origin, clip: str, performer: str = "", share: float = 1.0) -> Credit:
-    """Return the credit of a clip; where its performer is not known, that of the corpus's author."""
+    """Return the credit of a clip; the corpus's author replaces an unknown performer."""
     by = performer or origin.author
     return Credit(share, clip, by, origin.name, origin.title, origin.author, origin.source, origin.licence)
 
 
 def add_up(parts: Iterable[Credit]) -> tuple[Credit, ...]:
-    """Return credits with those of the same clip added up and all scaled to a sum of 1, the largest first.
+    """Add up the credits of each clip and scale them to a sum of 1, the largest first.
 
     Args:
-        parts: credits whose shares are in any unit, such as seconds; none is negative.
+        parts: credits with shares in any unit, such as seconds, not negative.
     """
     totals: dict[Credit, float] = {}
     for credit in parts:
@@ -83,13 +83,15 @@ def add_up(parts: Iterable[Credit]) -> tuple[Credit, ...]:
     if whole <= 0.0:
         return ()
     shared = [replace(one, share=total / whole) for one, total in totals.items() if total > 0.0]
-    # Rounded, so that the last bits of sums do not decide.
+    # Rounded: the last bits of sums must not decide the order.
     return tuple(sorted(shared, key=lambda one: (-round(one.share, 9), one.corpus, one.clip, one.performer)))
 
 
 def check_shares(parts: Sequence[Credit]) -> None:
-    """Raise MotionMindError unless the shares are from 0 to 1 and add up to 1; no credits at all are right, too."""
+    """Raise MotionMindError unless the shares are from 0 to 1 and add up to 1, or there are no credits."""
     shares = [credit.share for credit in parts]
     whole = math.fsum(shares)
-    if parts and not (all(0.0 <= share <= 1.0 + _ROUNDING for share in shares) and abs(whole - 1.0) <= _ROUNDING):
+    if parts and not (
+        all(0.0 <= share <= 1.0 + _SHARE_TOLERANCE for share in shares) and abs(whole - 1.0) <= _SHARE_TOLERANCE
+    ):
         raise MotionMindError(f"the shares of credits must be from 0 to 1 and add up to 1, not to {whole:.6g}")

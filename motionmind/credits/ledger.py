@@ -13,10 +13,10 @@ from motionmind.display import displayed
 from motionmind.errors import FormatError
 from motionmind.files import FilePath, read_bytes
 
-ENGINE = "the engine"  # made what no clip attests
+ENGINE = "the engine"  # made the movement that no clip attests
 GIVEN = "given"
 UNSTATED = "not stated"
-_LONG = 300  # characters of a title or a source
+_MAX_TEXT_LENGTH = 300  # characters of a title or a source
 
 
 class Ledger(msgspec.Struct, frozen=True):
@@ -27,7 +27,7 @@ class Ledger(msgspec.Struct, frozen=True):
         performers: the share of each performer.
         corpora: the share of each corpus.
         licences: the share under each licence, as the corpora state them.
-        notes: what stands against passing the movement on, in sentences.
+        notes: reasons against passing the movement on, in sentences.
     """
 
     clips: list[Credit] = []
@@ -38,7 +38,7 @@ class Ledger(msgspec.Struct, frozen=True):
 
 
 def ledger_of(parts: Sequence[Credit]) -> Ledger:
-    """Return the ledger of a movement's credits. What no clip attests is the engine's, and given movement is apart."""
+    """Return the ledger of a movement's credits, with separate sums for given movement and for the engine's own."""
     return Ledger(
         list(parts),
         _sums(parts, lambda one: one.performer),
@@ -49,7 +49,7 @@ def ledger_of(parts: Sequence[Credit]) -> Ledger:
 
 
 class _Report(msgspec.Struct):
-    """The report of a tween or of a variation; movement has a format, too."""
+    """The report of a tween or a variation, or a movement, which has a format."""
 
     format: str | None = None
     credits: Ledger | None = None
@@ -75,12 +75,12 @@ def read_ledger(path: FilePath) -> Ledger | None:
 
 
 def objections(parts: Sequence[Credit]) -> list[str]:
-    """Say what stands against passing on a movement of such credits: see `find_conflicts`."""
+    """List the reasons against passing on a movement with these credits: see `find_conflicts`."""
     return find_conflicts({displayed(one.corpus): displayed(one.licence) for one in parts if one.corpus})
 
 
 def _sums(parts: Sequence[Credit], name_of: Callable[[Credit], str]) -> dict[str, float]:
-    """Add up shares by a name, the largest first."""
+    """Add up shares by name, the largest first."""
     sums: dict[str, float] = {}
     for one in parts:
         name = ENGINE if one.is_engines else GIVEN if one.is_given else name_of(one) or UNSTATED
@@ -94,7 +94,9 @@ def sections_of(ledger: Ledger) -> dict[str, list[str]]:
         return {}
     about = {one.corpus: one for one in ledger.clips}
     sections = {
-        "performers": [f"{_percent(share)}  {displayed(name, _LONG)}" for name, share in ledger.performers.items()],
+        "performers": [
+            f"{_percent(share)}  {displayed(name, _MAX_TEXT_LENGTH)}" for name, share in ledger.performers.items()
+        ],
         "licences": [f"{_percent(share)}  {_terms(name)}" for name, share in ledger.licences.items()],
         "corpora": [f"{_percent(share)}  {_attribution(name, about)}" for name, share in ledger.corpora.items()],
         "clips": [f"{_percent(one.share)}  {_clip(one)}" for one in ledger.clips],
@@ -110,23 +112,23 @@ def lines_of(ledger: Ledger) -> Iterator[str]:
 
 
 def _percent(share: float) -> str:
-    """Format a share in four characters: " 62%", "<.5%" for what rounds to nothing."""
+    """Format a share in four characters: " 62%", "<.5%" if it rounds to zero."""
     return f"{share:4.0%}" if share >= 0.005 else "<.5%"
 
 
 def _terms(licence: str) -> str:
-    """Return a licence with what it asks."""
+    """Return a licence with its terms."""
     if licence in (ENGINE, GIVEN):
         return licence
     asks = find_licence("" if licence == UNSTATED else licence).terms
-    return f"{displayed(licence, _LONG)}: {asks}"
+    return f"{displayed(licence, _MAX_TEXT_LENGTH)}: {asks}"
 
 
 def _attribution(name: str, about: Mapping[str, Credit]) -> str:
-    """Return a corpus with its title, author, source and licence, as its licence may want them named."""
+    """Return a corpus with its title, author, source and licence, which its licence may require."""
     one = about.get(name, Credit(0.0))
-    said = [displayed(text, _LONG) for text in (one.title, one.author, one.source, one.licence) if text]
-    return displayed(name) + (f": {'; '.join(said)}" if said else "")
+    facts = [displayed(text, _MAX_TEXT_LENGTH) for text in (one.title, one.author, one.source, one.licence) if text]
+    return displayed(name) + (f": {'; '.join(facts)}" if facts else "")
 
 
 def _clip(credit: Credit) -> str:

@@ -1,8 +1,8 @@
-"""Common licences of movement: what they ask of work that is made of it, and which of them cannot be combined.
+"""Common licences of movement: their terms for derived work, and conflicts between them.
 
-The table is a help to see trouble early, and no legal advice. Names are SPDX identifiers, with any version. What can be
-combined follows Creative Commons' chart: Creative Commons, "Frequently asked questions" (2025), section "Can I combine
-material under different Creative Commons licenses in my work?".
+The table shows trouble early; it is not legal advice. Names are SPDX identifiers, with any version. Compatibility
+follows Creative Commons' chart: Creative Commons, "Frequently asked questions" (2025), section "Can I combine material
+under different Creative Commons licenses in my work?".
 """
 
 from __future__ import annotations
@@ -12,20 +12,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
-_LONGEST = 300  # characters of a licence in which its name is looked for
-
 
 @dataclass(frozen=True)
 class Licence:
     """The terms of a licence.
 
     Attributes:
-        name: its SPDX identifier without a version; "" if the licence is not known.
-        terms: what it asks, in words.
-        allows_derivatives: whether what is made of the work may be passed on.
-        allows_commerce: whether that may be sold.
-        is_share_alike: whether it has to be under the same licence.
-        is_open: whether it may be used beyond research.
+        name: its SPDX identifier without a version; "" for an unknown licence.
+        terms: in words.
+        allows_derivatives: whether derived work may be passed on.
+        allows_commerce: whether derived work may be sold.
+        is_share_alike: whether derived work must have the same licence.
+        is_open: whether use beyond research is allowed.
     """
 
     name: str
@@ -38,23 +36,23 @@ class Licence:
 
 UNKNOWN = Licence("", "not known here: ask who made the movement")
 RESEARCH = Licence("LicenseRef-research-only", "for research alone", allows_commerce=False, is_open=False)
-_NAMED = "name the authors"
-_NOT_SOLD = "do not sell it"
-_ALIKE = "pass on what you make under the same licence"
-_NO_DERIVATIVES = "do not pass on what you make of it"
+_BY = "name the authors"
+_NC = "do not sell it"
+_SA = "pass on what you make under the same licence"
+_ND = "do not pass on what you make of it"
 KNOWN = {
     licence.name: licence
     for licence in (
         Licence("CC0", "do as you like"),
         Licence("MIT", "keep the copyright notice and the licence"),
-        Licence("CC-BY", _NAMED),
-        Licence("CC-BY-SA", f"{_NAMED}; {_ALIKE}", is_share_alike=True),
-        Licence("CC-BY-NC", f"{_NAMED}; {_NOT_SOLD}", allows_commerce=False),
-        Licence("CC-BY-NC-SA", f"{_NAMED}; {_NOT_SOLD}; {_ALIKE}", allows_commerce=False, is_share_alike=True),
-        Licence("CC-BY-ND", f"{_NAMED}; {_NO_DERIVATIVES}", allows_derivatives=False),
+        Licence("CC-BY", _BY),
+        Licence("CC-BY-SA", f"{_BY}; {_SA}", is_share_alike=True),
+        Licence("CC-BY-NC", f"{_BY}; {_NC}", allows_commerce=False),
+        Licence("CC-BY-NC-SA", f"{_BY}; {_NC}; {_SA}", allows_commerce=False, is_share_alike=True),
+        Licence("CC-BY-ND", f"{_BY}; {_ND}", allows_derivatives=False),
         Licence(
             "CC-BY-NC-ND",
-            f"{_NAMED}; {_NOT_SOLD}; {_NO_DERIVATIVES}",
+            f"{_BY}; {_NC}; {_ND}",
             allows_derivatives=False,
             allows_commerce=False,
         ),
@@ -69,11 +67,11 @@ _COMBINED = re.compile(r"-(AND|OR|WITH)-CC|-(AND|OR|WITH)-(MIT|LICENSEREF)")
 
 
 def find_licence(text: str) -> Licence:
-    """Return the licence that a text names, as "CC BY-NC 4.0" and "cc-by-nc-4.0" do; `UNKNOWN` if it names none.
+    """Return the licence named in a text such as "CC BY-NC 4.0" or "cc-by-nc-4.0"; `UNKNOWN` if there is none.
 
-    A text that joins several licences is not known.
+    A text that joins several licences counts as unknown.
     """
-    plain = re.sub(r"[\s_]+", "-", text[:_LONGEST].strip().upper())
+    plain = re.sub(r"[\s_]+", "-", text[:300].strip().upper())
     if _COMBINED.search(plain):
         return UNKNOWN
     if found := _CREATIVE_COMMONS.search(plain):
@@ -85,13 +83,13 @@ def find_licence(text: str) -> Licence:
 
 
 def find_conflicts(licences: Mapping[str, str]) -> list[str]:
-    """Say what stands against passing on a work that is made of several corpora.
+    """List the reasons against passing on a work derived from several corpora.
 
     Args:
-        licences: the licence of each corpus, as it states it.
+        licences: {corpus: the licence that it states}.
 
     Returns:
-        A sentence for each corpus that forbids derivatives, then for each two licences that cannot be combined.
+        A sentence for each corpus that forbids derivatives, then for each pair of licences that cannot be combined.
     """
     found = [
         f"{corpus} forbids derivatives ({licence}): do not pass on what is made of it, unless its authors allow it"
@@ -112,7 +110,7 @@ def find_conflicts(licences: Mapping[str, str]) -> list[str]:
 
 
 def _objection(strict: Licence, loose: Licence) -> str:
-    """Return why a work cannot be under a share-alike licence where a part is under another; "" if it can."""
+    """Return why a share-alike licence excludes a part under another licence; "" if it does not."""
     if not strict.is_share_alike:
         return ""
     wants = f"{strict.name} wants the whole under {strict.name}"
