@@ -6,7 +6,6 @@ state. To undo the last edit, drop it from the list.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -121,12 +120,6 @@ class Seam:
     def __repr__(self) -> str:
         judged = f", chosen {self.chosen}\n {self.transition!r}" if self.transition else ", not judged"
         return f"<Seam {self.number} from posture {self.start} to {self.end}: {self.decision}{judged}>"
-
-    @property
-    def join(self) -> Transition | None:
-        """The former name of `transition`, which goes in 0.3."""
-        warnings.warn("Seam.join is now Seam.transition; the old name goes in 0.3", DeprecationWarning, stacklevel=2)
-        return self.transition
 
     @property
     def insertion(self) -> Candidate | None:

@@ -366,13 +366,3 @@ def test_what_is_no_variation_is_refused(run: Run, file: Path, variation: Variat
 
 def test_what_is_read_holds_what_was_written(file: Path, variation: Variation) -> None:
     assert read_variation(file).report() == variation.report()
-
-
-def test_the_names_of_0_1_warn(variation: Variation) -> None:
-    seam = next(seam for seam in variation.seams if seam.is_abrupt or seam.insertion)
-    with pytest.warns(DeprecationWarning, match=r"Seam\.join is now Seam\.transition"):
-        transition = seam.join
-    assert transition is not None
-    assert transition is seam.transition
-    with pytest.warns(DeprecationWarning, match="breaks is now abrupt_joints"):
-        assert transition.breaks == transition.abrupt_joints

@@ -245,27 +245,20 @@ def test_how_to_smooth_is_checked_where_nothing_is_smoothed(kata: Piece, karate:
         still.smooth(karate, nonsense=3)
 
 
-def test_the_former_keyword_told_still_works_and_says_what_to_use(kata: Piece, karate: Engine) -> None:
-    short = Piece.of(kata.motion.slice(0, 12))
+def test_progress_is_reported_before_each_search(kata: Piece, karate: Engine) -> None:
     calls: list[tuple[int, int]] = []
-    options = {"flow": FLOWS["chua"], "nudge": 1.0, "alternatives": 1}
 
     def note(done: int, of: int) -> None:
         calls.append((done, of))
 
-    bare = vary(short, **{name: options[name] for name in ("flow", "nudge")})  # type: ignore[arg-type]
-    vary(short, karate, **options, on_progress=note)  # type: ignore[arg-type]
+    short = Piece.of(kata.motion.slice(0, 12))
+    vary(short, karate, flow=FLOWS["chua"], nudge=1.0, alternatives=1, on_progress=note)
+    assert calls == [(done, len(calls)) for done in range(len(calls))]
     expected, calls[:] = [*calls], []
-    assert expected[0] == (0, len(expected))
-    with pytest.warns(DeprecationWarning, match="the keyword told is deprecated: use on_progress") as caught:
-        vary(short, karate, **options, told=note)  # type: ignore[arg-type]
-    assert caught[0].filename == __file__
-    with pytest.warns(DeprecationWarning, match="use on_progress") as caught:
-        bare.smooth(karate, alternatives=1, told=note)
-    assert caught[0].filename == __file__
-    assert calls == 2 * expected
-    with pytest.raises(TypeError, match="told is the former name of on_progress"):
-        bare.smooth(karate, told=note, on_progress=note)
+    vary(short, flow=FLOWS["chua"], nudge=1.0).smooth(karate, alternatives=1, on_progress=note)
+    assert calls == expected
+    with pytest.raises(TypeError, match="'told'"):
+        vary(short, karate, told=note)
 
 
 # --- what is abrupt -------------------------------------------------------------------------------------------------
