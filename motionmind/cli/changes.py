@@ -85,7 +85,7 @@ def add(
     mirror = any(clip.mirrored for clip in own)
     takes = Taking(rate, learned.corpus.skip, options["flips"], learned.corpus.flip_degrees, mirror)
     source = Reading(takes, read_mapping(joints), unit, str(asf) if asf else None, source_fps, up)
-    with open_team(1, None) as team, shards_of(name, home) as folder:
+    with open_team() as team, shards_of(name, home) as folder:
         taken = take_files(clip_names(files), source, folder, team, strict=True)
         workshop = Workshop(folder=folder)
         more = add_recordings(learned.corpus, taken, workshop=workshop, **options)

@@ -161,6 +161,7 @@ def build(
     from motionmind.corpus.shards import Reading, shards_of
     from motionmind.corpus.store import locate, place_for
     from motionmind.discretize import make_discretization
+    from motionmind.executors.cluster import cluster
     from motionmind.executors.opening import open_team
     from motionmind.executors.workshop import Workshop
     from motionmind.tween.engine import Engine
@@ -176,7 +177,8 @@ def build(
         for other in others:
             locate(other, home)
         prepare()
-    with open_team(workers, scheduler) as team, shards_of(name, home) as folder:
+    opened = cluster(scheduler) if scheduler else open_team(workers)
+    with opened as team, shards_of(name, home) as folder:
         engine = Engine.fit(
             take_files(clip_names(files), reading, folder, team, strict=strict_files),
             name=name,

@@ -64,7 +64,7 @@ def gaps(name: str, output: Path | None, as_json: bool, pairs: int, count: int, 
     )
     if output:
         from motionmind.files import write_atomically
-        from motionmind.plots.gap_sheet import gap_sheet
+        from motionmind.gaps.sheet import gap_sheet
         from motionmind.render.sheet import png
 
         write_atomically(output, png(gap_sheet(engine, found)))

@@ -29,6 +29,7 @@ from motionmind.corpus.gather import gather
 from motionmind.corpus.recordings import Taking
 from motionmind.corpus.shards import Reading, Taken, shards_of, take_files
 from motionmind.errors import CorpusError, MotionMindError, MotionMindWarning
+from motionmind.executors.cluster import cluster
 from motionmind.executors.here import this_process
 from motionmind.executors.opening import open_team
 from motionmind.executors.team import Team, UnfinishedError
@@ -102,7 +103,7 @@ def test_the_same_corpus_on_a_cluster(files: dict[Path, str], tmp_path: Path) ->
     with distributed.LocalCluster(
         2, threads_per_worker=2, dashboard_address=":0", processes=False, protocol="tcp"
     ) as local:
-        with open_team(scheduler=local.scheduler_address) as team:
+        with cluster(local.scheduler_address) as team:
             on_cluster = Client(tmp_path / "1", team).gather(files)
         assert_same(on_cluster, Client(tmp_path / "2", this_process()).gather(files))
 

@@ -43,7 +43,7 @@ def team(request: pytest.FixtureRequest) -> Iterator[Team]:
             case "processes":
                 yield stack.enter_context(open_team(2))
             case _:
-                yield stack.enter_context(open_team(scheduler=request.getfixturevalue("scheduler")))
+                yield stack.enter_context(clusters.cluster(request.getfixturevalue("scheduler")))
 
 
 def test_results_come_in_the_order_of_the_jobs(team: Team) -> None:
@@ -101,7 +101,7 @@ def test_a_cluster_that_goes_away_is_told() -> None:
     local = distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, dashboard_address=":0", processes=False, protocol="tcp"
     )
-    with local, open_team(scheduler=local.scheduler_address) as team:
+    with local, clusters.cluster(local.scheduler_address) as team:
         results = team.map(doze, range(100))
         assert next(results) == 0
         local.close()
@@ -114,14 +114,14 @@ def test_a_cluster_without_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> N
     with (
         distributed.LocalCluster(n_workers=0, dashboard_address=":0", processes=False, protocol="tcp") as local,
         pytest.raises(MotionMindError, match=r"tcp://\S+ the cluster has had no workers for 0\.3 s"),
-        open_team(scheduler=local.scheduler_address),
+        clusters.cluster(local.scheduler_address),
     ):
         pass
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense", "tcp://127.0.0.1:port"])
 def test_an_address_of_no_scheduler_is_told(address: str) -> None:
-    with pytest.raises(MotionMindError, match=f"^{address}: no scheduler answers there"), open_team(scheduler=address):
+    with pytest.raises(MotionMindError, match=f"^{address}: no scheduler answers there"), clusters.cluster(address):
         pass
 
 
@@ -132,5 +132,5 @@ def test_no_workers_are_too_few() -> None:
 
 def test_without_the_extra_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(MotionMindError, match=r'pip install "motionmind\[scale\]"'), open_team(scheduler="tcp://a:1"):
+    with pytest.raises(MotionMindError, match=r'pip install "motionmind\[scale\]"'), clusters.cluster("tcp://a:1"):
         pass
