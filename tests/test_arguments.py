@@ -44,6 +44,7 @@ ANSWERS = {
     "Seam",
     "Sighting",
     "Source",
+    "StateSpace",
     "Tween",
     "TweenReport",
     "Wait",

@@ -60,6 +60,7 @@ SUBJECTS = {
     "States": (
         "discretize.make_discretization",
         "discretize.Discretization",
+        "discretize.StateSpace",
         "discretize.name_states",
         "discretize.read_library",
         "discretize.write_library",

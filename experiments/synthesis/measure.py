@@ -12,7 +12,7 @@ Pairs are those of `experiments.wince`: `--pairs` far ones, a third as many on o
 Unless the list below says otherwise, figures are of far pairs, and a share is of pairs.
 
     feet's speed      mean level speed of ends of feet less than 5 cm above the floor, over the dancers'
-    skating           mean share of frames in which a foot skates (`motionmind.metrics.skating`), over the dancers'
+    skating           mean share of frames in which a foot skates (`motionmind.body.contact.skating`), over the dancers'
     bounce            99th percentile of the mass's vertical acceleration, up or down, in all frames, over the dancers';
                       gravity where bodies fall freely in more frames than one in 100
     bounce on the floor  the same of frames in which, and before and after which, the body is not in the air

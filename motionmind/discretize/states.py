@@ -42,6 +42,12 @@ class StateSpace:
             library keep every orientation that they were fitted to within it; in an expert library, orientations
             farther off are not in the vocabulary.
         labels: names of the states [S_j] of each joint [J]; empty for a joint whose states have no names.
+
+    >>> import numpy as np
+    >>> from motionmind.discretize import StateSpace
+    >>> centres = np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
+    >>> StateSpace(("hip", "knee"), centres, np.array([0, 1, 2]), "codebook", np.array([15.0, 15.0]))
+    <StateSpace by codebook: joints 2, states 2>
     """
 
     names: tuple[str, ...]
