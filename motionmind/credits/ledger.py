@@ -70,7 +70,8 @@ def read_ledger(path: FilePath) -> Ledger | None:
     if report.format is not None:
         return None
     if report.credits is None:
-        raise FormatError("is no report with credits: an earlier version's had none (write it again)", path=path)
+        again = "make a report of an earlier version again: motionmind tween (or vary) ... --report FILE"
+        raise FormatError(f"neither movement nor a report with credits; {again}", path=path)
     return report.credits
 
 

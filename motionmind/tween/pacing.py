@@ -94,8 +94,7 @@ class Tempo(msgspec.Struct, frozen=True):
         faster: up to three body parts that exceed their greatest speed in the corpus by a fifth, worst first.
         creeps: share of the time in which the body is slower than in all but the slowest hundredth of the corpus's
             seconds.
-        detours: whether movement that the corpus shows after postures like A and before ones like B fills spare time;
-            missing from the first reports with a tempo.
+        detours: whether movement that the corpus shows after postures like A and before ones like B fills spare time.
     """
 
     usual: float
@@ -104,7 +103,7 @@ class Tempo(msgspec.Struct, frozen=True):
     usual_moves: int | None
     faster: list[FasterPart]
     creeps: float
-    detours: bool = False
+    detours: bool
 
 
 def tempo_of(

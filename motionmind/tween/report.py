@@ -38,7 +38,7 @@ class ReportedCosts(msgspec.Struct, frozen=True):
     moves: list[list[float]]
     coordination: list[list[float]]
     per_move: float
-    guide: list[list[float]] = []
+    guide: list[list[float]]
 
 
 class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -53,7 +53,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         gap: (cost - lower bound) / cost.
         moves: number of moves T.
         length: how that number was chosen, from the costs of paths without the guide; null if it was given.
-        tempo: comparison of the timing with the corpus's; null in reports of 0.1.
+        tempo: comparison of the timing with the corpus's.
         expansions: nodes that A* expanded.
         peak_nodes: greatest number of nodes that A* held.
         node_budget: number of nodes that A* was allowed to hold.
@@ -76,15 +76,14 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         left_out: approximate share of the corpus walks that begin or end in postures represented by others; 0 for a
             small corpus.
         gave: the largest residual of each term of the synthesis (balance, gravity, joint limits...), with its unit and
-            its time in seconds; empty in reports of 0.1.
-        shown: the motion's greatest "balance", "bounce", "flight", "crossed_limbs" and "pace" beside the corpus's;
-            empty in reports of 0.1.
+            its time in seconds.
+        shown: the motion's greatest "balance", "bounce", "flight", "crossed_limbs" and "pace" beside the corpus's.
         times: times of the moves [T + 1], seconds.
         names: names of the states [T + 1][L].
         degrees: angle of each joint's move [T][L].
         likelihood: P(next state | state) of each joint's move; 0 if unattested [T][L].
         costs: the parts of the cost.
-        credits: the sources of the movement, by share; null in reports of 0.1.
+        credits: the sources of the movement, by share.
         motion_sha256: hash of the movement's file, written with the report; null if there is none.
 
     >>> from motionmind import Engine, read_report
@@ -103,45 +102,44 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     cost: float
     lower_bound: float
     gap: float
-    moves: int = 0
-    length: LengthChoice | None = None
-    tempo: Tempo | None = None
-    expansions: int = 0
-    peak_nodes: int = 0
-    node_budget: int = 0
-    seconds: dict[str, float] = {}
+    moves: int
+    length: LengthChoice | None
+    tempo: Tempo
+    expansions: int
+    peak_nodes: int
+    node_budget: int
+    seconds: dict[str, float]
     joints: list[str]
     path: list[list[int]]
-    attested: float = 0.0
+    attested: float
     bridges: list[Bridge]
     waits: list[Wait]
-    differs: list[float] = []
-    what_if: list[WhatIf] = []
-    vias: list[PassedPosture] = []
-    snap_degrees: dict[str, dict[str, float]] = {}
-    path_degrees: dict[str, float] = {}
-    followed: list[list[bool]] = []
+    differs: list[float]
+    what_if: list[WhatIf]
+    vias: list[PassedPosture]
+    snap_degrees: dict[str, dict[str, float]]
+    path_degrees: dict[str, float]
+    followed: list[list[bool]]
     sources: list[list[Source | None]]
-    detail: list[Source] = []
-    left_out: float = 0.0
-    gave: list[Gave] = []
-    shown: dict[str, Sighting] = {}
+    detail: list[Source]
+    left_out: float
+    gave: list[Gave]
+    shown: dict[str, Sighting]
     times: list[float]
     names: list[list[str]]
     degrees: list[list[float]]
     likelihood: list[list[float]]
     costs: ReportedCosts
-    credits: Ledger | None = None
-    motion_sha256: str | None = None
+    credits: Ledger
+    motion_sha256: str | None
 
     def __post_init__(self) -> None:
         """Check that every table has one row per move or posture, and every row one entry per joint."""
         moves, joints = len(self.path) - 1, len(self.joints)
         tables: list[tuple[Sequence[Sequence[object]], int]] = [(self.path, moves + 1), (self.names, moves + 1)]
-        costs = (self.costs.moves, self.costs.coordination)
+        tables.append((self.followed, moves + 1))
+        costs = (self.costs.moves, self.costs.coordination, self.costs.guide)
         tables += [(table, moves) for table in (self.sources, self.degrees, self.likelihood, *costs)]
-        # Reports of 0.1 have neither.
-        tables += [(table, rows) for table, rows in ((self.costs.guide, moves), (self.followed, moves + 1)) if table]
         if any(len(table) != rows or any(len(row) != joints for row in table) for table, rows in tables):
             raise ValueError(f"its tables are not of {moves} moves of {joints} joints")
         if moves < 0 or len(self.times) != moves + 1:
@@ -200,7 +198,7 @@ def read_any_report(path: FilePath) -> TweenReport | NoPathReport:
     try:
         return msgspec.json.decode(text, type=TweenReport)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise FormatError(f"is no report of a tween: {_fault(error, Path(os.fsdecode(path)))}", path=path) from error
+        raise FormatError(_fault(error, Path(os.fsdecode(path))), path=path) from error
 
 
 def _fault(error: Exception, path: Path) -> str:
@@ -208,10 +206,10 @@ def _fault(error: Exception, path: Path) -> str:
     lacks = "Object missing required field"
     fault = str(error)
     if not fault.startswith(lacks):
-        return fault
+        return f"is no report of a tween: {fault}"
     if "`status`" in fault:  # as movement does
-        word, path = "tween writes one", path.with_name(f"{path.stem}-report.json")
-    else:  # a report of 0.1 from before `explain`
-        word = "write it again"
-    again = f"{word}: motionmind tween A B --corpus NAME --report {shlex.quote(os.fspath(path))}"
-    return f"{fault.replace(lacks, 'there is no key')}; {again}"
+        what = f"is no report of a tween: {fault.replace(lacks, 'there is no key')}; tween writes one"
+        path = path.with_name(f"{path.stem}-report.json")
+    else:
+        what = "a tween report of an earlier version; make it again"
+    return f"{what}: motionmind tween A B --corpus NAME --report {shlex.quote(os.fspath(path))}"

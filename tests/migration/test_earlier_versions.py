@@ -229,7 +229,7 @@ def test_a_report_is_explained_or_refused_with_the_command_that_mends_it(
     explained = run("explain", file)
     if explained.code:
         assert len(explained.err.strip().splitlines()) == 1
-        with pytest.raises(MotionMindError, match="there is no key `times`; write it again"):
+        with pytest.raises(MotionMindError, match="a tween report of an earlier version; make it again"):
             read_report(file)
         assert run("corpus", "build", "piece", PIECE).code == 0
         assert mended_by(run, explained.err).code == 0

@@ -215,8 +215,7 @@ def test_what_is_no_report_is_refused(bridged: Tween, tmp_path: Path, run: Run) 
         path.write_text(json.dumps(report | change), "utf-8")
         with pytest.raises(FormatError, match=words):
             read_report(path)
-    del report["likelihood"]
-    for text in (json.dumps(report), "[]", "{", "", "\udcff"):
+    for text in ("[]", "{", "", "\udcff"):
         path.write_bytes(text.encode("utf-8", "surrogateescape"))
         ran = run("explain", path)
         assert (ran.code, ran.out) == (2, "")

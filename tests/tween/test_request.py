@@ -108,16 +108,14 @@ def test_a_report_that_was_written_is_read_again(ballet: Engine, tmp_path: Path)
     assert list(tween.report()) == list(TweenReport.__struct_fields__)
 
 
-def test_reports_of_0_1_are_read(ballet: Engine, tmp_path: Path) -> None:
-    """They lack what came later, and may have what is gone."""
-    old = ballet.tween(FIRST, PLIE).report()
-    del old["asked"]["whole_body"]
-    for name in ("detail", "path_degrees", "vias", "differs", "length", "tempo", "followed"):
-        del old[name]
-    del old["costs"]["guide"]
-    (tmp_path / "old.json").write_text(json.dumps(old | {"renderer": 1, "shared": 0}), "utf-8")
-    report = read_report(tmp_path / "old.json")
-    assert (report.cost, report.detail, report.differs) == (old["cost"], [], [])
+def test_a_report_of_an_earlier_version_is_refused_with_the_command_that_makes_it(ballet: Engine, run: Run) -> None:
+    report = ballet.tween(FIRST, PLIE).report()
+    del report["gave"]
+    Path("old.json").write_text(json.dumps(report), "utf-8")
+    ran = run("explain", "old.json")
+    assert ran.code == 2
+    told = "a tween report of an earlier version; make it again: motionmind tween A B --corpus NAME --report old.json"
+    assert ran.err == f"error: old.json: {told}\n"
 
 
 def test_a_motion_is_no_report(run: Run) -> None:
