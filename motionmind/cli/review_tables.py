@@ -141,11 +141,11 @@ def print_advice(variation: Variation, engine: Engine | None, depart: float | No
         engine: what judged it; None for nothing.
         depart: the share of steps for which a nudge was sought, if one was.
     """
-    from motionmind.variation.departure import WITHIN, departure
+    from motionmind.variation.departure import DEPARTURE_TOLERANCE, departure
 
     refused = REFUSED[variation.by]
     reached = departure(variation.first_order)
-    if depart is not None and abs(reached - depart) > WITHIN:
+    if depart is not None and abs(reached - depart) > DEPARTURE_TOLERANCE:
         note(f"no nudge was found by which {depart:.0%} of steps leave the piece's order; the nearest is {reached:.0%}")
     counts = variation.report()["counts"]
     limits = variation.kept.limits if variation.kept else None

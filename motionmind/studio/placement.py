@@ -22,7 +22,7 @@ from motionmind.credits.credit import add_up
 from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.studio.piece import Seam, State, key_of
-from motionmind.variation.piece import ALONE, Parts, Placement
+from motionmind.variation.piece import LONE_POSTURE_S, Parts, Placement
 
 _STILL = 30.0  # frames a second of a missing movement
 _LEAST = 1e-9  # seconds that a part counts for in credits, at least: a single posture is credited too
@@ -134,7 +134,7 @@ class Marks:
         """Return the seconds from a frame to the next one; the last frame lasts as long as the one before it."""
         count = self._count(key)
         if count <= 1:
-            return ALONE
+            return LONE_POSTURE_S
         begin = min(frame, count - 2)
         return self.at(key, begin + 1).time - self.at(key, begin).time
 

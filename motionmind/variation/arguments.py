@@ -1,4 +1,4 @@
-"""Checks of arguments: convert Python's and NumPy's numbers to Python's, which files can hold, and refuse the rest."""
+"""Checks of arguments: convert Python and NumPy numbers to Python's, which JSON can hold, and refuse the rest."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ def check_whole(name: str, value: object, least: int | None = None, most: int | 
 
     Args:
         name: the argument's name, for the message.
-        value: what was given, Python's or numpy's.
-        least: the smallest number allowed; None for no limit.
-        most: the largest number allowed; None for no limit.
+        value: the argument, Python's or NumPy's.
+        least, most: the range allowed; None for no limit.
 
     Raises:
         WrongTypeError: `value` is not a whole number.

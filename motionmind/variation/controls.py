@@ -1,9 +1,9 @@
-"""Controls: orders of a piece by chance or by a simpler mapping, for comparison with a chaotic variation.
+"""Controls: orders of a piece by chance or by a simpler mapping, to compare with a chaotic variation.
 
 - `shuffle`: the postures in random order.
-- `chunks`: the chunks of a chaotic order in random order. It keeps as much of the piece as that order does.
+- `chunks`: the chunks of a chaotic order in random order, which keeps as much of the piece.
 - `quadrants`: the postures of each body part in an independent random order, after Merce Cunningham. The composed
-  postures do not occur in the piece, so they form a new piece (`Piece.composed`), in its own order.
+  postures form a new piece (`Piece.composed`), in its own order.
 - `dabby`: the postures along a chaotic trajectory, by Dabby's mapping of one coordinate.
 """
 
@@ -25,15 +25,13 @@ from motionmind.variation.arguments import check_whole
 from motionmind.variation.orders import ORDERS, RANDOM, REFUSED, By, ControlName
 from motionmind.variation.piece import Piece
 
-_MOST = 2**63 - 1  # a seed that a file holds
-
 
 class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The control that gave a variation its order.
 
     Attributes:
         by: its name.
-        seed: the seed of its random numbers; None where nothing is random.
+        seed: the seed of its random numbers; None if nothing is random.
     """
 
     by: ControlName
@@ -41,7 +39,7 @@ class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def is_random(self) -> bool:
-        """Whether its order is random, so that no trajectory passes its postures."""
+        """Whether its order is random."""
         return self.by in RANDOM
 
     @property
@@ -50,18 +48,18 @@ class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return "flow" not in REFUSED[self.by]
 
     def of_piece(self, piece: Piece) -> tuple[Piece, Ints]:
-        """Return the piece, of composed postures if by quadrants, and its order [N]; for controls of no trajectory."""
+        """Return the piece, composed if by quadrants, and its order [N], for a control without a trajectory."""
         rng, count = np.random.default_rng(self.seed), len(piece)
         if self.by == "shuffle":
             return piece, shuffled(count, rng)
         return compose_postures(piece, quadrants(piece.motion.skeleton, count, rng)), np.arange(count)
 
     def of_trajectory(self, found: Itinerary, order: Ints) -> Ints:
-        """Return the order of a control that is made of a trajectory [L].
+        """Return the order [L] of a control with a trajectory.
 
         Args:
             found: the trajectory, and the sites of the piece.
-            order: the chaotic order, within limits if there are any [L].
+            order: the chaotic order, within the limits if any [L].
         """
         if self.by == "dabby":
             return dabby(found.sites, found.points)
@@ -78,7 +76,7 @@ def control_of(by: By, seed: int) -> Control | None:
     check_text("by", by)
     if by not in ORDERS:
         raise MotionMindError(f"no order by {by!r}{suggestion(by, ORDERS)}")
-    seed = check_whole("seed", seed, 0, _MOST)
+    seed = check_whole("seed", seed, 0, 2**63 - 1)  # JSON readers know 64-bit integers
     return None if by == "attractor" else Control(by, seed if by in RANDOM else None)
 
 
@@ -96,8 +94,8 @@ def map_points(control: Control | None, sites: Floats, points: Floats) -> Ints:
 def compose_postures(piece: Piece, sources: Ints) -> Piece:
     """Compose postures of joints from several postures of a piece.
 
-    The root position comes with the root joint. Keep the height of the lowest point in the root's source posture, as
-    other legs would otherwise sink into the floor or hover.
+    The root position comes with the root joint. The lowest point keeps its height in that source posture; otherwise
+    other legs would sink into the floor or hover.
 
     Args:
         piece: the piece, N postures.

@@ -1,4 +1,4 @@
-"""The trajectories by which a variation was made."""
+"""The trajectories of a variation."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ class Course:
         flow: the flow's name.
         parameters: the flow's parameters, by name.
         start: the start of the piece's trajectory, before its transient [d].
-        nudge: the offset, as asked for, between the starts of the two trajectories once the transient is over [d].
+        nudge: the requested offset between the starts of the two trajectories after the transient [d].
         skip: points of the trajectories to skip between two postures.
         step: the step of the integration, in the flow's units of time.
-        transient: steps that are dropped from the beginning of the piece's trajectory.
+        transient: steps dropped from the beginning of the piece's trajectory.
         exponent: the flow's largest Lyapunov exponent, nats per unit of time, accurate to a few percent.
     """
 

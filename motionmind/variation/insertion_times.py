@@ -1,4 +1,4 @@
-"""Estimates of the time that the engine will insert at each possible seam, before it searches."""
+"""Estimates of the time that the engine inserts at each possible seam."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from motionmind.variation.seams import TransitionTest
 
 
 def estimate_insertions(piece: Piece, test: TransitionTest) -> Singles:
-    """Estimate the seconds that a seam inserts from each of a piece's N postures to each other [N, N].
+    """Estimate the seconds of an insertion from each of a piece's N postures to each other [N, N].
 
     The estimate is 0 where the corpus knows the transition. Elsewhere it is the corpus's median time for the
     displacement, or longer if a body part would exceed the 99th percentile of its speed (`motionmind.tween.pacing`).
 
     Args:
         piece: the piece.
-        test: judges which transitions are abrupt.
+        test: tells which transitions are abrupt.
 
     Raises:
         SkeletonError: the piece has another skeleton than the corpus.

@@ -1,12 +1,12 @@
-"""Limits of a variation: how short stretches of the piece may be, and how much of the time insertions may take.
+"""Limits of a variation: the least length of its stretches, and the greatest share of time for insertions.
 
-The trajectory's own order has short stretches and many insertions. Limits replace it by another order near the
-trajectory (`motionmind.variation.stretches`): the cheapest with long enough stretches, at the smallest price per second
-of insertion that meets the limit. So a seam disappears, or moves to a place where the piece resembles itself more, the
-sooner the longer its insertion is and the less the trajectory requires it.
+The trajectory's own order has short stretches and many insertions. Limits replace it by the cheapest order near the
+trajectory with long enough stretches (`motionmind.variation.stretches`), at the smallest price per second of insertion
+that meets the limit. The longer its insertion and the smaller the detour, the sooner a seam disappears, or moves to
+where the piece resembles itself more.
 
-The length of an insertion is unknown until the engine finds it. So start with estimates, smooth the seams of the
-resulting order, and replace the estimates by the lengths found, until every seam of the order has been smoothed.
+The engine determines the length of an insertion. So start with estimates, smooth the seams of the resulting order, and
+replace the estimates by the actual lengths, until every seam of the order is smoothed.
 """
 
 from __future__ import annotations
@@ -21,18 +21,14 @@ from motionmind._typing import Floats, Ints, Singles
 from motionmind.chaos.reorder import Itinerary
 from motionmind.errors import MotionMindError
 from motionmind.variation.arguments import check_number, check_whole
-from motionmind.variation.departure import WITHIN, departs
+from motionmind.variation.departure import DEPARTURE_TOLERANCE, departs
 from motionmind.variation.seams import Index, Transition
 from motionmind.variation.stretches import cheapest_order
 
-STRETCH = 4  # default postures per stretch where insertions are limited
-_MOST = 4_000  # postures of a piece, and of its variation: arrays hold the square of them
-_ROUNDS = 12  # of smoothing; then only use seams that are smoothed already
-_HALVINGS = 20  # of the span of prices
-_PRICES = 1e-6, 1e4  # of a second, in the trajectory's extents
-_NEVER = 1e6  # seconds assigned to a forbidden seam
+_MAX_POSTURES = 4_000  # of a piece, and of its variation: arrays hold the square of them
+_MAX_ROUNDS = 12  # of smoothing; then only use seams that are smoothed already
 
-Smoothing = Callable[[Sequence[tuple[int, int]]], tuple[Transition, ...]]  # smooths seams; fewer if it was ended
+Smoothing = Callable[[Sequence[tuple[int, int]]], tuple[Transition, ...]]  # smooths seams; fewer if interrupted
 
 
 class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -75,21 +71,21 @@ def check_limits(inserted: float | None, stretch: int | None, count: int, length
         return None
     if inserted is not None and not 0.0 <= check_number("inserted", inserted) <= 1.0:
         raise MotionMindError(f"the share of inserted time must be from 0 to 1, not {inserted}")
-    if max(count, length) > _MOST:
+    if max(count, length) > _MAX_POSTURES:
         raise MotionMindError(
-            f"inserted and stretch are for pieces and variations of up to {_MOST:,} postures, not of "
+            f"inserted and stretch are for pieces and variations of up to {_MAX_POSTURES:,} postures, not of "
             f"{max(count, length):,}: vary a part"
         )
     most = min(count, length)
     if stretch is not None and check_whole("stretch", stretch, 1) > most:
-        raise MotionMindError(f"there are no stretches of {stretch} postures: the piece or its variation has {most}")
+        raise MotionMindError(f"stretch must be at most {most}, the postures of piece and variation, not {stretch}")
     share = None if inserted is None else float(inserted)
-    return Limits(share, min(STRETCH, most) if stretch is None else int(stretch))
+    return Limits(share, min(4, most) if stretch is None else int(stretch))
 
 
 def check_departure(depart: float | None, limits: Limits | None) -> None:
     """Raise MotionMindError if the least length of stretches rules out departing at this share of the steps."""
-    if depart is not None and limits is not None and depart > 1.0 / limits.stretch + WITHIN:
+    if depart is not None and limits is not None and depart > 1.0 / limits.stretch + DEPARTURE_TOLERANCE:
         raise MotionMindError(
             f"depart {depart:g} cannot be reached in stretches of {limits.stretch} postures: at most 1 step in "
             f"{limits.stretch} leaves the piece's order; take shorter stretches"
@@ -101,7 +97,7 @@ def inserted_share(inserted: Floats, durations: Floats) -> float:
 
     Args:
         inserted: seconds of the insertion at each of its steps, 0 where there is none [L - 1].
-        durations: seconds of the same steps in the piece [L - 1], which an insertion replaces.
+        durations: seconds of the same steps in the piece [L - 1]; an insertion replaces them.
     """
     total = float(np.where(inserted > 0.0, inserted, durations).sum())
     return float(inserted.sum()) / total if total > 0.0 else 0.0
@@ -109,7 +105,7 @@ def inserted_share(inserted: Floats, durations: Floats) -> float:
 
 @dataclass(eq=False)
 class _Seeker:
-    """A search for an order within limits; `seconds` [N, N] holds estimates until the found lengths replace them."""
+    """A search for an order within limits; actual lengths replace the estimates in `seconds` [N, N]."""
 
     course: Itinerary
     durations: Floats
@@ -117,15 +113,15 @@ class _Seeker:
     seconds: Singles
 
     def order(self) -> Ints:
-        """Return the order at the smallest price that meets the limit, by present knowledge [L]."""
+        """Return the order [L] at the smallest price that meets the limit, by the present `seconds`."""
         at_no_price = self._cheapest(0.0)
         if self._holds(at_no_price):
             return at_no_price
-        low, high = np.log(_PRICES)
+        low, high = np.log((1e-6, 1e4))  # price of a second, in the trajectory's extents
         best = self._cheapest(float(np.exp(high)))
         if not self._holds(best):
             return best  # no other inserts less
-        for _ in range(_HALVINGS):
+        for _ in range(20):
             middle = 0.5 * (low + high)
             order = self._cheapest(float(np.exp(middle)))
             if self._holds(order):
@@ -156,11 +152,11 @@ def keep_within(
         limits: the limits.
         course: the trajectories.
         durations: seconds from each of the piece's postures to the next [N].
-        seconds: estimated seconds that a seam inserts from each posture to each other [N, N].
-        smooth: smooths seams; None if no corpus does.
+        seconds: estimated seconds of the insertion from each posture to each other [N, N].
+        smooth: smooths seams; None without a corpus.
 
     Returns:
-        The order, and its seams, judged and smoothed.
+        The order, and its judged and smoothed seams.
 
     Raises:
         MotionMindError: there is no order with such stretches.
@@ -168,7 +164,7 @@ def keep_within(
     seeker = _Seeker(course, durations, limits, seconds.copy())
     smoothed: dict[tuple[int, int], Transition] = {}
     order = seeker.order()
-    for number in range(_ROUNDS + 1):
+    for number in range(_MAX_ROUNDS + 1):
         pairs = _seams_of(order)
         new = [pair for pair in pairs if pair not in smoothed]
         if not new or smooth is None:
@@ -178,11 +174,11 @@ def keep_within(
         if any(one.is_pending for one in found):  # ended early
             break
         _learn(seeker, seconds, smoothed)
-        if number == _ROUNDS - 1:
+        if number == _MAX_ROUNDS - 1:
             taken = np.array(list(smoothed))
             rest = np.ones(seconds.shape, dtype=np.bool_)
             rest[taken[:, 0], taken[:, 1]] = False
-            seeker.seconds[rest] = _NEVER
+            seeker.seconds[rest] = 1e6  # so long that no order takes these seams
         order = seeker.order()
     kept = Kept(tuple(order.tolist()), limits)
     return kept, tuple(smoothed[pair] for pair in _seams_of(order) if pair in smoothed)
@@ -195,7 +191,7 @@ def _seams_of(order: Ints) -> list[tuple[int, int]]:
 
 
 def _learn(seeker: _Seeker, estimates: Singles, smoothed: Mapping[tuple[int, int], Transition]) -> None:
-    """Replace estimates by the found lengths, and rescale the other estimates to match."""
+    """Replace estimates by actual lengths, and rescale the other estimates to match."""
     known = {pair: float(one.candidates[0].motion.times[-1]) for pair, one in smoothed.items() if one.candidates}
     scale = 1.0
     if known:

@@ -1,4 +1,4 @@
-"""The orders in which `vary` puts a piece, and the arguments that each does not take; nothing here imports numpy."""
+"""The orders that `vary` can give a piece, and the arguments that each refuses; imports no NumPy."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _UNTRACED = dict.fromkeys(
     ("flow", "nudge", "depart", "start", "skip", "step", "transient", "inserted", "stretch"), "follows no trajectory"
 )
 _ONCE = {"length": "goes through the piece once"}
-# By order, the arguments of `vary` that it does not take, each with the reason.
+# By order, the arguments of `vary` that it refuses, each with the reason.
 REFUSED: Mapping[By, Mapping[str, str]] = {
     "attractor": {},
     "shuffle": _UNTRACED | _ONCE,
@@ -27,7 +27,7 @@ REFUSED: Mapping[By, Mapping[str, str]] = {
 
 
 def check_taken(by: By, arguments: Mapping[str, object]) -> None:
-    """Raise MotionMindError if an order does not take one of the arguments of `vary` that are given, not None."""
+    """Raise MotionMindError if an order refuses one of the given arguments of `vary`; None counts as not given."""
     for name, reason in REFUSED[by].items():
         if arguments[name] is not None:
             raise MotionMindError(f"{name} is not for {by}, which {reason}")

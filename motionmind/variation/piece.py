@@ -1,8 +1,8 @@
-"""A piece of movement as postures that can follow one another in any order, and the movement of such an order.
+"""A piece of movement, cut into postures, and its arrangement in another order.
 
-Postures that follow one another as in the piece form a *chunk*, which stays one movement: a chunk is placed whole,
-moved over the floor and, if the piece may face anywhere, turned about the vertical. So each step keeps its displacement
-in the body's heading, and nothing teleports: a chunk begins where the one before it ended.
+A *chunk* is a run of postures in the piece's own order. An arrangement moves each chunk as a whole over the floor and,
+if the piece may face anywhere, turns it about the vertical, so that it begins where the chunk before it ended. Each
+step keeps its displacement relative to the body's heading.
 """
 
 from __future__ import annotations
@@ -24,16 +24,13 @@ from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 from motionmind.variation.arguments import check_number
 
-_ROUNDING = 1e-9  # seconds
-ALONE = 1.0  # seconds that the only posture of a piece lasts
-_VERTICAL = np.array([0.0, 1.0, 0.0])
-_FLOOR = np.array([1.0, 0.0, 1.0])
-
-_LEAD = 0.2  # seconds of the piece's movement on either side of a transition
-# Seconds between frames beyond which they do not show how fast the piece passes one of them. Nearer keyframes do: the
-# piece goes in a straight line from one to the next, so that is its velocity. Of a second between two positions nobody
-# knows how it is spent, often mostly at rest.
-_FARTHEST = 0.5 + 1e-6
+_CLOCK_TOLERANCE_S = 1e-9
+LONE_POSTURE_S = 1.0  # duration of the only posture of a piece
+_HORIZONTAL = np.array([1.0, 0.0, 1.0])
+_LEAD_S = 0.2  # of the piece's movement on either side of a transition
+# Frames farther apart do not show how fast the piece passes them: a second between two positions may be spent mostly at
+# rest. Between nearer keyframes the piece moves in a straight line, which gives its velocity.
+_MAX_FRAME_GAP_S = 0.5 + 1e-6
 
 
 class Arrangement(NamedTuple):
@@ -55,13 +52,13 @@ class Placement(NamedTuple):
     shift: Floats
 
     def turn(self, rotations: Floats) -> Floats:
-        """Local rotations [..., J, 4], the root's turned."""
+        """Return local rotations [..., J, 4] with the root turned."""
         turned = rotations.copy()
         turned[..., 0, :] = rot.mul(rot.about_vertical(self.angle), rotations[..., 0, :])
         return turned
 
     def move(self, root: Floats) -> Floats:
-        """Positions [..., 3] of the root, turned and moved, metres."""
+        """Return root positions [..., 3], turned and moved, metres."""
         return np.asarray(rot.mul_vec(rot.about_vertical(self.angle), root) + self.shift)
 
 
@@ -72,9 +69,9 @@ class Piece:
     Attributes:
         motion: the piece, all its frames, from its first posture to its last.
         frames: the frame of each posture [N], increasing from 0.
-        facing: "free" if the piece may face anywhere: a chunk then continues in the heading in which the last one
-            ended. "stage" if each posture keeps its own orientation.
-        composed: whether nobody ever went from one of its postures to the next: each is a chunk by itself.
+        facing: "free" if the piece may face anywhere: each chunk continues in the heading of the one before it; "stage"
+            if each posture keeps its orientation.
+        composed: whether its postures were composed of several, so that each is a chunk by itself.
 
     >>> from motionmind import Engine, Piece
     >>> engine = Engine.load("ballet")
@@ -105,7 +102,7 @@ class Piece:
     def of(cls, motion: Motion, rate: float | None = None, facing: Facing = "free") -> Piece:
         """Cut a motion into postures.
 
-        The rest after the last posture, less than a step, is not part of the piece.
+        The piece ends at the last posture; a remainder of less than a step is dropped.
 
         Args:
             motion: the movement.
@@ -144,74 +141,73 @@ class Piece:
     def durations(self) -> Floats:
         """Seconds from each posture to the next one [N]; the last lasts as long as the one before it."""
         steps = np.diff(self.motion.times[self.frames])
-        return np.append(steps, steps[-1:] if len(steps) else ALONE)
+        return np.append(steps, steps[-1:] if len(steps) else LONE_POSTURE_S)
 
     def is_seam(self, i: int, k: int) -> bool:
-        """Tell whether going from posture i to posture k is neither the piece's own step nor a stay."""
+        """Return whether a step from posture i to posture k is a seam: neither the piece's own step nor a stay."""
         return k != i and (self.composed or k != i + 1)
 
     def chunks(self, order: Ints) -> tuple[Ints, Ints]:
-        """Return where the chunks of an order of postures [L] start [C], and where they stop [C]."""
+        """Return the starts [C] and stops [C] of the chunks of an order of postures [L]."""
         leaps = np.flatnonzero((np.diff(order) != 1) | self.composed) + 1
         return np.concatenate([[0], leaps]), np.concatenate([leaps, [len(order)]])
 
     def ends(self, i: int, k: int) -> tuple[Posture, Posture]:
-        """Return postures i and k for a movement from one to the other: both above the origin and, if the facing is
-        free, both facing +Z."""
+        """Return postures i and k above the origin and, if the facing is free, facing +Z."""
         return self._at_origin(i), self._at_origin(k)
 
     def around(self, i: int, k: int) -> tuple[Motion | None, Motion | None]:
-        """Return how the piece moves up to posture i and from posture k on, each placed as in `ends`.
+        """Return the piece's movement up to posture i and from posture k, each placed as in `ends`.
 
-        Each lasts a fifth of a second, or until the next frame if that is later; None where the piece has no frame, or
-        none within half a second, and for composed postures.
+        Each lasts 0.2 s, or to the next frame if that is farther; None if the next frame is missing or more than 0.5 s
+        away, and for composed postures.
         """
         if self.composed:
             return None, None
         times, begin, end = self.motion.times, int(self.frames[i]), int(self.frames[k])
-        first = min(int(np.searchsorted(times, times[begin] - _LEAD - _ROUNDING)), begin - 1)
-        last = max(int(np.searchsorted(times, times[end] + _LEAD + _ROUNDING)), end + 2) - 1
-        leads = first >= 0 and times[begin] - times[begin - 1] <= _FARTHEST
-        follows = last < len(times) and times[end + 1] - times[end] <= _FARTHEST
+        first = min(int(np.searchsorted(times, times[begin] - _LEAD_S - _CLOCK_TOLERANCE_S)), begin - 1)
+        last = max(int(np.searchsorted(times, times[end] + _LEAD_S + _CLOCK_TOLERANCE_S)), end + 2) - 1
+        leads = first >= 0 and times[begin] - times[begin - 1] <= _MAX_FRAME_GAP_S
+        follows = last < len(times) and times[end + 1] - times[end] <= _MAX_FRAME_GAP_S
         return (
             self._stretch_at_origin(first, begin + 1, i) if leads else None,
             self._stretch_at_origin(end, last + 1, k) if follows else None,
         )
 
     def _stretch_at_origin(self, first: int, stop: int, posture: int) -> Motion:
-        """Return the frames from `first` to before `stop`, placed as `_at_origin` places a posture among them."""
+        """Return frames `first` to `stop` - 1, placed so that a posture among them is `_at_origin`."""
         own, place = self.motion.slice(first, stop), Placement(-self._headings[posture], np.zeros(3))
-        root = place.move(own.root - self.motion.root[self.frames[posture]] * _FLOOR)
+        root = place.move(own.root - self.motion.root[self.frames[posture]] * _HORIZONTAL)
         return replace(own, rotations=rot.normalise(place.turn(own.rotations)), root=root)
 
     def _at_origin(self, posture: int) -> Posture:
         own = self.motion.posture(int(self.frames[posture]))
         rotations = Placement(-self._headings[posture], np.zeros(3)).turn(own.rotations)
-        return replace(own, rotations=rot.normalise(rotations), root=own.root * _VERTICAL)
+        return replace(own, rotations=rot.normalise(rotations), root=own.root * (0.0, 1.0, 0.0))
 
     @cached_property
     def _headings(self) -> Floats:
-        """Heading of each posture [N], radians; 0 if postures keep their orientation: nothing is turned."""
+        """Heading of each posture [N], radians; 0 if postures keep their orientation."""
         if self.facing == "stage":
             return np.zeros(len(self))
         return rot.heading(self.motion.rotations[self.frames, 0])
 
     def _insertions_within(self, frames: slice) -> Iterator[Insertion]:
-        """The piece's own insertions that lie wholly within a slice of its frames."""
+        """Yield the piece's own insertions that lie within a slice of its frames."""
         times = self.motion.times[frames]
         for mark in self.motion.insertions:
-            if times[0] - _ROUNDING <= mark.times[0] and mark.times[-1] <= times[-1] + _ROUNDING:
+            if times[0] - _CLOCK_TOLERANCE_S <= mark.times[0] and mark.times[-1] <= times[-1] + _CLOCK_TOLERANCE_S:
                 yield mark
 
     def arrange(self, order: Ints, insertions: Mapping[int, Motion]) -> Arrangement:
         """Put the piece's postures in another order.
 
-        The piece's own insertions stay marked where a chunk holds the whole of them.
+        The piece's own insertions stay marked if a chunk contains them whole.
 
         Args:
-            order: numbers of postures [L], any number of them.
-            insertions: the movement from the n-th posture of the order to the next, by n, from and to `ends`. Where the
-                order leaves the piece's and there is no insertion, the next posture follows at once.
+            order: numbers of postures [L].
+            insertions: movement from the n-th posture of the order to the next, between their `ends`, by n. At a seam
+                without an insertion, the next posture follows at once.
         """
         starts, stops = self.chunks(order)
         motion, parts = self.motion, Parts()
@@ -224,7 +220,7 @@ class Piece:
             parts.add(motion.rotations[chunk], motion.root[chunk], motion.times[chunk], marks, place, clock)
             if stop == len(order):
                 break
-            end, heading = parts.root[-1][-1] * _FLOOR, place.angle + self._headings[last]
+            end, heading = parts.root[-1][-1] * _HORIZONTAL, place.angle + self._headings[last]
             now, inserted = float(parts.times[-1][-1]), insertions.get(int(stop - 1))
             if inserted is None:
                 now += float(self.durations[last])
@@ -237,10 +233,10 @@ class Piece:
         return parts.join(motion)
 
     def _continue(self, posture: int, end: Floats, heading: float, now: float) -> tuple[Placement, float]:
-        """The placement and the clock of a chunk that begins with a posture at `end` [3], at the time `now`."""
+        """Return the placement and clock offset of a chunk that begins with a posture at `end` [3] and time `now`."""
         angle = heading - self._headings[posture]
         begins = self.frames[posture]
-        turned = rot.mul_vec(rot.about_vertical(angle), self.motion.root[begins] * _FLOOR)
+        turned = rot.mul_vec(rot.about_vertical(angle), self.motion.root[begins] * _HORIZONTAL)
         return Placement(float(angle), end - turned), now - float(self.motion.times[begins])
 
 
@@ -272,7 +268,7 @@ class Parts:
         self.insertions.extend(replace(one, times=one.times + clock) for one in insertions)
 
     def join(self, motion: Motion) -> Arrangement:
-        """All of them as one movement."""
+        """Concatenate the parts into one movement."""
         arranged = replace(
             motion,
             rotations=np.concatenate(self.rotations),

@@ -1,4 +1,4 @@
-"""The report of a variation: what it is made of, all but the movement, as a schema for JSON."""
+"""The report of a variation for JSON: everything but the movement."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class PieceReport(msgspec.Struct, frozen=True):
 
 
 class CourseReport(msgspec.Struct, frozen=True):
-    """The trajectories (see `Course`); `parting` in nats, on average, from one posture to the next; `departed` is the
-    share of steps by which the order without limits leaves the piece's."""
+    """The trajectories (see `Course`); `parting` in nats from one posture to the next, on average; `departed` is the
+    share of departing steps in the order without limits."""
 
     flow: str
     parameters: Mapping[str, float]
@@ -53,15 +53,14 @@ class CountsReport(msgspec.Struct, frozen=True):
         postures: postures.
         seams: seams.
         inserted: seams with an insertion.
-        attested: seams that their corpus knows.
+        attested: seams whose transition the corpus contains.
         abrupt: seams that are abrupt and not smoothed.
         unjudged: seams that no corpus has judged.
         stays: steps that stay in their posture.
-        seconds_still: the duration of these, seconds.
-        departed: share of the steps that leave the piece's order.
-        mean_chunk: postures of a chunk, on average.
-        longest_chunk: postures of the longest.
-        inserted_share: share of the time that insertions take.
+        seconds_still: duration of the stays, seconds.
+        departed: share of departing steps.
+        mean_chunk, longest_chunk: postures of the chunks.
+        inserted_share: share of the time for insertions.
     """
 
     postures: int
@@ -79,8 +78,7 @@ class CountsReport(msgspec.Struct, frozen=True):
 
 
 class CandidateReport(msgspec.Struct, frozen=True):
-    """A candidate for an insertion (see `InsertionCandidate`): its length in moves and seconds, its certificate, and
-    whose movement it is made of."""
+    """A candidate (see `InsertionCandidate`): its length in moves and seconds, its certificate, and its credits."""
 
     moves: int
     seconds: float
@@ -110,11 +108,20 @@ class SeamReport(msgspec.Struct, frozen=True):
 
 
 class VariationReport(msgspec.Struct, frozen=True):
-    """The report of a variation as it stands; `course` is null where it follows no trajectory, `order` is the piece's
-    postures [L], `edits` the number of edits, `credits` whose movement it is made of: its own stretches are the
-    piece's, `limits` those that its first order was kept within, null for none, `control` the control that gave the
-    first order, null for the attractor's own, and `motion_sha256` the hash of the file that was written with the
-    report, null where none was."""
+    """The report of a variation as it stands.
+
+    Attributes:
+        piece: the piece.
+        course: the trajectories; null if it follows none.
+        order: the piece's postures in their present order [L].
+        counts: numbers of postures and seams.
+        seams: the seams.
+        edits: number of edits.
+        credits: sources of the movement, by share.
+        limits: limits of its first order; null for none.
+        control: the control of its first order; null for the attractor's own.
+        motion_sha256: hash of the movement's file, written with the report; null if there is none.
+    """
 
     piece: PieceReport
     course: CourseReport | None
@@ -139,18 +146,18 @@ def report_of(
     kept: Kept | None,
     shares: tuple[Credit, ...],
 ) -> VariationReport:
-    """Report a variation: all but the movement.
+    """Return the report of a variation.
 
     Args:
-        piece: what it is a variation of.
-        course: the trajectories by which it was made, if any.
-        control: the control by which it was made, if any.
-        made: numbers of the piece's postures as these gave them [L].
-        order: numbers of the piece's postures as they stand now [L].
+        piece: the piece.
+        course: its trajectories, if any.
+        control: its control, if any.
+        made: the order from these [L].
+        order: the present order [L].
         seams: its seams.
         edits: number of its edits.
-        kept: the order within limits that it began with, if it did.
-        shares: whose movement it is made of.
+        kept: its first order within limits, if any.
+        shares: its credits.
     """
     return VariationReport(
         PieceReport(piece.motion.name, len(piece), piece.facing),

@@ -1,7 +1,7 @@
-"""The review of a variation: edits, each of which leads from one state of the review to the next.
+"""The review of a variation: its edits and its state.
 
-An edit loses nothing. A variation keeps the list of its edits; applying them in turn to the first order gives its
-state. To undo the last edit, drop it from the list.
+A variation keeps the list of its edits, which lose nothing: applied in turn to the first order they give its state. To
+undo the last edit, drop it from the list.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Discard(msgspec.Struct, frozen=True, tag_field="edit", tag="discard", forb
 
 
 class Replace(msgspec.Struct, frozen=True, tag_field="edit", tag="replace", forbid_unknown_fields=True):
-    """Insert another of the movements that the engine found for a seam, counted from 1."""
+    """Insert another candidate of a seam, counted from 1."""
 
     seam: int
     alternative: int
@@ -46,24 +46,23 @@ class Replace(msgspec.Struct, frozen=True, tag_field="edit", tag="replace", forb
 class Cut(msgspec.Struct, frozen=True, tag_field="edit", tag="cut", forbid_unknown_fields=True):
     """Move postures `first` to `last` before posture `before`, all as numbered before the edit.
 
-    Attributes:
-        numbers: "anew" to number seams in their new order; "kept", as in files of 0.1, if each seam keeps its number
-            and new seams get the next ones.
+    Seams are then numbered in their new order. In files `numbers` says so; cuts of earlier versions, which kept the old
+    numbers, lack it.
     """
 
     first: int
     last: int
     before: int
-    numbers: Literal["kept", "anew"] = "kept"
+    numbers: Literal["anew"]
 
 
 class Smooth(
     msgspec.Struct, Generic[T], frozen=True, eq=False, tag_field="edit", tag="smooth", forbid_unknown_fields=True
 ):
-    """Judge and smooth transitions that were not judged before, or whose insertion was discarded; they become open.
+    """Judge and smooth transitions without a judgement, or with a discarded insertion; they become open.
 
     Attributes:
-        transitions: the new judgements, with what the engine found; variation files call them `joins`.
+        transitions: the new judgements, with their candidates; variation files call them `joins`.
     """
 
     transitions: tuple[T, ...] = msgspec.field(name="joins")
@@ -78,8 +77,7 @@ class Verdict:
 
     Attributes:
         number: the seam's number, from 1 on in the order of the movement.
-        decision: open until somebody approves or discards the seam; insertions that are not discarded are in the
-            movement.
+        decision: open until approved or discarded; the movement contains all insertions that are not discarded.
         chosen: the number of the chosen candidate, counted from 1.
     """
 
@@ -142,8 +140,8 @@ class ReviewState:
         piece: the piece.
         order: its postures in their first order [L].
         sequence: the entries of `order` in their present order [L].
-        transitions: judged transitions, by the postures of the piece that they lead from and to.
-        verdicts: decisions, by the two entries of `order` between which the seam is or was.
+        transitions: judged transitions, by their two postures of the piece, (from, to).
+        verdicts: decisions, by the two entries of `order` that the seam joins or joined.
     """
 
     piece: Piece
@@ -170,7 +168,7 @@ class ReviewState:
         return tuple(seams)
 
     def looks_like(self, other: ReviewState) -> bool:
-        """Return whether another state has the same postures, seams and insertions, and so looks the same."""
+        """Return whether another state has the same postures, seams and insertions."""
         mine, theirs = (
             [(seam.number, seam.transition, seam.decision, seam.chosen) for seam in state.seams]
             for state in (self, other)
@@ -178,7 +176,7 @@ class ReviewState:
         return np.array_equal(self.postures, other.postures) and mine == theirs
 
     def seam(self, number: int) -> Seam:
-        """Return the seam with a number; MotionMindError, which lists the existing seams, if there is none."""
+        """Return the seam with a number; MotionMindError lists the existing seams if there is none."""
         for seam in self.seams:
             if seam.number == number:
                 return seam
@@ -192,7 +190,7 @@ def initial_state(piece: Piece, order: Ints, transitions: tuple[Transition, ...]
     Args:
         piece: the piece.
         order: its postures in their first order [L].
-        transitions: what a corpus judged.
+        transitions: judged transitions.
     """
     known = {(transition.start, transition.end): transition for transition in transitions}
     return _number_seams(ReviewState(piece, order, tuple(range(len(order))), known, {}))
@@ -217,8 +215,7 @@ def apply_edit(state: ReviewState, edit: Edit) -> ReviewState:
                 raise MotionMindError(f"seam {number} has alternatives 1 to {count}, no alternative {alternative}")
             return _change_verdict(state, number, chosen=alternative, decision="open")
         case Cut():
-            moved = _number_seams(replace(state, sequence=_move_postures(state.sequence, edit)))
-            return _number_anew(moved) if edit.numbers == "anew" else moved
+            return _number_seams(replace(state, sequence=_move_postures(state.sequence, edit)))
         case Smooth(transitions):
             return _judge_anew(state, {(one.start, one.end): one for one in transitions})
 
@@ -234,7 +231,7 @@ def _judge_anew(state: ReviewState, judged: Mapping[tuple[int, int], Transition]
 
 
 def _candidates(state: ReviewState, number: int, purpose: str) -> tuple[Candidate, ...]:
-    """The candidates for a seam; MotionMindError, which names the `purpose`, if there are none."""
+    """Return the candidates of a seam; MotionMindError names the `purpose` if there are none."""
     transition = state.seam(number).transition
     if not (transition and transition.candidates):
         raise MotionMindError(f"seam {number} has no insertion to {purpose}")
@@ -255,7 +252,7 @@ def _change_verdict(state: ReviewState, number: int, **changes: object) -> Revie
 
 
 def _move_postures(sequence: tuple[int, ...], cut: Cut) -> tuple[int, ...]:
-    """The sequence with the cut postures in their new place."""
+    """Return the sequence with the cut postures in their new place."""
     count = len(sequence)
     if not 0 <= cut.first <= cut.last < count:
         raise MotionMindError(f"cannot cut {cut.first}..{cut.last}: postures are 0 to {count - 1}, the first one first")
@@ -273,16 +270,10 @@ def _move_postures(sequence: tuple[int, ...], cut: Cut) -> tuple[int, ...]:
 
 
 def _number_seams(state: ReviewState) -> ReviewState:
-    """The state with a verdict on each seam: new seams are open, and get the next numbers."""
-    verdicts = dict(state.verdicts)
-    for pair in pairwise(state.sequence):
-        if state.piece.is_seam(*state.order[list(pair)]) and pair not in verdicts:
-            verdicts[pair] = Verdict(len(verdicts) + 1)
-    return replace(state, verdicts=verdicts)
-
-
-def _number_anew(state: ReviewState) -> ReviewState:
-    """The state with its seams numbered in the order in which they come."""
-    pairs = [(state.sequence[seam.at], state.sequence[seam.at + 1]) for seam in state.seams]
-    verdicts = {pair: replace(state.verdicts[pair], number=number) for number, pair in enumerate(pairs, start=1)}
-    return replace(state, verdicts={**state.verdicts, **verdicts})
+    """Return the state with its seams numbered in their order; a new seam is open."""
+    pairs = [pair for pair in pairwise(state.sequence) if state.piece.is_seam(*state.order[list(pair)])]
+    numbered = {
+        pair: replace(state.verdicts.get(pair, Verdict(number)), number=number)
+        for number, pair in enumerate(pairs, start=1)
+    }
+    return replace(state, verdicts={**state.verdicts, **numbered})

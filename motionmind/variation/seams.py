@@ -1,8 +1,8 @@
-"""Transitions at the seams of a variation, where one posture of a piece follows another that it did not follow there:
-which of them are abrupt, and the movement that the engine inserts to smooth those.
+"""Transitions at the seams of a variation: which are abrupt, and the movement that the engine inserts to smooth them.
 
-A transition is abrupt if the corpus does not know it: some joint goes from one state to another as it never does in the
-corpus (or, by whole bodies, the body does), or turns faster than it ever does there. Staying in a state is no move.
+A seam joins two postures that are not successive in the piece. Its transition is abrupt if the corpus lacks it: some
+joint (with `posturewise`, the whole body) makes a move between states that the corpus does not contain, or some joint
+turns faster than ever in the corpus. Staying in a state is no move.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from motionmind.tween.result import Tween
 from motionmind.variation.arguments import check_whole
 from motionmind.variation.piece import Piece
 
-OnProgress = Callable[[int, int], None]  # called with how many searches are done, and how many there are
+OnProgress = Callable[[int, int], None]  # called with the numbers of searches done and in all
 Index = Annotated[int, msgspec.Meta(ge=0, lt=2**31)]  # of a posture or a state
 M = TypeVar("M")  # a movement: Motion, or its form in a file
 P = TypeVar("P", bound=Sized)  # a path of states: Int32s, or its form in a file
@@ -37,7 +37,6 @@ M2 = TypeVar("M2")  # the same three in the other form
 P2 = TypeVar("P2", bound=Sized)
 C2 = TypeVar("C2")
 
-_ROUNDING = 1.0 + 1e-6  # the corpus's fastest move, made again, is not faster than itself
 BODY = "body"  # stands for the joint where whole bodies are judged
 
 
@@ -47,9 +46,9 @@ class AbruptJoint:
 
     Attributes:
         joint: its name.
-        degrees: the angle that it turns by; for "body", the largest angle of any joint.
-        attested: whether the corpus has it go from the one state to the other.
-        fast: whether it turns faster than it ever does in the corpus.
+        degrees: its turn; for "body", the largest turn of any joint.
+        attested: whether the corpus contains its move from the one state to the other.
+        fast: whether it turns faster than ever in the corpus.
     """
 
     joint: str
@@ -66,11 +65,11 @@ class InsertionCandidate(msgspec.Struct, Generic[M, P], frozen=True, eq=False, f
     Attributes:
         motion: the movement, from and to `Piece.ends`.
         path: states of the chains [moves + 1, L].
-        status: what is proven of it.
+        status: the proof: "optimal", "bounded", "interrupted" or "sampled".
         cost: nats.
         lower_bound: no path costs less, nats.
-        attested: share of the joints' moves that the corpus attests.
-        bridges: the moves that it does not attest, other than waits.
+        attested: share of joint-moves that the corpus attests.
+        bridges: unattested moves, other than waits.
         waits: moves that joints spend waiting at their goals.
     """
 
@@ -107,18 +106,17 @@ Candidate = InsertionCandidate[Motion, Int32s]
 
 
 class JudgedTransition(msgspec.Struct, Generic[C], frozen=True, eq=False, forbid_unknown_fields=True):
-    """A corpus's judgement of posture `end` of a piece following posture `start`, and the movement to go between them.
+    """A corpus's judgement of the transition from posture `start` of a piece to `end`, and movement to insert there.
 
     Variation files hold the same fields in this order; `breaks` and `asked` are their names there for two of them.
 
     Attributes:
-        start: the posture that the transition leads from.
-        end: the posture that it leads to.
+        start, end: numbers of the two postures.
         corpus: the name of the corpus.
-        abrupt_joints: the joints that make it abrupt; none if the corpus knows the transition.
-        candidates: movements that the engine found to go between, the best first.
+        abrupt_joints: the joints that make it abrupt; none if the corpus contains the transition.
+        candidates: movements found by the engine, the best first.
         failure: why the engine found none; "" if it found some or has not searched.
-        options: the options of the engine's search, as plain values.
+        options: the options of the search, as plain values.
     """
 
     start: Index
@@ -135,7 +133,7 @@ class JudgedTransition(msgspec.Struct, Generic[C], frozen=True, eq=False, forbid
 
     @property
     def is_abrupt(self) -> bool:
-        """Whether the corpus does not know this transition."""
+        """Whether the corpus lacks this transition."""
         return bool(self.abrupt_joints)
 
     @property
@@ -144,7 +142,7 @@ class JudgedTransition(msgspec.Struct, Generic[C], frozen=True, eq=False, forbid
         return self.is_abrupt and not self.candidates and not self.failure
 
     def tells_more_than(self, other: JudgedTransition[C] | None) -> bool:
-        """Tell whether it adds to an earlier judgement of the same transition; None stands for no judgement."""
+        """Return whether it adds to an earlier judgement of the same transition, or to None."""
         if other is None or self.candidates or not self.is_abrupt:
             return True
         mine, theirs = ((one.corpus, one.abrupt_joints, one.failure) for one in (self, other))
@@ -161,11 +159,11 @@ Transition = JudgedTransition[Candidate]
 
 @dataclass(frozen=True, eq=False)
 class TransitionTest:
-    """A test of which transitions are abrupt beside a corpus.
+    """A test for transitions that a corpus lacks.
 
     Attributes:
-        engine: what was learned from the corpus.
-        whole_body: whether the whole body must have made the move, not each joint.
+        engine: the corpus.
+        posturewise: whether to test moves of the whole body instead of each joint.
     """
 
     engine: Engine
@@ -198,7 +196,7 @@ class TransitionTest:
         return tuple(found)
 
     def known(self, rotations: Floats, durations: Floats) -> Bools:
-        """Tell which transitions between N postures are not abrupt, from each to each [N, N].
+        """Return which transitions between N postures are not abrupt [from N, to N].
 
         Args:
             rotations: local rotations of the postures [N, J, 4].
@@ -218,12 +216,12 @@ class TransitionTest:
             raise SkeletonError(f"the piece is on another skeleton than corpus {corpus.name!r}: {difference}")
 
     def _largest(self, seconds: float) -> Floats:
-        """Degrees that each chain may turn by within some seconds, and not be too fast [L]."""
-        # Within a state's tolerance orientations are one to the corpus: that is no turn.
-        return np.asarray(np.maximum(self.engine.space.tolerances, self._fastest * seconds) * _ROUNDING)
+        """Return the largest turn of each chain within some seconds that is not too fast [L], degrees."""
+        # A turn within a state's tolerance is no move; 1e-6 absorbs rounding when the corpus's fastest move recurs.
+        return np.asarray(np.maximum(self.engine.space.tolerances, self._fastest * seconds) * (1.0 + 1e-6))
 
     def _attested_pairs(self, states: Int32s) -> Bools:
-        """Whether the corpus attests every chain's move from each row of states [N, L] to each [N, N]."""
+        """Return whether the corpus attests all chains' moves between rows of states [N, L]: [from N, to N]."""
         graph = self.engine.grammar.transitions
         attested = np.ones((len(states), len(states)), dtype=np.bool_)
         for chain in range(states.shape[1]):
@@ -236,7 +234,7 @@ class TransitionTest:
         return attested
 
     def _known_bodies(self, states: Int32s) -> Bools:
-        """Whether a body of the corpus went from each row of states [N, L] to each [N, N]; it may always stay."""
+        """Return whether a whole body in the corpus moved between rows of states [N, L], or stayed: [from N, to N]."""
         moves, joints, count = self.engine.corpus.moves, len(self.engine.corpus.skeleton), len(states)
         rows = np.concatenate([states, self.engine.states])[:, :joints]
         _, which = np.unique(rows, axis=0, return_inverse=True)
@@ -249,7 +247,7 @@ class TransitionTest:
 
     @cached_property
     def _fastest(self) -> Floats:
-        """Degrees a second that each chain turns at most in a move of the corpus [L]."""
+        """Largest speed of each chain in a move of the corpus [L], degrees a second."""
         corpus, moves = self.engine.corpus, self.engine.corpus.moves
         if len(moves) == 0:
             return np.zeros(len(corpus.chains))
@@ -258,13 +256,13 @@ class TransitionTest:
         return np.asarray((angles / moves.seconds[:, None]).max(axis=0))
 
     def _attested(self, before: Int32s, after: Int32s) -> Bools:
-        """Whether the corpus attests each chain's move from states [L] to states [L]; a chain may always stay [L]."""
+        """Return whether the corpus attests each chain's move between states [L], or the chain stays [L]."""
         graph = self.engine.grammar.transitions
         pairs = enumerate(zip(before, after, strict=True))
         return np.array([state == target or graph.edge(chain, state, target) >= 0 for chain, (state, target) in pairs])
 
     def _has_made(self, before: Int32s, after: Int32s) -> bool:
-        """Whether a body of the corpus went from states [J] to states [J] of its joints."""
+        """Return whether a whole body in the corpus moved between joint states [J]."""
         states, moves = self.engine.states[:, : len(before)], self.engine.corpus.moves
         return bool(((states[moves.begins] == before).all(axis=1) & (states[moves.ends] == after).all(axis=1)).any())
 
@@ -272,13 +270,13 @@ class TransitionTest:
 def judge_transitions(
     piece: Piece, pairs: Iterable[tuple[int, int]], engine: Engine, whole_body: bool
 ) -> list[Transition]:
-    """Judge, for pairs (i, k), whether posture k of a piece may follow posture i.
+    """Judge the transitions between pairs of a piece's postures.
 
     Args:
         piece: the piece.
-        pairs: numbers of two postures each.
-        engine: what was learned from the corpus that judges.
-        whole_body: whether whole bodies are judged, not each joint.
+        pairs: numbers of two postures each, (from, to).
+        engine: the corpus that judges.
+        posturewise: whether to judge moves of the whole body instead of each joint.
 
     Raises:
         SkeletonError: the piece is on another skeleton than the corpus.
@@ -291,7 +289,7 @@ def judge_transitions(
 
 
 def check_asked(alternatives: int, options: Mapping[str, Any]) -> None:
-    """Check the options for smoothing seams, before it is known whether any seam needs it.
+    """Check the options for smoothing seams.
 
     Raises:
         MotionMindError: `alternatives` is out of its range.
@@ -301,7 +299,7 @@ def check_asked(alternatives: int, options: Mapping[str, Any]) -> None:
     known = {"search", *OPTIONS} - {"unlike", "what_if"}
     for name in options:
         if name not in known:
-            raise WrongTypeError(f"seams are not smoothed by an argument {name!r}{did_you_mean(name, known)}")
+            raise WrongTypeError(f"unknown argument {name!r} for smoothing seams{did_you_mean(name, known)}")
 
 
 def judge_and_smooth(
@@ -315,17 +313,17 @@ def judge_and_smooth(
     watch: Watch | None = None,
     **options: Any,
 ) -> tuple[Transition, ...]:
-    """Judge the transitions between pairs of a piece's postures, and find movement for those that are abrupt.
+    """Judge the transitions between pairs of a piece's postures, and find movement for the abrupt ones.
 
-    It begins and ends as fast as the piece moves there, where the piece shows it (`Piece.around`).
+    The movement begins and ends with the piece's velocity there, if the piece shows one (`Piece.around`).
 
     Args:
         piece: the piece.
         pairs: numbers of two postures each, (from, to).
-        engine: what was learned from the corpus.
-        alternatives: how many movements to find for each; searches of whole bodies find one.
-        whole_body: whether whole bodies are judged and inserted.
-        on_progress: called before each search with how many are done and how many there are.
+        engine: the corpus.
+        alternatives: number of movements to find for each; a search of whole bodies finds one.
+        posturewise: whether to judge and insert whole bodies.
+        on_progress: called before each search with the numbers of searches done and in all.
         watch: as for `Engine.tween`; once it returns True, the remaining transitions stay pending.
         options: the other arguments of `Engine.tween`.
 
@@ -367,7 +365,7 @@ def judge_and_smooth(
 
 
 def _with_candidates(transition: Transition, tweens: Iterable[Tween]) -> Transition:
-    """The transition with the tweens as its candidates, each path once: a corpus may know one path only."""
+    """Return the transition with the tweens as its candidates, without repeated paths."""
     distinct: dict[bytes, Tween] = {}
     for tween in tweens:
         distinct.setdefault(tween.path.tobytes(), tween)

@@ -1,12 +1,12 @@
-"""Orders of a piece's postures that stay near a trajectory, in long enough stretches of the piece.
+"""Orders of a piece's postures near a trajectory, in long enough stretches of the piece.
 
-The nearest site at each point (`motionmind.chaos.reorder`) gives an order that may depart from the piece at every step.
-Here an order pays for its distance from the trajectory, and for the insertions at its seams:
+The order of the nearest sites (`motionmind.chaos.reorder`) may depart from the piece at every step. The cost of an
+order here is its distance from the trajectory plus a charge for the insertions at its seams:
 
     sum over n of (|y[n] - x[order[n]]| - min over i of |y[n] - x[i]|) / scale + charge * sum over seams of seconds
 
-Dynamic programming over the points finds the cheapest order whose stretches (runs of the piece) are long enough, from
-the cheapest orders that end at each posture and may leave it. The scale is the root mean square distance of the sites
+Dynamic programming over the points finds the cheapest order whose stretches (runs of the piece) are long enough. Its
+state is the posture that a long enough stretch has reached. The scale is the root mean square distance of the sites
 from their mean. A seam leads to one of the sites nearest to its point.
 """
 
@@ -19,18 +19,18 @@ from motionmind.chaos.reorder import Itinerary
 from motionmind.errors import MotionMindError
 from motionmind.jit import jit
 
-_LANDINGS = 32  # sites at a point to which a seam may lead
-_ON, _STAY = -1, -2  # steps without a seam; other values are the number of a landing
+_N_LANDINGS = 32  # nearest sites at a point to which a seam may lead
+_ON, _STAY = -1, -2  # steps without a seam; other values number a landing
 
 
 def cheapest_order(course: Itinerary, seconds: Singles, charge: float, stretch: int) -> Ints:
     """Find the cheapest order of a piece's N postures along a trajectory of L points (see the module).
 
-    It stays in a posture only where the nearest site stays too.
+    The order stays in a posture only where the nearest site stays too.
 
     Args:
         course: the sites [N, d] and the trajectory [L, d].
-        seconds: seconds that a seam inserts from each posture to each other [N, N].
+        seconds: seconds of the insertion from each posture to each other [N, N].
         charge: the price of a second.
         stretch: the least number of postures in each stretch.
 
@@ -47,7 +47,7 @@ def cheapest_order(course: Itinerary, seconds: Singles, charge: float, stretch: 
     for n, point in enumerate(course.points):
         far = np.sqrt(np.sum((course.sites - point) ** 2, axis=1))
         away[n] = (far - far[course.indices[n]]) / scale
-    landings = np.argsort(away, axis=1, kind="stable")[:, :_LANDINGS]
+    landings = np.argsort(away, axis=1, kind="stable")[:, :_N_LANDINGS]
     stays = np.concatenate([[False], np.diff(course.indices) == 0])
     order = _follow(away, landings, stays, seconds, charge, stretch)
     if not len(order):
@@ -59,7 +59,7 @@ def cheapest_order(course: Itinerary, seconds: Singles, charge: float, stretch: 
 
 @jit
 def _follow(away: Singles, landings: Ints, stays: Bools, seconds: Singles, charge: float, stretch: int) -> Ints:
-    """Return the cheapest order [L]; none [0] if there is no order.
+    """Return the cheapest order [L]; empty [0] if there is none.
 
     Args:
         away: distance of each posture's site from each point [L, N].

@@ -1,5 +1,4 @@
-"""A variation of a piece: its postures in the order of a chaotic trajectory or of a control, smoothed by the engine,
-and reviewed."""
+"""A variation of a piece: its postures in another order, with smoothed seams, and its review."""
 
 from __future__ import annotations
 
@@ -54,30 +53,24 @@ from motionmind.variation.seams import (
 )
 from motionmind.variation.stretches import cheapest_order
 
-_COARSELY = 5  # each of so many nudges is tried where each takes some time
-NUDGE = 0.1  # of a trajectory that begins where it is told to, in a flow's own coordinates
-SKIP = 10
-ALTERNATIVES = 3
-EXPONENT_STEPS = 200_000
-_MOMENT = 1e-6  # seconds
-MOST_STEPS = 1_000_000_000  # of a transient: some minutes
-LONGEST = 1_000_000  # postures that a variation may have
+SKIP = 10  # default number of points between two postures
+MAX_LENGTH = 1_000_000  # postures of a variation
 
 
 @dataclass(frozen=True, eq=False)
 class Variation:
     """A variation and its review.
 
-    A variation never changes: an edit returns another one, or, if it makes no difference, this one, and is not kept.
+    A variation is immutable: an edit returns a new one, or this one if the edit makes no difference.
 
     Attributes:
-        piece: the piece that it varies.
-        course: the trajectories that it was made by; None for a control that follows none.
-        order: the postures of the piece as the trajectories, or the control, gave them [L].
-        transitions: the judged transitions that it began with; none if no corpus was given.
-        edits: the edits since, in order.
-        kept: the order that it began with in place of `order`, if limits were given; else None.
-        control: the control that gave the order; None for the attractor's own.
+        piece: the piece.
+        course: its trajectories; None for a control without a trajectory.
+        order: the postures of the piece in the order of the trajectories or the control [L].
+        transitions: the judged transitions before any edit; none without a corpus.
+        edits: the edits, in order.
+        kept: the order within limits, which replaces `order`; None without limits.
+        control: the control of the order; None for the attractor's own.
 
     >>> from motionmind import Engine, vary
     >>> engine = Engine.load("ballet")
@@ -107,7 +100,7 @@ class Variation:
         if self.control and (self.control.seed is not None) != self.control.is_random:
             raise MotionMindError(f"a control by {self.by} has {'a' if self.control.is_random else 'no'} seed")
         if self.piece.composed != (self.by == "quadrants"):
-            raise MotionMindError("the postures of a piece are composed for quadrants, and for nothing else")
+            raise MotionMindError("a variation has composed postures if and only if it is by quadrants")
         order = as_integers("order", self.order)
         for one in (order, np.array(self.kept.order if self.kept else order)):
             if one.ndim != 1 or one.shape != order.shape or not len(one) or min(one) < 0 or max(one) >= len(self.piece):
@@ -135,7 +128,7 @@ class Variation:
 
     @property
     def by(self) -> By:
-        """Name of its order: "attractor", or that of its control."""
+        """Name of its order: "attractor" or its control."""
         return self.control.by if self.control else "attractor"
 
     @property
@@ -150,25 +143,25 @@ class Variation:
 
     @property
     def seams(self) -> tuple[Seam, ...]:
-        """The places where it neither goes on as the piece does nor stays in its posture, in order."""
+        """The seams, in the order of the movement."""
         return self._state.seams
 
     def motion(self) -> Motion:
-        """Return the movement as it stands: with all insertions but those that were discarded."""
+        """Return the movement with all insertions that are not discarded."""
         return self.arrange().motion
 
     def arrange(self) -> Arrangement:
-        """Return the movement as `motion` does, with the frame of each posture."""
+        """Return the movement (see `motion`) and the frame of each posture."""
         insertions = {seam.at: seam.insertion.motion for seam in self.seams if seam.insertion}
         return self.piece.arrange(self.postures, insertions)
 
     def around(self, seam: int, alternative: int | None = None, *, seconds: float = 1.0) -> Motion:
-        """Return the movement around a seam: what is inserted there, and some of what comes before and after.
+        """Return the movement around a seam.
 
         Args:
             seam: the seam's number.
-            alternative: the number, from 1, of the movement to insert; None for what is inserted now.
-            seconds: how much comes before and after.
+            alternative: number, from 1, of the candidate to insert; None for the present one.
+            seconds: duration to include before and after.
 
         Raises:
             MotionMindError: there is no such seam or alternative.
@@ -184,11 +177,11 @@ class Variation:
         motion, frames = shown.arrange()
         at = next(one.at for one in shown.seams if one.number == self._state.seam(check_whole("seam", seam)).number)
         begin, end = motion.times[frames[at]] - seconds, motion.times[frames[at + 1]] + seconds
-        first = int(np.searchsorted(motion.times, begin - _MOMENT))
-        return motion.slice(first, int(np.searchsorted(motion.times, end + _MOMENT)))
+        first = int(np.searchsorted(motion.times, begin - 1e-6))  # seconds
+        return motion.slice(first, int(np.searchsorted(motion.times, end + 1e-6)))
 
     def report(self) -> dict[str, Any]:
-        """Report what it is made of, all but the movement, as plain values for JSON (see `VariationReport`)."""
+        """Return everything but the movement as plain values for JSON: the fields of `VariationReport`."""
         report: dict[str, Any] = msgspec.to_builtins(
             report_of(
                 self.piece,
@@ -207,26 +200,26 @@ class Variation:
     # --- edits ------------------------------------------------------------------------------------------------------
 
     def approve(self, *seams: int) -> Variation:
-        """Approve these seams, by number, as they are.
+        """Approve seams, by number, as they are.
 
         Raises:
-            MotionMindError: there is no seam of such a number.
+            MotionMindError: a seam does not exist.
         """
         return self._after(Approve(_check_seams(seams)))
 
     def discard(self, *seams: int) -> Variation:
-        """Leave out the insertions at these seams, by number.
+        """Leave out the insertions at seams, by number.
 
         Raises:
-            MotionMindError: there is no seam of such a number, or no insertion.
+            MotionMindError: a seam does not exist or has no insertion.
         """
         return self._after(Discard(_check_seams(seams)))
 
     def replace(self, seam: int, alternative: int) -> Variation:
-        """Insert another of the movements that the engine found for a seam, counted from 1; the seam is open again.
+        """Insert another candidate of a seam, counted from 1; the seam becomes open again.
 
         Raises:
-            MotionMindError: there is no seam or no alternative of this number.
+            MotionMindError: the seam or the alternative does not exist.
         """
         number = check_whole("a seam's number", seam)
         return self._after(Replace(number, check_whole("an alternative's number", alternative)))
@@ -234,11 +227,11 @@ class Variation:
     def cut(self, first: int, last: int, before: int) -> Variation:
         """Move postures `first` to `last` before posture `before`.
 
-        All are numbered from 0 as they stand now; `before` may be the number of postures, which means the end. Then
-        seams are numbered anew, in the order in which they come.
+        Postures count from 0 in their present order; `before` may be their number, for the end. Seams are renumbered
+        in their new order.
 
         Raises:
-            MotionMindError: there are no such postures, or `before` is one of those that move.
+            MotionMindError: a posture does not exist, or `before` is among the moved ones.
         """
         places = check_whole("first", first), check_whole("last", last), check_whole("before", before)
         return self._after(Cut(*places, numbers="anew"))
@@ -247,30 +240,30 @@ class Variation:
         self,
         engine: Engine,
         *,
-        alternatives: int = ALTERNATIVES,
-        whole_body: bool = False,
+        alternatives: int = 3,
+        posturewise: bool = False,
         on_progress: OnProgress | None = None,
         watch: Watch | None = None,
         **options: Any,
     ) -> Variation:
-        """Judge the seams that no corpus has judged, and smooth those that are abrupt and have no insertion.
+        """Judge the seams without a judgement, and smooth the abrupt ones without an insertion.
 
-        Seams whose insertion was discarded are smoothed anew. A transition that comes more than once is smoothed anew
-        only if its insertion is discarded wherever it comes, and keeps what it had if nothing is found. All seams with
-        new candidates are open again.
+        This includes seams with a discarded insertion. A transition that occurs more than once is smoothed again only
+        if its insertion is discarded at each occurrence, and keeps its candidates if the engine finds none. Seams with
+        new candidates become open.
 
         Args:
             engine: the corpus that judges and smooths.
-            alternatives: how many movements to find for each transition.
-            whole_body: whether to judge by whole bodies and insert only whole bodies of the corpus.
-            on_progress: called before each search with how many are done and how many there are.
+            alternatives: number of movements to find for each transition.
+            posturewise: whether to judge whole bodies, and insert only whole bodies of the corpus.
+            on_progress: called before each search with the numbers of searches done and in all.
             watch: as for `Engine.tween`; once it returns True, the remaining seams stay as they are.
             options: the other arguments of `Engine.tween`.
 
         Raises:
-            SkeletonError: the piece is on another skeleton than the corpus.
+            SkeletonError: the piece and the corpus have different skeletons.
             MotionMindError: an argument is out of its range.
-            WrongTypeError: an argument is of another type, or there is no such argument.
+            WrongTypeError: an argument has the wrong type, or is unknown.
         """
         check_type("engine", engine, Engine)
         _check_watchers(whole_body, on_progress, watch)
@@ -292,7 +285,7 @@ class Variation:
         return self._after(Smooth(news)) if news else self
 
     def undo(self) -> Variation:
-        """Take back the last edit; MotionMindError if there is none."""
+        """Undo the last edit; MotionMindError if there is none."""
         if not self.edits:
             raise MotionMindError("there is no edit to undo")
         return replace(self, edits=self.edits[:-1])
@@ -302,9 +295,9 @@ class Variation:
         return self if self._state.looks_like(after._state) else after
 
 
-def _check_watchers(whole_body: bool, on_progress: OnProgress | None, watch: Watch | None) -> None:
-    """Check the types of arguments that `vary` and `Variation.smooth` share."""
-    check_flag("whole_body", whole_body)
+def _check_watchers(posturewise: bool, on_progress: OnProgress | None, watch: Watch | None) -> None:
+    """Check the types of the arguments that `vary` and `Variation.smooth` share."""
+    check_flag("posturewise", posturewise)
     check_function("on_progress", on_progress, or_none=True)
     check_function("watch", watch, or_none=True)
 
@@ -329,8 +322,8 @@ def vary(
     length: int | None = None,
     inserted: float | None = None,
     stretch: int | None = None,
-    alternatives: int = ALTERNATIVES,
-    whole_body: bool = False,
+    alternatives: int = 3,
+    posturewise: bool = False,
     on_progress: OnProgress | None = None,
     watch: Watch | None = None,
     **options: Any,
@@ -342,33 +335,32 @@ def vary(
 
     Args:
         piece: the movement; every frame of a motion is a posture, `Piece.of` takes fewer.
-        engine: the corpus that judges which transitions are abrupt, and smooths those; None leaves them as they are.
-        by: what orders the postures: the attractor, or a control (see `motionmind.variation.controls`), which does not
-            take all of the other arguments.
+        engine: the corpus that finds the abrupt transitions and smooths them; None leaves all as they are.
+        by: the order of the postures: the attractor's, or a control (see `motionmind.variation.controls`), which
+            refuses some of the other arguments.
         seed: the seed of all random numbers: of a control, and of samples (`sample`).
         flow: the flow whose trajectories order the postures; None for Lorenz'.
         nudge: the offset of the variation's trajectory from the piece's at its beginning: a number for the flow's first
             coordinate, or one for each [d]. None to seek it by `depart`.
-        depart: the share of steps that are to leave the piece's order, in place of a nudge: the smallest nudge of the
-            first coordinate is taken that comes within 0.05 of it, or else nearest to it. None for 0.25, or half of
-            what the `stretch` allows if that is less; or, with a `start`, for a nudge of 0.1.
+        depart: the share of departing steps, in place of a nudge: the smallest nudge of the first coordinate within
+            0.05 of it, or else the nearest. None for 0.25, or half of what `stretch` allows if that is less; or, with a
+            `start`, for a nudge of 0.1.
         start: the start of the piece's trajectory, before its transient [d]; None for the flow's own.
-        skip: points of the trajectories to leave out between two postures; None for 10.
+        skip: points of the trajectories to skip between two postures; None for 10.
         step: the step of the integration, in the flow's units of time; None for the flow's own.
         transient: steps to drop from the beginning; None for the flow's own.
-        length: postures of the variation; None for as many as the piece has.
-        inserted: the greatest share of the time that insertions are to take. Seams with long insertions then go, or
-            move to where the piece is more like itself, and no more of them than needed (see
-            `motionmind.variation.limits`); if no order holds the limit, the one that inserts least is taken. None for
-            no limit.
-        stretch: postures that each stretch of the piece has at least; None for 4 where insertions are limited, else 1.
-        alternatives: see `Variation.smooth`, as for `whole_body`, `on_progress`, `watch` and `options`.
+        length: postures of the variation; None for as many as in the piece.
+        inserted: the greatest share of the time for insertions. To meet it, seams with long insertions disappear or
+            move to where the piece resembles itself more (see `motionmind.variation.limits`); if no order meets it, the
+            order that inserts least is taken. None for no limit.
+        stretch: the least number of postures in each stretch of the piece; None for 4 if insertions are limited, or 1.
+        alternatives: see `Variation.smooth`, as for `posturewise`, `on_progress`, `watch` and `options`.
 
     Raises:
-        MotionMindError: an argument is out of its range or not for this order, a trajectory diverges or settles, both a
-            nudge and a share are given, insertions are limited that no corpus makes, or there are no such stretches.
-        SkeletonError: the piece is on another skeleton than the corpus.
-        WrongTypeError: an argument is of another type, or there is no such argument.
+        MotionMindError: an argument is out of its range or refused by this order, a trajectory diverges or settles,
+            `nudge` and `depart` are both given, `inserted` is given without a corpus, or no order has such stretches.
+        SkeletonError: the piece and the corpus have different skeletons.
+        WrongTypeError: an argument has the wrong type, or is unknown.
 
     >>> from motionmind import Engine, vary
     >>> from motionmind.chaos import find_flow
@@ -387,10 +379,10 @@ def vary(
     trajectory |= {"skip": skip, "step": step, "transient": transient}
     check_taken(by, trajectory | {"length": length, "inserted": inserted, "stretch": stretch})
     piece = piece if isinstance(piece, Piece) else Piece.of(piece)
-    length = check_whole("length", len(piece) if length is None else length, 1, LONGEST)
+    length = check_whole("length", len(piece) if length is None else length, 1, MAX_LENGTH)
     limits = check_limits(inserted, stretch, len(piece), length)
     if inserted is not None and engine is None:
-        raise MotionMindError("inserted limits what a corpus inserts, and none is given")
+        raise MotionMindError("inserted needs a corpus, which makes the insertions")
     found: Itinerary | None = None
     if control is None or control.needs_trajectory:
         course, found = _order_postures(len(piece), length, limits, **trajectory)
@@ -426,7 +418,7 @@ def vary(
 
 
 def _in_order_of(control: Control, variation: Variation, found: Itinerary) -> Variation:
-    """Return a variation by an attractor in the order of a control that is made of the same trajectory."""
+    """Return a variation by an attractor in the order of a control with the same trajectory."""
     kept = variation.kept
     if kept is not None:
         order = control.of_trajectory(found, np.array(kept.order))
@@ -447,38 +439,38 @@ def _order_postures(
     step: float | None,
     transient: int | None,
 ) -> tuple[Course, Itinerary]:
-    """The course that `vary` asks for, its arguments checked, and the reordering of `count` postures that it gives."""
+    """Check the arguments of `vary` for a trajectory; return its course, and the reordering of `count` postures."""
     flow = FLOWS["lorenz"] if flow is None else flow
     check_type("flow", flow, Flow, wanted="a Flow, such as find_flow('lorenz') gives")
-    skip = check_whole("skip", SKIP if skip is None else skip, 0, LONGEST)
+    skip = check_whole("skip", SKIP if skip is None else skip, 0, MAX_LENGTH)
     step = check_number("step", flow.step if step is None else step)
-    transient = check_whole("transient", flow.transient if transient is None else transient, 0, MOST_STEPS)
+    transient = check_whole("transient", flow.transient if transient is None else transient, 0, 1_000_000_000)
     if nudge is not None and depart is not None:
-        raise MotionMindError("depart seeks a nudge, and nudge gives one: leave out one of them")
+        raise MotionMindError("give nudge or depart, not both")
     check_departure(depart, limits)
     depart = share_sought(nudge, depart, start, limits.stretch if limits else 1)
     start = check_numbers("start", flow.start if start is None else start)
 
     def reorder(nudge: ArrayLike) -> Itinerary:
-        """Return the reordering that a nudge gives."""
+        """Return the reordering by a nudge."""
         return itinerary(flow, count, length, nudge=nudge, start=start, every=skip + 1, step=step, transient=transient)
 
     if nudge is None:
-        nudge = NUDGE if depart is None else _seek_nudge(reorder, check_number("depart", depart), limits)
+        nudge = 0.1 if depart is None else _seek_nudge(reorder, check_number("depart", depart), limits)
     offset = check_numbers("nudge", nudge)
     if np.ndim(nudge) == 0:
         offset += (0.0,) * (len(flow.start) - 1)
     # With the flow's own step at least: tiny steps do not reach the attractor in so many.
-    exponent = largest_exponent(flow, start, steps=EXPONENT_STEPS, step=max(step, flow.step))
+    exponent = largest_exponent(flow, start, steps=200_000, step=max(step, flow.step))
     course = Course(flow.name, dict(flow.parameters), start, offset, skip, step, transient, round(exponent, 4))
     return course, reorder(offset)
 
 
 def _seek_nudge(reorder: Callable[[float], Itinerary], depart: float, limits: Limits | None) -> float:
-    """Return the nudge by which a share of the steps depart, in stretches as long as the limits say."""
+    """Return the nudge for a share of departing steps, in stretches within the limits."""
     if limits is None:
         return find_nudge(lambda nudge: reorder(nudge).indices, depart)
     first = reorder(0.0)
     free = np.zeros((len(first.sites), len(first.sites)), dtype=np.float32)
     stretch = limits.stretch
-    return find_nudge(lambda nudge: cheapest_order(reorder(nudge), free, 0.0, stretch), depart, every=_COARSELY)
+    return find_nudge(lambda nudge: cheapest_order(reorder(nudge), free, 0.0, stretch), depart, every=5)

@@ -1,4 +1,4 @@
-"""Files of variations: the movement as it stands, which every reader of movement reads, and all the rest beside it.
+"""Files of variations: motion that any reader of motion JSON can read, and everything else beside it.
 
 A file is motion JSON (`motionmind.formats.motion_json`) with one more field:
 
@@ -14,16 +14,16 @@ A file is motion JSON (`motionmind.formats.motion_json`) with one more field:
       "control": {"by": "chunks", "seed": 0}
     }
 
-`piece` is the original with the frame of each of its postures, `order` the postures as the trajectory gave them,
-`joins` the judged transitions from one posture to another, and `edits` the decisions, from which all else follows.
-`kept` is there only where limits were given: the order that was taken in the trajectory's place. `control` is there
-only where a control gave the order; `course` is null where it follows no trajectory, and the piece of quadrants is
-composed postures, `"composed": true`.
-Numbers are written in full, and are read to the last bit as they were written.
+`piece` is the original with the frame of each of its postures, `order` the postures in the trajectory's order,
+`joins` the judged transitions, and `edits` the decisions, from which all else follows. With limits, `kept` is the order
+that replaces the trajectory's. With a control, `control` names it; `course` is null if it follows no trajectory, and
+the piece of quadrants has `"composed": true`. Numbers keep all their bits.
 """
 
 from __future__ import annotations
 
+import os
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -48,7 +48,6 @@ from motionmind.variation.variation import Variation
 
 VERSION = 1
 _MOVEMENT_ALONE = (".bvh", ".glb", ".npz", ".txt", ".gif", ".png", ".mp4", ".svg", ".html")  # as vary writes it, too
-_ROUNDING = 1e-6  # of a quaternion and of metres: how far a candidate's ends may be from the piece's postures
 
 # In a file, a candidate's movement and path are lists of numbers.
 FileCandidate = InsertionCandidate[FramesSchema, list[list[Index]]]
@@ -56,7 +55,7 @@ FileTransition = JudgedTransition[FileCandidate]
 
 
 class PieceSchema(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
-    """The original, or postures composed of parts of it."""
+    """The original, or composed postures."""
 
     motion: FramesSchema
     frames: list[Index]
@@ -77,16 +76,24 @@ class VariationSchema(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=
     control: Control | None = None
 
 
-class _Version(msgspec.Struct):
+class _EditHead(msgspec.Struct):
+    edit: str = ""
+    numbers: str = ""
+
+
+class _Head(msgspec.Struct):
+    """Tells a file's version: cuts of earlier ones do not say how seams are numbered after them."""
+
     version: int = 0
+    edits: list[_EditHead] = []
 
 
 def read_variation(path: FilePath) -> Variation:
     """Read the variation in the file at `path`.
 
     Raises:
-        FormatError: the file cannot be read, holds movement alone, is of an unknown version, or its parts do not fit
-            together. The message says which.
+        FormatError: the file cannot be read, holds movement alone, has another version, or is inconsistent; the message
+            says which.
 
     >>> from motionmind import Engine, read_variation, vary, write_variation
     >>> engine = Engine.load("ballet")
@@ -118,7 +125,7 @@ def read_variation(path: FilePath) -> Variation:
 
 
 def is_variation(path: FilePath) -> bool:
-    """Tell whether the file at `path` is JSON with a variation in it, damaged or not."""
+    """Return whether the file at `path` is JSON with a variation, even a damaged one."""
     if Path(path).suffix.lower() != ".json":
         return False
     try:
@@ -155,7 +162,7 @@ def write_variation(path: FilePath, variation: Variation) -> None:
 
 
 def _read_motion(path: FilePath) -> MotionSchema:
-    """The file at `path`; FormatError unless it holds a variation of a known version."""
+    """Read the file at `path`; FormatError unless it holds a variation of this version."""
     given = Path(path)
     if given.suffix.lower() in _MOVEMENT_ALONE:
         beside = given.with_suffix(".json")
@@ -169,9 +176,12 @@ def _read_motion(path: FilePath) -> MotionSchema:
     section = bytes(file.variation)
     if not section:
         raise FormatError(f"this holds movement alone, {wanted}", path=path)
-    version = _json.decode(section, _Version, path).version
-    if version != VERSION:
-        raise FormatError(f"variation: version {version}: this MotionMind reads version {VERSION}", path=path)
+    head = _json.decode(section, _Head, path)
+    if head.version > VERSION:
+        raise FormatError(f"variation: version {head.version}: this MotionMind reads version {VERSION}", path=path)
+    if head.version < VERSION or any(one.edit == "cut" and not one.numbers for one in head.edits):
+        again = f"motionmind vary PIECE --corpus NAME -o {shlex.quote(os.fsdecode(path))}"
+        raise FormatError(f"a variation of an earlier version; make it again: {again}", path=path)
     return file
 
 
@@ -190,7 +200,7 @@ def _frames(motion: Motion) -> FramesSchema:
 
 
 def _file_transition(transition: Transition) -> FileTransition:
-    """A judged transition in the form that a file has."""
+    """Return a judged transition in its form for files."""
     return transition.with_candidates(
         tuple(one.with_movement(_frames(one.motion), one.path.tolist()) for one in transition.candidates)
     )
@@ -199,7 +209,7 @@ def _file_transition(transition: Transition) -> FileTransition:
 def _read_transitions(
     file: Sequence[FileTransition], where: str, piece: Piece, path: FilePath
 ) -> tuple[Transition, ...]:
-    """The judged transitions in one of the file's lists; FormatError names the place of one that does not fit."""
+    """Read one of the file's lists of judged transitions; FormatError names the place of an inconsistent one."""
     transitions = []
     for number, one in enumerate(file):
         here = f"{where}[{number}]"
@@ -217,16 +227,16 @@ def _read_transitions(
 def _read_candidate(
     file: FileCandidate, transition: FileTransition, where: str, piece: Piece, path: FilePath
 ) -> Candidate:
-    """A candidate with its movement and path as arrays; FormatError if it does not fit the transition."""
+    """Return a candidate with its movement and path as arrays; FormatError if it does not fit the transition."""
     motion = motion_of(file.motion, piece.motion.skeleton, path, mend=False)
     states = len(file.path[0]) if file.path else 0
     if len(motion.insertions) != 1 or len(file.path) < 2 or any(len(row) != states for row in file.path):
-        raise FormatError(f"variation: {where}: this is no insertion with its path of states", path=path)
+        raise FormatError(f"variation: {where}: not one insertion with its path of states", path=path)
     ends = piece.ends(transition.start, transition.end)
     for word, frame, end in zip(("start", "end"), (0, -1), ends, strict=True):
         rotations, root = motion.rotations[frame], motion.root[frame]
         apart = np.minimum(np.abs(rotations - end.rotations), np.abs(rotations + end.rotations))  # q and -q are one
-        if max(apart.max(), np.abs(root - end.root).max()) > _ROUNDING:
+        if max(apart.max(), np.abs(root - end.root).max()) > 1e-6:  # of a quaternion, and metres
             posture = getattr(transition, word)
-            raise FormatError(f"variation: {where}: it does not {word} at posture {posture} of the piece", path=path)
+            raise FormatError(f"variation: {where}: does not {word} at posture {posture} of the piece", path=path)
     return file.with_movement(motion, np.array(file.path, dtype=np.int32))

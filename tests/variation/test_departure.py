@@ -16,7 +16,7 @@ from motionmind.chaos.flows import FLOWS, find_flow
 from motionmind.errors import MotionMindError
 from motionmind.formats import write_motion
 from motionmind.tween.engine import Engine
-from motionmind.variation.departure import WITHIN, departure, find_nudge
+from motionmind.variation.departure import DEPARTURE_TOLERANCE, departure, find_nudge
 from motionmind.variation.variation import vary
 from motionmind.variation.variation_json import write_variation
 
@@ -43,8 +43,8 @@ def test_the_smallest_nudge_that_comes_near_is_taken() -> None:
     rising = stepping(lambda nudge: min(nudge, 1.0))
     for share in (0.1, 0.25, 0.6, 1.0):
         nudge = find_nudge(rising, share)
-        assert abs(departure(rising(nudge)) - share) <= WITHIN
-        assert abs(departure(rising(nudge / 10**0.1)) - share) > WITHIN
+        assert abs(departure(rising(nudge)) - share) <= DEPARTURE_TOLERANCE
+        assert abs(departure(rising(nudge / 10**0.1)) - share) > DEPARTURE_TOLERANCE
     assert find_nudge(rising, 0.0) == pytest.approx(1e-12)
     assert find_nudge(stepping(lambda nudge: 0.5 if nudge > 2.0 else 0.1), 0.9) == pytest.approx(10**0.4)
 
@@ -62,7 +62,7 @@ def test_nudges_that_lead_nowhere_end_the_search() -> None:
 
     with pytest.raises(MotionMindError, match="diverges"):
         find_nudge(nowhere, 0.3)
-    with pytest.raises(MotionMindError, match="depart seeks a nudge, and nudge gives one"):
+    with pytest.raises(MotionMindError, match="give nudge or depart, not both"):
         vary(ballet_clip("jump"), nudge=0.1, depart=0.25)
     for share in (-0.1, 1.1, float("nan")):
         with pytest.raises(MotionMindError, match="must be from 0 to 1"):
@@ -74,7 +74,7 @@ def test_nudges_that_lead_nowhere_end_the_search() -> None:
 def test_a_variation_departs_as_asked_however_long_its_piece_is(clip: str, flow: str) -> None:
     piece = ballet_clip(clip)
     found = vary(piece, flow=find_flow(flow), depart=0.25)
-    assert abs(departure(found.order) - 0.25) <= WITHIN
+    assert abs(departure(found.order) - 0.25) <= DEPARTURE_TOLERANCE
     again = vary(piece, flow=find_flow(flow), nudge=found.course.nudge[0])
     np.testing.assert_array_equal(again.order, found.order)
     np.testing.assert_array_equal(vary(piece, flow=find_flow(flow)).order, found.order)  # a quarter is the default

@@ -197,10 +197,10 @@ def test_what_cannot_be_reached_is_refused_in_a_line(
 ) -> None:
     monkeypatch.setattr("motionmind.plots.portrait.N_SHEET_STEPS", 20_000)  # which are drawn quickly
     for options, message in (
-        ({"inserted": 0.3}, "limits what a corpus inserts, and none is given"),
+        ({"inserted": 0.3}, "inserted needs a corpus"),
         ({"inserted": 1.5, "engine": karate}, "must be from 0 to 1, not 1.5"),
         ({"stretch": 0}, "stretch must be a whole number from 1, not 0"),
-        ({"stretch": 110}, "no stretches of 110 postures: the piece or its variation has 109"),
+        ({"stretch": 110}, "stretch must be at most 109, the postures of piece and variation, not 110"),
         ({"stretch": 100, "length": 150}, "no variation of 150 postures in stretches of 100 at least"),
         ({"stretch": 4, "depart": 0.6}, "depart 0.6 cannot be reached in stretches of 4 postures"),
         ({"stretch": 4, "length": 5000}, "up to 4,000 postures, not of 5,000"),

@@ -553,6 +553,11 @@ def test_what_is_no_variation_is_refused(smoothed: Variation, tmp_path: Path) ->
         ('"edits":[]', '"edits":[{"edit":"approve","seams":[99]}]', "no seam 99"),
         ('"edits":[]', '"edits":[{"edit":"dance"}]', "dance"),
         ('"facing":"free"', '"facing":"up"', "up"),
+        (
+            '"edits":[]',
+            '"edits":[{"edit":"cut","first":0,"last":1,"before":5}]',
+            "a variation of an earlier version; make it again: motionmind vary PIECE --corpus NAME -o ",
+        ),
     ):
         assert old in whole
         path.write_text(whole.replace(old, new, 1))
@@ -580,8 +585,8 @@ def test_insertions_that_do_not_lead_where_they_should_are_refused(smoothed: Var
 
     for where in ("joins", "edits[0].joins"):
         for changed, message in (
-            (turn, f"{where}[{first}].candidates[1]: it does not end at posture {join.end} of the piece"),
-            (move, f"{where}[{first}].candidates[1]: it does not start at posture {join.start} of the piece"),
+            (turn, f"{where}[{first}].candidates[1]: does not end at posture {join.end} of the piece"),
+            (move, f"{where}[{first}].candidates[1]: does not start at posture {join.start} of the piece"),
             (flip, None),
             ({"end": last + 1}, f"{where}[{first}]: from posture {join.start} to {last + 1} there is no seam"),
             ({"end": join.start}, f"{where}[{first}]: from posture {join.start} to {join.start} there is no seam"),
