@@ -24,14 +24,10 @@ from motionmind.tween.engine import Engine
 from motionmind.tween.headline import beyond, feet_staying, seen_in
 from motionmind.tween.result import Tween
 
-COUNT = 4
+MAX_ALTERNATIVES = 4
 # Proving the last percent takes most of a search's time: four alternatives within 6 % of the best take one or two
-# seconds for a length that people wait for; with proofs they would take six.
-WITHIN = 0.06
-_MOVES = 2000  # moves of the corpus, at most, that define usual and rare
-_TELLING = 10.0  # degrees: a smaller difference in a joint is hardly another movement
-_NAMED = 2  # joints, at most, that a description of a difference names
-_USUAL, _RARE = 25.0, 5.0  # percentiles of the corpus's own moves: below them movement is less usual, or rare
+# seconds for a typical duration; with proofs they would take six.
+COST_GAP_RATIO = 0.06
 
 How = Literal["seen", "waits", "new", "between"]
 
@@ -79,8 +75,8 @@ class Account(msgspec.Struct, frozen=True):
     joints: dict[str, list[Stretch]]
 
 
-def find(engine: Engine, a: Posture, b: Posture, count: int = COUNT, **options: Any) -> Iterator[Tween]:
-    """Find distinct movements from `a` to `b`, the best first, each proven within `WITHIN` of the best of its kind.
+def find(engine: Engine, a: Posture, b: Posture, count: int = MAX_ALTERNATIVES, **options: Any) -> Iterator[Tween]:
+    """Find distinct movements from `a` to `b`, the best first, each within `COST_GAP_RATIO` of the best of its kind.
 
     Args:
         engine: the engine of the corpus.
@@ -95,7 +91,7 @@ def find(engine: Engine, a: Posture, b: Posture, count: int = COUNT, **options: 
     """
     found = 0
     try:
-        for tween in engine.alternatives(a, b, count, within=WITHIN, **options):
+        for tween in engine.alternatives(a, b, count, within=COST_GAP_RATIO, **options):
             found += 1
             yield tween
             if tween.moves < 2:
@@ -115,18 +111,20 @@ def account(tween: Tween, corpus: Corpus, own: Floats, first: Motion | None = No
         first: the movement that was found first; None if it is this alternative.
     """
     if tween.moves == 0:
-        return Account("no movement: both postures are the same", "", "nothing is better", "", [], {})
+        return Account("no movement: both postures are the same", "", "proven the best", "", [], {})
     seconds = float(tween.motion.times[-1] - tween.motion.times[0])
     words = "; ".join([f"{seconds:.1f} s", *feet_staying(tween.motion)])
-    differs = "" if first is None else _differs(tween.motion, first)
-    said = [line.replace("_", " ") for line in beyond(tween)]
-    return Account(words, differs, _sure(tween), _usual(tween, own), said, _stretches(tween, corpus))
+    differs = "" if first is None else _describe_difference(tween.motion, first)
+    flaws = [line.replace("_", " ") for line in beyond(tween)]
+    return Account(
+        words, differs, _describe_optimality(tween), _describe_usualness(tween, own), flaws, _stretches(tween, corpus)
+    )
 
 
 def usual_likelihoods(engine: Engine) -> Floats:
     """Return percentiles [101] of the corpus's own moves' likelihood: the mean ln P over the joints that move."""
     moves, graph = engine.corpus.moves, engine.grammar.transitions
-    chosen = np.unique(np.linspace(0, len(moves) - 1, _MOVES).astype(int))
+    chosen = np.unique(np.linspace(0, len(moves) - 1, 2000).astype(int))
     states = np.asarray(engine.states)
     before, after = states[moves.begins[chosen]], states[moves.ends[chosen]]
     logs = -graph.weights("conditional")
@@ -156,39 +154,39 @@ def _clip(source: Source, corpus: Corpus) -> str:
     return f"{origin}{displayed(source.clip)}" + (f" ({changes})" if changes else "")
 
 
-def _differs(motion: Motion, first: Motion) -> str:
+def _describe_difference(motion: Motion, first: Motion) -> str:
     """Describe in which joints a movement differs most from the first, by how much, and when."""
-    as_far = np.rint(np.linspace(0.0, len(first) - 1, len(motion))).astype(np.intp)
-    degrees = np.degrees(rot.angle(motion.rotations, first.rotations[as_far]))
+    same_share = np.rint(np.linspace(0.0, len(first) - 1, len(motion))).astype(np.intp)
+    degrees = np.degrees(rot.angle(motion.rotations, first.rotations[same_share]))
     frame = int(degrees.max(axis=1).argmax())
-    most = [int(joint) for joint in np.argsort(-degrees[frame], kind="stable")[:_NAMED]]
+    most = [int(joint) for joint in np.argsort(-degrees[frame], kind="stable")[:2]]
     named = [
         f"{displayed(motion.skeleton.names[joint]).replace('_', ' ')} by {degrees[frame, joint]:.0f}°"
         for joint in most
-        if degrees[frame, joint] >= _TELLING
+        if degrees[frame, joint] >= 10.0  # smaller differences are hard to see
     ]
     if not named:
-        return "hardly unlike the first"
-    return f"unlike the first: {' and '.join(named)}, at {motion.times[frame] - motion.times[0]:.1f} s"
+        return "almost the same as the first"
+    return f"differs from the first: {' and '.join(named)} at {motion.times[frame] - motion.times[0]:.1f} s"
 
 
-def _sure(tween: Tween) -> str:
+def _describe_optimality(tween: Tween) -> str:
     """Describe how close to optimal an alternative is proven to be."""
-    kind = "so different" if tween.differs else "of its kind"
+    best = "the best that differs this much" if tween.differs else "the best"
     if tween.status == "optimal":
-        return f"nothing {kind} is better"
+        return f"proven {best}"
     percent = max(1, math.ceil(100.0 * (tween.cost / tween.lower_bound - 1.0) - 1e-6)) if tween.lower_bound > 0 else 100
-    return f"at most {percent}% from the best that is {kind}" if percent < 100 else "not known to be near the best"
+    return f"at most {percent}% worse than {best}" if percent < 100 else "may be far from the best"
 
 
-def _usual(tween: Tween, own: Floats) -> str:
+def _describe_usualness(tween: Tween, own: Floats) -> str:
     """Describe how usual the movement is among the corpus's own moves, and whether the corpus shows all of it."""
     moved = (tween.path[1:] != tween.path[:-1]) & (tween.costs.likelihood > 0.0)
     seen = seen_in(tween).replace("every one", "every move").replace("_", " ")
     if not moved.any():
         return seen
     mean = float(np.log(tween.costs.likelihood[moved]).mean())
-    word = "usual" if mean >= own[int(_USUAL)] else "less usual" if mean >= own[int(_RARE)] else "rare"
+    word = "usual" if mean >= own[25] else "less usual" if mean >= own[5] else "rare"
     return f"{word}; {seen}"
 
 
@@ -199,7 +197,7 @@ def _stretches(tween: Tween, corpus: Corpus) -> dict[str, list[Stretch]]:
     times, degrees = tween.motion.insertions[0].times, tween.costs.degrees
     out: dict[str, list[Stretch]] = {}
     for chain, joint in enumerate(tween.joints):
-        ways: list[Stretch] = []
+        stretches: list[Stretch] = []
         last: Source | None = None
         for move in range(tween.moves):
             source = tween.sources[move][chain]
@@ -209,20 +207,24 @@ def _stretches(tween: Tween, corpus: Corpus) -> dict[str, list[Stretch]]:
             elif (joint, move) in waits:
                 how, source = "waits", None
             turned = float(degrees[move, chain])
-            if ways and how == ways[-1].how and (source is None or (last is not None and _goes_on(last, source))):
-                ways[-1] = msgspec.structs.replace(
-                    ways[-1], ends=float(times[move + 1]), degrees=ways[-1].degrees + turned
+            if (
+                stretches
+                and how == stretches[-1].how
+                and (source is None or (last is not None and _continues(last, source)))
+            ):
+                stretches[-1] = msgspec.structs.replace(
+                    stretches[-1], ends=float(times[move + 1]), degrees=stretches[-1].degrees + turned
                 )
             else:
                 where = f"{_clip(source, corpus)} at {clock(source.seconds)}" if source else ""
                 key, at = (key_of(source, corpus), source.seconds) if source else ("", 0.0)
-                ways.append(Stretch(float(times[move]), float(times[move + 1]), how, where, key, at, turned))
+                stretches.append(Stretch(float(times[move]), float(times[move + 1]), how, where, key, at, turned))
             last = source
-        out[displayed(joint).replace("_", " ")] = ways
+        out[displayed(joint).replace("_", " ")] = stretches
     return out
 
 
-def _goes_on(one: Source, other: Source) -> bool:
+def _continues(one: Source, other: Source) -> bool:
     """Return whether one source directly follows another in the same clip."""
     same = (one.clip, one.corpus, one.mirrored, one.reversed) == (
         other.clip,

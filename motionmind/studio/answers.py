@@ -286,7 +286,6 @@ class SheetClip(_Answer):
     frames: int
     seconds: float
     pictures: list[int]
-    mended: int
 
 
 class Sheet(_Answer):

@@ -16,13 +16,15 @@ from starlette.routing import BaseRoute, Route
 from motionmind.errors import MotionMindError
 from motionmind.render.page import player_data
 from motionmind.studio.edits import Edit
+from motionmind.studio.movements import STORED
+from motionmind.studio.piece import MIRRORED
 from motionmind.studio.project import RefusedError
 from motionmind.studio.studio import Studio
-from motionmind.studio.thumbnails import HEIGHT, thumbnail
+from motionmind.studio.thumbnails import THUMBNAIL_HEIGHT_PX, thumbnail
 
 T = TypeVar("T")
 Window = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_-]{1,40}\Z")]
-_GONE = 10.0  # seconds until a closed window counts as gone: a reload takes less
+_WINDOW_GONE_S = 10.0  # a window closed for longer is gone: a reload takes less
 FOREVER = "private, max-age=31536000, immutable"
 
 
@@ -54,7 +56,7 @@ async def body_of(request: Request, schema: type[T]) -> T:
     try:
         return msgspec.json.decode(await request.body(), type=schema)
     except (ValueError, RecursionError) as problem:
-        raise MotionMindError(f"this was not understood: {problem}") from problem
+        raise MotionMindError(f"invalid request: {problem}") from problem
 
 
 def number(text: str | None, words: str) -> int:
@@ -69,7 +71,7 @@ def window_of(request: Request) -> str:
     try:
         return msgspec.convert(request.query_params.get("window", "-"), Window)
     except msgspec.ValidationError:
-        raise MotionMindError("a window's name is of letters, digits, - and _") from None
+        raise MotionMindError("a window's name may contain only letters, digits, - and _") from None
 
 
 def routes(studio: Studio) -> list[BaseRoute]:
@@ -110,16 +112,16 @@ def _project_routes(studio: Studio) -> list[BaseRoute]:
         if not open_streams[window] and studio.project.forget(window):
             studio.events.send("project", {"sequence": studio.project.sequence, "left": window})
 
-    async def watched(window: str, told: AsyncGenerator[bytes]) -> AsyncIterator[bytes]:
+    async def watched(window: str, stream: AsyncGenerator[bytes]) -> AsyncIterator[bytes]:
         """Stream events to a window; some time after it closes, other windows may undo its edits."""
         open_streams[window] += 1
         try:
-            async with aclosing(told):
-                async for text in told:
+            async with aclosing(stream):
+                async for text in stream:
                     yield text
         finally:
             open_streams[window] -= 1
-            asyncio.get_running_loop().call_later(_GONE, leave, window)
+            asyncio.get_running_loop().call_later(_WINDOW_GONE_S, leave, window)
 
     async def events(request: Request) -> Response:
         window = window_of(request)
@@ -128,8 +130,8 @@ def _project_routes(studio: Studio) -> list[BaseRoute]:
             first["smoothing", ""] = {"stopped": True}
         first |= {("job", job.id): job.view() for job in studio.workers.jobs}
         headers = {"cache-control": "no-store"}
-        told = watched(window, studio.events.open(first))
-        return StreamingResponse(told, headers=headers, media_type="text/event-stream")
+        stream = watched(window, studio.events.open(first))
+        return StreamingResponse(stream, headers=headers, media_type="text/event-stream")
 
     async def job(request: Request) -> Response:
         try:
@@ -160,13 +162,13 @@ def _movement_routes(studio: Studio) -> list[BaseRoute]:
         except MotionMindError as missing:
             return error(str(missing), 404)
         answer = json(player_data(motion) | {"name": studio.movements.title(key)})
-        if key.lstrip("~").startswith("m-"):
+        if key.lstrip(MIRRORED).startswith(STORED):
             answer.headers["cache-control"] = FOREVER
         return answer
 
     async def picture(request: Request) -> Response:
         key, frame = request.path_params["key"], number(request.path_params["frame"], "a frame")
-        height = number(request.query_params.get("height", str(HEIGHT)), "the height")
+        height = number(request.query_params.get("height", str(THUMBNAIL_HEIGHT_PX)), "the height")
         stable = studio.project.state.stable(key)
         try:
             motion = studio.movements.get(stable)

@@ -13,13 +13,13 @@ from starlette.routing import BaseRoute, Route, Router
 
 from motionmind.studio import api, between, export, imports, posing, seams, varied
 from motionmind.studio.answers import Entering
-from motionmind.studio.guard import ENTER, Application, Guard, Message, Receive, Send, policy
+from motionmind.studio.guard import ENTER_PATH, Application, Guard, Message, Receive, Send, policy
 from motionmind.studio.pages import read_page
 from motionmind.studio.schema import document
 from motionmind.studio.studio import Studio
 from motionmind.studio.token import Keys
 
-_PARTS = (api, seams, between, export, varied, imports, posing)
+_PARTS = (api, seams, between, export, varied, imports, posing)  # with a function `routes` each
 
 
 def app(studio: Studio, keys: Keys, host: str, port: int) -> Application:
@@ -43,8 +43,8 @@ def app(studio: Studio, keys: Keys, host: str, port: int) -> Application:
             await smoothing
         studio.close()
 
-    found = [*_open_routes(keys, port), *chain.from_iterable(part.routes(studio) for part in _PARTS)]
-    router = Router(found, redirect_slashes=False, lifespan=lifespan)
+    routes = [*_open_routes(keys, port), *chain.from_iterable(part.routes(studio) for part in _PARTS)]
+    router = Router(routes, redirect_slashes=False, lifespan=lifespan)
 
     async def routed(scope: Message, receive: Receive, send: Send) -> None:
         scope["app"] = router  # otherwise the router answers unknown paths itself, in plain text
@@ -60,7 +60,7 @@ def _open_routes(keys: Keys, port: int) -> list[BaseRoute]:
 
     async def file(request: Request) -> Response:
         if (found := page.files.get(request.url.path)) is None:
-            return api.error("there is nothing here", 404)
+            return api.error("not found", 404)
         lasting = "no-cache" if request.url.path == "/" else api.FOREVER
         sent = headers | {"etag": found.tag, "cache-control": lasting}
         if request.headers.get("if-none-match") == found.tag:
@@ -73,7 +73,7 @@ def _open_routes(keys: Keys, port: int) -> list[BaseRoute]:
     async def enter(request: Request) -> Response:
         given = await api.body_of(request, Entering)
         if not keys.admits(given.token):
-            return api.error("this address is of another studio: open the one that the terminal shows", 403)
+            return api.error("this address belongs to another studio: open the one shown in the terminal", 403)
         answer = api.json({})
         answer.headers["set-cookie"] = keys.cookie(port)
         return answer
@@ -86,6 +86,6 @@ def _open_routes(keys: Keys, port: int) -> list[BaseRoute]:
         Route("/page/{path:path}", file),
         Route("/player/{path:path}", file),
         Route("/health", health),
-        Route(ENTER, enter, methods=["POST"]),
+        Route(ENTER_PATH, enter, methods=["POST"]),
         Route("/api/schema", schema),
     ]

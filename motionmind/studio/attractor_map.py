@@ -8,16 +8,12 @@ from typing import Any
 from motionmind._typing import Floats
 from motionmind.chaos.flows import Flow
 from motionmind.chaos.trajectories import trajectory
-from motionmind.studio.varying import EVERY, find_flow
-
-_SHEETS = 12_000  # points that show an attractor
-_MOST_DRAWN = 6_000  # points of a trajectory, beyond which a map thins it out
-_USUAL = {"lorenz": (0, 2, 1)}  # coordinates to the right, up and towards the viewer, if not (0, 1, 2)
+from motionmind.studio.varying import STEPS_PER_PLACE, find_flow
 
 
 def axes_of(flow: Flow) -> tuple[int, int, int]:
     """Return the coordinates that point right, up and towards the viewer on a map of a flow."""
-    return _USUAL.get(flow.name, (0, 1, 2))
+    return (0, 2, 1) if flow.name == "lorenz" else (0, 1, 2)
 
 
 @lru_cache(maxsize=4)
@@ -28,12 +24,12 @@ def map_of(name: str) -> dict[str, Any]:
         MotionMindError: no flow in three dimensions has this name.
     """
     flow = find_flow(name)
-    points = trajectory(flow, count=_SHEETS, every=3)
+    points = trajectory(flow, count=12_000, every=3)
     return {"flow": name, "axes": axes_of(flow), "points": points.round(4).tolist(), "about": flow.about}
 
 
 def drawn(points: Floats) -> list[list[float]]:
-    """Thin a trajectory out for a map [M][3], if it is long; its sites stay."""
-    every = EVERY if len(points) > _MOST_DRAWN else 1
+    """Thin out a trajectory of more than 6000 points for a map [M][3]; its sites stay."""
+    every = STEPS_PER_PLACE if len(points) > 6_000 else 1
     thinned: list[list[float]] = points[::every].round(4).tolist()
     return thinned

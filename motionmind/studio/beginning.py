@@ -14,8 +14,6 @@ from motionmind.studio.seams import why_abrupt
 from motionmind.variation.seams import Candidate
 from motionmind.variation.variation import Variation
 
-_DECIDED: dict[str, Decision] = {"approved": "locked", "discarded": "discarded"}
-
 
 def corpus_of(variation: Variation) -> str | None:
     """Return the name of the corpus that judged a variation's seams; None if it was not one corpus."""
@@ -47,11 +45,12 @@ def take_in(project: Project, variation: Variation, window: str) -> None:
     )
     ends = {stop - 1: number for number, (_, stop) in enumerate(runs)}  # number of each run, by its last posture
     met = {(blocks[ends[seam.at]].id, blocks[ends[seam.at] + 1].id): seam for seam in variation.seams}
-    words = f"begin with {displayed(variation.piece.motion.name or 'a variation')}"
+    words = f"start from {displayed(variation.piece.motion.name or 'a variation')}"
+    decisions: dict[str, Decision] = {"approved": "locked", "discarded": "discarded"}
     decided = [
-        Decide(*pair, _DECIDED[seam.decision])
+        Decide(*pair, decisions[seam.decision])
         for pair, seam in met.items()
-        if seam.decision in _DECIDED and seam.transition is not None and seam.transition.candidates
+        if seam.decision in decisions and seam.transition is not None and seam.transition.candidates
     ]
     project.edit(window, Several((Arrange(blocks, {"words": words}), *decided), words))
     for seam in project.state.seams:

@@ -15,7 +15,7 @@ from motionmind.body.motion import Motion
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.render.page import player_data
-from motionmind.studio.alternatives import COUNT, Account, account, find, usual_likelihoods
+from motionmind.studio.alternatives import MAX_ALTERNATIVES, Account, account, find, usual_likelihoods
 from motionmind.studio.api import Window, body_of, error, json
 from motionmind.studio.edits import Ask, Choose, Edit, Frame, Insert, Key, Pin, Several, Single, Wish
 from motionmind.studio.piece import End, Finding, Found, State, key_of
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
     from motionmind.studio.sides import Sides
     from motionmind.studio.studio import Studio
     from motionmind.studio.workers import Report
-
-_KEPT = 8  # latest searches whose movements stay available
-_WORDS = "go from A to B"
 
 
 class Place(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -53,7 +50,7 @@ class Acceptance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A request to add one of a job's alternatives, counted from 1, to the piece."""
 
     job: Annotated[str, msgspec.Meta(max_length=40)]
-    alternative: Annotated[int, msgspec.Meta(ge=1, le=COUNT)]
+    alternative: Annotated[int, msgspec.Meta(ge=1, le=MAX_ALTERNATIVES)]
     window: Window
 
 
@@ -72,11 +69,11 @@ def search(report: Report, corpus: str, sides: Sides, options: dict[str, Any], s
     found = find(engine, sides.a, sides.b, before=sides.before, after=sides.after, **options)
     first: Motion | None = None
     for number, tween in enumerate(found, start=1):
-        said = account(tween, engine.corpus, own, first)
+        described = account(tween, engine.corpus, own, first)
         first = first or tween.motion
         motion, missed = in_place(tween.motion, stays)
-        told = msgspec.structs.replace(said, beyond=[*missed, *said.beyond])
-        report(number, COUNT, "looking for others", (motion, told))
+        described = msgspec.structs.replace(described, beyond=[*missed, *described.beyond])
+        report(number, MAX_ALTERNATIVES, "searching for more", (motion, described))
 
 
 class _Search:
@@ -142,7 +139,7 @@ class _Desk:
         given = corpus, sides, options, stays_of(asked.options, sides.a.skeleton)
         job = self._studio.workers.submit("between", search, *given, collect=seeking.take, urgent=True)
         self._searches[job.id] = seeking
-        while len(self._searches) > _KEPT:
+        while len(self._searches) > 8:
             self._searches.popitem(last=False)
         return json({"job": job.id})
 
@@ -151,7 +148,7 @@ class _Desk:
         found = self._found(request.path_params["job"]).found
         number = request.path_params["number"]
         if not 1 <= number <= len(found):
-            raise MotionMindError(f"there are {len(found)} alternatives, no number {number}")
+            raise MotionMindError(f"no alternative {number}: there are {len(found)}")
         return json(player_data(found[number - 1][0], 0))
 
     async def accept(self, request: Request) -> Response:
@@ -159,7 +156,7 @@ class _Desk:
         asked = await body_of(request, Acceptance)
         seeking, project = self._found(asked.job), self._studio.project
         if asked.alternative > len(seeking.found):
-            raise MotionMindError(f"there are {len(seeking.found)} alternatives, no number {asked.alternative}")
+            raise MotionMindError(f"no alternative {asked.alternative}: there are {len(seeking.found)}")
         edit = accepted(project.state, seeking.asked, asked.alternative)
         insertions = tuple(
             Found(self._studio.movements.keep(motion, said.words), _seconds(motion), words_of(said))
@@ -175,7 +172,7 @@ class _Desk:
 
     def _found(self, job: str) -> _Search:
         if job not in self._searches:
-            raise MotionMindError("these alternatives are gone: look for them again")
+            raise MotionMindError("these alternatives have expired: search again")
         return self._searches[job]
 
 
@@ -199,7 +196,7 @@ def accepted(state: State, asked: Between, alternative: int) -> Edit:
     if asked.options != Ask():
         edits.append(Wish(left, right, asked.options.seconds, asked.options.passing, asked.options.pins))
     edits.append(Choose(left, right, alternative))
-    return Several(tuple(edits), _WORDS)
+    return Several(tuple(edits), "go from A to B")
 
 
 def words_of(said: Account) -> str:

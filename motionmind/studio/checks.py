@@ -38,7 +38,7 @@ def check_movements(state: State, edit: Edit, frames: Callable[[str], int]) -> N
             count = frames(key_of(block))
             if block.last >= count:
                 raise MotionMindError(
-                    f"{displayed(block.source)} has frames 0 to {count - 1}, no frame {block.last}: end sooner"
+                    f"{displayed(block.source)} has no frame {block.last}: its frames are 0 to {count - 1}"
                 )
 
 
@@ -50,7 +50,7 @@ def check_names(edit: Edit) -> None:
     """
     for one in each(edit):
         if isinstance(one, SavePosture) and one.posture is not None and {".", ".."} & set(one.name.split("/")):
-            raise MotionMindError(f"a posture cannot be called “{displayed(one.name)}”: give it another name")
+            raise MotionMindError(f"“{displayed(one.name)}” cannot be the name of a posture: choose another")
 
 
 def missing_in(state: State, has_corpus: Callable[[str], bool], marks: Marks) -> list[str]:
@@ -64,10 +64,10 @@ def missing_in(state: State, has_corpus: Callable[[str], bool], marks: Marks) ->
     lines: dict[str, None] = {}
     for name in sorted(corpora_of(state)):
         if not has_corpus(name):
-            lines[f"the corpus {displayed(name)} is missing: build it again by that name"] = None
+            lines[f"corpus {displayed(name)} is missing: build it again under that name"] = None
     for block in state.blocks:
         if not marks.has(key := key_of(block), block.last) and has_corpus(corpus_of(block.source) or state.corpus):
-            lines[f"frame {block.last} of {displayed(key)} is missing, which the piece needs"] = None
+            lines[f"the piece needs frame {block.last} of {displayed(key)}, which is missing"] = None
     return list(lines)
 
 

@@ -21,8 +21,7 @@ from motionmind.studio.reading import Facts, load_clip
 
 Report = Callable[[int, int, str], None]  # called with steps done, steps in all, and a description of the next
 
-PICTURES = 6  # pictures of a clip on its sheet, at most
-_LINE = 200  # characters of a title
+_MAX_TITLE_LENGTH = 200  # characters
 
 
 class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -52,7 +51,7 @@ class Lesson(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     name: Annotated[str, msgspec.Meta(max_length=200)]
-    title: Annotated[str, msgspec.Meta(max_length=_LINE)] = ""
+    title: Annotated[str, msgspec.Meta(max_length=_MAX_TITLE_LENGTH)] = ""
     parts: Annotated[tuple[Part, ...], msgspec.Meta(max_length=1_000)] = ()
     mix: Annotated[tuple[Mixed, ...], msgspec.Meta(max_length=50)] = ()
     mirror: bool = False
@@ -89,12 +88,12 @@ def list_all(home: Path | None) -> list[dict[str, Any]]:
         entry: dict[str, Any] = {"name": name, "title": "", "own": _is_own(name, folder, home), "error": ""}
         try:
             manifest = store.read_manifest(folder)
-            entry["title"] = displayed(str(manifest.get("title") or ""), _LINE)
+            entry["title"] = displayed(str(manifest.get("title") or ""), _MAX_TITLE_LENGTH)
             entry["rate"] = manifest.get("rate")
             if manifest["format"] == store.BUILT:
                 entry["clips"] = _count_clips(manifest)
         except MotionMindError as error:
-            entry["error"] = displayed(str(error), _LINE)
+            entry["error"] = displayed(str(error), _MAX_TITLE_LENGTH)
         found.append(entry)
     return found
 
@@ -130,20 +129,21 @@ def sheet_of(corpus: Corpus) -> dict[str, Any]:
     for clip in corpus.clips:
         count = len(clip)
         step = corpus.detail.shape[1] + 1 if count > 1 else 1  # frames from one posture to the next
-        postures = np.unique(np.linspace(0, count - 1, min(PICTURES, count)).round().astype(int))
+        postures = np.unique(np.linspace(0, count - 1, min(6, count)).round().astype(int))
         times = corpus.times[clip.start : clip.stop]
         clips.append(
             {
                 "key": f"{corpus.name}/{clip.label}",
                 "name": displayed(clip.label),
-                "about": displayed(clip.about, _LINE),
+                "about": displayed(clip.about, _MAX_TITLE_LENGTH),
                 "frames": (count - 1) * step + 1,
                 "seconds": round(float(times[-1] - times[0]), 2),
                 "pictures": (postures * step).tolist(),
-                "mended": len(clip.repairs),
             }
         )
-    about = {key: displayed(str(getattr(corpus, key)), _LINE) for key in ("title", "author", "source", "licence")}
+    about = {
+        key: displayed(str(getattr(corpus, key)), _MAX_TITLE_LENGTH) for key in ("title", "author", "source", "licence")
+    }
     body = f"{len(corpus.skeleton)} joints"
     return {"name": corpus.name, **about, "body": body, "postures": len(corpus), "rate": corpus.rate, "clips": clips}
 
@@ -156,9 +156,9 @@ def check_lesson(lesson: Lesson, home: Path | None) -> None:
     """
     store.place_for(lesson.name, home)
     if lesson.name in store.list_corpora(home):
-        raise CorpusError(f"there is a corpus {lesson.name} already: choose another name, or delete that one first")
+        raise CorpusError(f"corpus {lesson.name} already exists: choose another name or delete it first")
     if not (lesson.parts or lesson.mix):
-        raise CorpusError("choose what to learn from: files that were read, or corpora to mix")
+        raise CorpusError("nothing to learn from: add files or mix in corpora")
     for one in lesson.mix:
         known(one.name, home)
 
@@ -185,11 +185,11 @@ def learn(report: Report, lesson: Lesson, recordings: list[Recording], home: Pat
     def clips() -> Iterator[Motion]:
         for number, one in enumerate(recordings):
             motion = load_clip(one.folder, one.facts, one.clip)
-            report(number, steps, f"takes up {displayed(motion.name)}")
+            report(number, steps, f"reading {displayed(motion.name)}")
             if one.skip >= len(motion):
-                raise CorpusError(f"{displayed(motion.name)}: leaving out {one.skip} frames leaves none")
+                raise CorpusError(f"{displayed(motion.name)}: skipping {one.skip} frames leaves none")
             yield replace(motion.slice(one.skip, len(motion)), name=motion.name)
-        report(len(recordings), steps, "learns")
+        report(len(recordings), steps, "learning")
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -202,11 +202,11 @@ def learn(report: Report, lesson: Lesson, recordings: list[Recording], home: Pat
             mirror=lesson.mirror,
             title=lesson.title,
         )
-    report(len(recordings) + 1, steps, "writes it down")
+    report(len(recordings) + 1, steps, "saving")
     engine.save(store.place_for(lesson.name, home))
-    notes = list(dict.fromkeys(displayed(str(one.message), _LINE) for one in caught))[:5]
+    notes = list(dict.fromkeys(displayed(str(one.message), _MAX_TITLE_LENGTH) for one in caught))[:5]
     corpus = engine.corpus
-    mended = sum(len(clip.repairs) for clip in corpus.clips)
-    if mended:
-        notes.append(f"{mended} places where a joint jumped were mended")
+    repaired = sum(len(clip.repairs) for clip in corpus.clips)
+    if repaired:
+        notes.append(f"repaired {repaired} joint jumps")
     return {"name": lesson.name, "clips": len(corpus.clips), "postures": len(corpus), "notes": notes}

@@ -10,8 +10,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 
-MOST_BLOCKS = 10_000  # in a piece
-_MOST_TOGETHER = 2_000  # edits in one `Several`
+MAX_BLOCKS = 10_000  # in a piece
 
 Id = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.-]{1,40}\Z")]  # of a block
 Key = Annotated[str, msgspec.Meta(min_length=1, max_length=400)]  # of a movement
@@ -76,7 +75,7 @@ class Pin(_Struct, frozen=True):
     def __post_init__(self) -> None:
         """Check that `begins` is less than `ends`."""
         if self.begins >= self.ends:
-            raise ValueError("a hand or foot that stays must begin to before it ends to")
+            raise ValueError(f"begins must be less than ends, not {self.begins:g} and {self.ends:g}")
 
 
 class Ask(_Struct, frozen=True):
@@ -183,7 +182,7 @@ class Arrange(_Edit, frozen=True):
         about: origin of the new order: `words` for people, and data to make it again.
     """
 
-    blocks: Annotated[tuple[Block, ...], msgspec.Meta(max_length=MOST_BLOCKS)]
+    blocks: Annotated[tuple[Block, ...], msgspec.Meta(max_length=MAX_BLOCKS)]
     about: dict[str, Any] = {}
 
 
@@ -236,13 +235,13 @@ class Several(_Edit, frozen=True):
         words: description of the whole, for people; "" for that of the last edit.
     """
 
-    edits: Annotated[tuple[Single, ...], msgspec.Meta(min_length=1, max_length=_MOST_TOGETHER)]
+    edits: Annotated[tuple[Single, ...], msgspec.Meta(min_length=1, max_length=2_000)]
     words: Annotated[str, msgspec.Meta(max_length=200)] = ""
 
 
 Edit: TypeAlias = Single | Several
 
-_WORDS: Mapping[type, str] = {
+_DESCRIPTIONS: Mapping[type, str] = {
     Insert: "insert a stretch",
     Move: "move a stretch",
     Trim: "trim a stretch",
@@ -250,11 +249,10 @@ _WORDS: Mapping[type, str] = {
     Mirror: "mirror a stretch",
     Delete: "delete a stretch",
     Choose: "choose an insertion",
-    Wish: "ask for another insertion",
+    Wish: "change the wishes for an insertion",
     SetCorpus: "change the corpus",
     SetTitle: "rename the piece",
 }
-_DECIDED = {"open": "leave an insertion open", "locked": "lock an insertion", "discarded": "discard an insertion"}
 
 
 def each(edit: Edit) -> Iterator[Single]:
@@ -276,13 +274,14 @@ def words_of(edit: Edit) -> str:
         case Several(edits, words):
             return words or words_of(edits[-1])
         case Decide():
-            return _DECIDED[edit.decision]
+            verb = {"open": "reopen", "locked": "lock", "discarded": "discard"}[edit.decision]
+            return f"{verb} an insertion"
         case Arrange():
-            return str(edit.about.get("words", "")) or "arrange the piece anew"
+            return str(edit.about.get("words", "")) or "rearrange the piece"
         case SavePosture():
-            return f"{'forget' if edit.posture is None else 'save'} the posture {edit.name}"
+            return f"{'delete' if edit.posture is None else 'save'} the posture {edit.name}"
         case _:
-            return _WORDS[type(edit)]
+            return _DESCRIPTIONS[type(edit)]
 
 
 def touched(edit: Edit) -> frozenset[Place]:

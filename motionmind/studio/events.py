@@ -13,8 +13,8 @@ import msgspec
 
 from motionmind.errors import MotionMindError
 
-_BEAT = 15.0  # seconds between heartbeats of an idle stream, which reveal that its reader has gone
-_MOST = 32  # streams at once
+_HEARTBEAT_S = 15.0  # of an idle stream: heartbeats reveal that its reader has gone
+_MAX_STREAMS = 32
 
 
 class Events:
@@ -32,7 +32,7 @@ class Events:
             data: plain values for JSON.
             about: the subject of the event; it replaces an unread event of the same kind and subject.
         """
-        text = b"event: %s\ndata: %s\n\n" % (event.encode(), msgspec.json.encode(data, enc_hook=float))
+        text = _encode(event, data)
         for stream in self._streams:
             stream.put((event, about), text)
 
@@ -42,14 +42,13 @@ class Events:
         Raises:
             MotionMindError: there are too many streams, or the studio is closing.
         """
-        if self._is_closed or len(self._streams) >= _MOST:
-            raise MotionMindError(f"{_MOST} windows are open, and no more can be")
+        if self._is_closed or len(self._streams) >= _MAX_STREAMS:
+            raise MotionMindError(f"too many open windows: at most {_MAX_STREAMS}")
         stream = _Stream()
         for (event, about), data in first.items():
-            text = b"event: %s\ndata: %s\n\n" % (event.encode(), msgspec.json.encode(data, enc_hook=float))
-            stream.put((event, about), text)
+            stream.put((event, about), _encode(event, data))
         self._streams.add(stream)
-        return self._told(stream)
+        return self._events_of(stream)
 
     def close(self) -> None:
         """End all streams."""
@@ -57,13 +56,17 @@ class Events:
         for stream in self._streams:
             stream.end()
 
-    async def _told(self, stream: _Stream) -> AsyncGenerator[bytes]:
+    async def _events_of(self, stream: _Stream) -> AsyncGenerator[bytes]:
         try:
             yield b"retry: 1000\n\n"
             while (text := await stream.take()) is not None:
                 yield text
         finally:
             self._streams.discard(stream)
+
+
+def _encode(event: str, data: Any) -> bytes:
+    return b"event: %s\ndata: %s\n\n" % (event.encode(), msgspec.json.encode(data, enc_hook=float))
 
 
 class _Stream:
@@ -86,7 +89,7 @@ class _Stream:
     async def take(self) -> bytes | None:
         """Wait for events and return them, or a heartbeat; None if the stream has ended."""
         try:
-            async with asyncio.timeout(_BEAT):
+            async with asyncio.timeout(_HEARTBEAT_S):
                 await self._has_news.wait()
         except TimeoutError:
             return b": here\n\n"

@@ -29,10 +29,7 @@ from motionmind.studio.view import layout_of
 if TYPE_CHECKING:
     from motionmind.studio.studio import Studio
 
-_UNSAFE = re.compile(r'[\\/:*?"<>|\x00-\x1f\x7f]+')  # in file names, on some system
-_LONGEST = 100  # characters of a name
-_RATE = 30.0  # frames a second, for a piece whose frames are unevenly spaced
-_TYPES = {
+_MEDIA_TYPES = {
     "html": "text/html; charset=utf-8",
     "glb": "model/gltf-binary",
     "bvh": "text/plain; charset=utf-8",
@@ -49,9 +46,9 @@ def composed(studio: Studio) -> Motion:
     """
     project = studio.project
     if not project.state.blocks:
-        raise MotionMindError("the piece is empty: there is nothing to take away yet")
+        raise MotionMindError("the piece is empty: nothing to export")
     if missing := project.missing:
-        raise MotionMindError(f"the piece cannot be taken away: {missing[0]}")
+        raise MotionMindError(f"cannot export the piece: {missing[0]}")
     layout = layout_of(project.state, project.finding, project.marks, project.standing)
     return replace(performance(list(layout.parts), studio.movements.get), name=project.state.title or "piece")
 
@@ -68,7 +65,8 @@ def file_name(title: str, suffix: str) -> str:
     >>> file_name("Swan: act 2/3", "bvh")
     'Swan- act 2-3.bvh'
     """
-    plain = _UNSAFE.sub("-", title).strip(". ")[:_LONGEST].rstrip(". ")
+    safe = re.sub(r'[\\/:*?"<>|\x00-\x1f\x7f]+', "-", title)  # each is invalid on some system
+    plain = safe.strip(". ")[:100].rstrip(". ")
     return f"{plain or 'piece'}.{suffix}"
 
 
@@ -77,7 +75,7 @@ def routes(studio: Studio) -> list[BaseRoute]:
     makers: dict[str, Callable[[Motion], bytes]] = {
         "html": lambda motion: page(motion).encode(),
         "glb": lambda motion: _written(motion, ".glb"),
-        "bvh": lambda motion: _written(motion if motion.is_even else motion.resample(_RATE), ".bvh"),
+        "bvh": lambda motion: _written(motion if motion.is_even else motion.resample(30.0), ".bvh"),
         "json": lambda motion: _written(motion, ".json"),
     }
 
@@ -87,7 +85,7 @@ def routes(studio: Studio) -> list[BaseRoute]:
         if form == "project":
             return _saved(studio.project.path.read_bytes(), file_name(title, "motionmind"))
         if form not in makers:
-            raise MotionMindError(f"the piece cannot be taken away as {form!r:.20}{suggestion(form, list(makers))}")
+            raise MotionMindError(f"cannot export as {form!r:.20}{suggestion(form, list(makers))}")
         data = await run_in_threadpool(makers[form], composed(studio))
         return _saved(data, file_name(title, form))
 
@@ -112,5 +110,5 @@ def _written(motion: Motion, suffix: str) -> bytes:
 def _saved(data: bytes, name: str) -> Response:
     """Return a response that a browser saves as a file."""
     disposition = f"attachment; filename*=UTF-8''{quote(name, safe='')}"
-    media = _TYPES[name.rpartition(".")[2]]
+    media = _MEDIA_TYPES[name.rpartition(".")[2]]
     return Response(data, media_type=media, headers={"Content-Disposition": disposition, "Cache-Control": "no-store"})

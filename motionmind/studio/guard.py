@@ -19,19 +19,16 @@ from starlette.exceptions import HTTPException
 from motionmind.display import printable
 from motionmind.errors import MotionMindError
 from motionmind.studio.token import Keys
+from motionmind.studio.uploads import MAX_UPLOAD_BYTES
 
 Message = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]
 Application = Callable[[Message, Receive, Send], Awaitable[None]]
 
-HEADER, VALUE = "x-motionmind", "studio"
-ENTER, UPLOADS = "/api/enter", "/api/imports"
-_METHODS = {"GET", "HEAD", "POST", "DELETE"}
-_READING = {"GET", "HEAD"}
-_MOST, _MOST_UPLOADED = 4 * 2**20, 64 * 2**20  # bytes, at most, of a request's body
-_SECONDS, _SECONDS_UPLOADED = 20.0, 120.0  # time limits to receive it
-_ALWAYS = {
+ENTER_PATH = "/api/enter"
+_UPLOAD_PATH = "/api/imports"
+_SECURITY_HEADERS = {
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
     "cross-origin-opener-policy": "same-origin",
@@ -57,9 +54,7 @@ class TooLargeError(Exception):
 class Guard:
     """An ASGI application that guards another."""
 
-    def __init__(
-        self, application: Application, host: str, port: int, keys: Keys, *, seconds: float = _SECONDS
-    ) -> None:
+    def __init__(self, application: Application, host: str, port: int, keys: Keys, *, seconds: float = 20.0) -> None:
         """Guard an application.
 
         Args:
@@ -67,7 +62,7 @@ class Guard:
             host: the name or address that the server listens on.
             port: its port.
             keys: admits requests.
-            seconds: time limit to receive the body of a request.
+            seconds: time limit to receive the body of a request, except for uploads.
         """
         self._application, self._port, self._keys, self._seconds = application, port, keys, seconds
         names = {"127.0.0.1", "::1", "localhost", host.lower().strip("[]")}
@@ -98,21 +93,20 @@ class Guard:
         if fault := self._fault(scope):
             await refuse(*fault)
             return
-        is_upload = scope["path"] == UPLOADS
-        most, seconds = (_MOST_UPLOADED, _SECONDS_UPLOADED) if is_upload else (_MOST, self._seconds)
+        most, seconds = _max_bytes(scope["path"]), 120.0 if scope["path"] == _UPLOAD_PATH else self._seconds
         try:
             await self._application(scope, _limited(receive, most, seconds), sent)
         except TimeoutError:
-            await refuse(408, f"the request did not come within {seconds:g} s")
+            await refuse(408, f"the request took longer than {seconds:g} s")
         except TooLargeError:
-            await refuse(413, f"this is too much at once: {most // 2**20} MB are the most")
+            await refuse(413, f"request too large: at most {most // 2**20} MB")
         except MotionMindError as error:
             await refuse(400, printable(str(error)))
         except HTTPException as error:
-            await refuse(error.status_code, "there is nothing here" if error.status_code == 404 else "this cannot be")
+            await refuse(error.status_code, "not found" if error.status_code == 404 else "not allowed")
         except Exception as error:
             print(f"motionmind studio: {type(error).__name__}: {error}", file=sys.stderr)
-            await refuse(500, "this cannot be answered; the terminal says why")
+            await refuse(500, "internal error: see the terminal")
 
     def _fault(self, scope: Message) -> tuple[int, str] | None:
         """Return the status and message for a request to refuse; None to accept it."""
@@ -125,25 +119,27 @@ class Guard:
         """Return the fault of a request that may come from another page."""
         hosts, origins = headers.get("host", []), headers.get("origin", [])
         if len(hosts) != 1 or not self._is_own(hosts[0]):
-            return 403, "the studio is not at this host"
+            return 403, "wrong host for this studio"
         sites = headers.get("sec-fetch-site", [])
         if any(origin != f"http://{hosts[0]}" for origin in origins) or not {*sites} <= {"same-origin", "none"}:
-            return 403, "other pages may not ask"
-        if method not in _METHODS:
-            return 405, "there is no such method"
-        if method not in _READING and (len(origins) != 1 or headers.get(HEADER) != [VALUE]):
-            return 403, f"what writes needs Origin and {HEADER}"
+            return 403, "requests from other pages are not allowed"
+        if method in ("GET", "HEAD"):
+            return None
+        if method not in ("POST", "DELETE"):
+            return 405, "unknown method"
+        if len(origins) != 1 or headers.get("x-motionmind") != ["studio"]:
+            return 403, "requests that write need the headers Origin and X-MotionMind"
         return None
 
     def _unwelcome(self, headers: Mapping[str, list[str]], path: str) -> tuple[int, str] | None:
         """Return the fault of a request that is too large or not authorised."""
         length = headers.get("content-length", ["0"])[0]
-        most = _MOST_UPLOADED if path == UPLOADS else _MOST
+        most = _max_bytes(path)
         if not length.isascii() or not length.isdigit() or len(length) > 15 or int(length) > most:
-            return 413, f"this is too much at once: {most // 2**20} MB are the most"
-        needs_cookie = path.startswith("/api/") and path != ENTER
+            return 413, f"request too large: at most {most // 2**20} MB"
+        needs_cookie = path.startswith("/api/") and path != ENTER_PATH
         if needs_cookie and not self._keys.is_let_in("; ".join(headers.get("cookie", [])), self._port):
-            return 401, "open the studio at the address that the terminal shows"
+            return 401, "open the studio at the address shown in the terminal"
         return None
 
     def _is_own(self, host: str) -> bool:
@@ -161,6 +157,11 @@ class Guard:
         return self._any_address
 
 
+def _max_bytes(path: str) -> int:
+    """Return the size limit of a request's body."""
+    return MAX_UPLOAD_BYTES if path == _UPLOAD_PATH else 4 * 2**20
+
+
 def _limited(receive: Receive, most: int, seconds: float) -> Receive:
     """Wrap `receive` to raise TooLargeError for a large body, and TimeoutError for one that is incomplete in time."""
     until = asyncio.get_running_loop().time() + seconds
@@ -168,7 +169,7 @@ def _limited(receive: Receive, most: int, seconds: float) -> Receive:
 
     async def limited() -> Message:
         nonlocal is_whole, size
-        if is_whole:  # the next message tells of a disconnect
+        if is_whole:  # the next message reports a disconnect
             return await receive()
         async with asyncio.timeout_at(until):
             message = await receive()
@@ -183,7 +184,7 @@ def _limited(receive: Receive, most: int, seconds: float) -> Receive:
 
 def _with_headers(headers: Any, path: str) -> list[tuple[bytes, bytes]]:
     found = {name.lower() for name, _ in headers}
-    added = {**_ALWAYS, "content-security-policy": policy()}
+    added = {**_SECURITY_HEADERS, "content-security-policy": policy()}
     if path.startswith("/api/"):
         added["cache-control"] = "no-store"
     more = [(name.encode(), value.encode()) for name, value in added.items() if name.encode() not in found]

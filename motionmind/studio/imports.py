@@ -100,9 +100,9 @@ def _corpus_routes(studio: Studio, uploads: Uploads) -> list[BaseRoute]:
     async def delete(request: Request) -> Response:
         name = known(request.path_params["name"], home)
         if name in corpora_of(studio.project.state):
-            raise MotionMindError(f"this piece needs the corpus {displayed(name)}: it cannot be deleted while it does")
+            raise MotionMindError(f"cannot delete corpus {displayed(name)}: this piece uses it")
         if name in studio.project.versions:
-            raise MotionMindError(f"undo or redo leads back to the corpus {displayed(name)}: it cannot be deleted here")
+            raise MotionMindError(f"cannot delete corpus {displayed(name)}: undo or redo may need it")
         store.delete(name, home)
         studio.forget(name)
         return api.json({})
@@ -118,7 +118,7 @@ def _corpus_routes(studio: Studio, uploads: Uploads) -> list[BaseRoute]:
 def _recording(uploads: Uploads, upload: str, clip: int) -> Recording:
     own = uploads.get(upload)
     if own.facts is None or not 0 <= clip < len(own.facts.clips):
-        raise MotionMindError(own.error or f"{own.name} holds no such movement")
+        raise MotionMindError(own.error or f"{own.name} has no clip {clip + 1}")
     return Recording(uploads.folder(upload), own.facts, clip, own.skip(clip))
 
 

@@ -70,7 +70,7 @@ class Journal:
                 os.fsync(file.fileno())
             sync_folder(path.parent)
         except FileExistsError:
-            raise MotionMindError(f"{path}: is there already") from None
+            raise MotionMindError(f"{path}: already exists") from None
         except OSError as error:
             with suppress(OSError):
                 path.unlink()
@@ -92,7 +92,7 @@ class Journal:
             raise MotionMindError(f"{path}: cannot be opened: {error.strerror or error}") from error
         try:
             if not lock_alone(descriptor):
-                raise MotionMindError(f"{path}: is open{_elsewhere(path)}; end that studio, or work there")
+                raise MotionMindError(f"{path}: already open in a studio{_address_of(path)}; close it or work there")
             data = read_bytes(path)
             end, dropped = _whole(data), False
             if end == len(data) and not data.endswith(b"\n"):  # the last line lacks only its newline
@@ -139,7 +139,7 @@ class Journal:
             with suppress(OSError):
                 os.ftruncate(self._descriptor, self._end)
             reason = error.strerror or str(error)
-            raise MotionMindError(f"this was not done, for {self.path.name} cannot be written: {reason}") from error
+            raise MotionMindError(f"not done: {self.path.name} cannot be written: {reason}") from error
         line = Line(self.count, self._end, data)
         self._end += len(data) + 1
         self.count += 1
@@ -148,13 +148,13 @@ class Journal:
     def tell(self, address: str) -> None:
         """Write down the address of this studio, for another one that tries to open the project."""
         with suppress(OSError):
-            replace_file(_note(self.path), address.encode())
+            replace_file(_address_file(self.path), address.encode())
 
     def close(self) -> None:
         """Unlock and close the file, unless it is closed."""
         if self._descriptor >= 0:
             with suppress(OSError):
-                _note(self.path).unlink()
+                _address_file(self.path).unlink()
             os.close(self._descriptor)
             self._descriptor = -1
 
@@ -188,17 +188,18 @@ def _check_head(path: Path) -> None:
     except (ValueError, RecursionError):
         head = {}
     if head.get("format") != FORMAT:
-        raise FormatError(f"is no project of the studio: its first line does not say {FORMAT!r}", path=path)
+        raise FormatError(f"not a studio project: its first line does not say {FORMAT!r}", path=path)
     if head.get("version") != VERSION:
         raise FormatError(f"is version {head.get('version')!r} of a project; version {VERSION} can be read", path=path)
 
 
-def _note(path: Path) -> Path:
+def _address_file(path: Path) -> Path:
     return path.with_name(f".{path.name}.address")
 
 
-def _elsewhere(path: Path) -> str:
+def _address_of(path: Path) -> str:
+    """Return " at ADDRESS" for the studio that has a project open; "" if its address is unknown."""
     try:
-        return f" at {_note(path).read_text('ascii')[:100]}"
+        return f" at {_address_file(path).read_text('ascii')[:100]}"
     except (OSError, ValueError):
-        return " elsewhere"
+        return ""

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from motionmind.learned.learning import Learned
 
 Known = Literal["seen", "near", "unseen"]
-NEAR = 2.0  # an orientation within this many tolerances of a seen one is near
-_COUNTED = 1e-9  # degrees of rounding error that a tolerance allows
 
 
 class Memory:
@@ -43,12 +41,12 @@ class Memory:
     def known(self, posture: Posture) -> list[Known]:
         """Return how well the corpus knows each joint's orientation [J].
 
-        It is "seen" within the tolerance of a recorded orientation, "near" within `NEAR` tolerances.
+        It is "seen" within the tolerance of a recorded orientation, "near" within twice that.
         """
         degrees, _ = self._nearest(posture.rotations)
-        limits = self.space.tolerances[: len(degrees)] + _COUNTED
+        limits = self.space.tolerances[: len(degrees)] + 1e-9  # degrees of rounding error
         return [
-            "seen" if off <= limit else "near" if off <= NEAR * limit else "unseen"
+            "seen" if off <= limit else "near" if off <= 2.0 * limit else "unseen"
             for off, limit in zip(degrees, limits, strict=True)
         ]
 
@@ -79,8 +77,8 @@ class Memory:
         mine, theirs = corpus.to_chains(posture.rotations)[:count], corpus.to_chains(corpus.rotations)[:, :count]
         number = int(np.argmin(np.sum(rot.angle(theirs, mine) ** 2, axis=1)))
         rotations = np.array(corpus.rotations[number])
-        way = rot.heading(posture.rotations[0]) - rot.heading(rotations[0])
-        rotations[0] = rot.mul(rot.about_vertical(way), rotations[0])
+        turn = rot.heading(posture.rotations[0]) - rot.heading(rotations[0])
+        rotations[0] = rot.mul(rot.about_vertical(turn), rotations[0])
         clip = corpus.clip_of(number)
         seconds = float(corpus.times[number] - corpus.times[clip.start])
         return settle(Posture(posture.skeleton, rot.normalise(rotations), posture.root), posture), clip.label, seconds

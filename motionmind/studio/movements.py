@@ -32,9 +32,9 @@ from motionmind.errors import FormatError, MotionMindError, suggestion
 from motionmind.names.finding import Collection, open_collection
 from motionmind.names.spelling import Source
 from motionmind.studio.journal import Journal, Line
+from motionmind.studio.piece import MIRRORED, OWN
 
-_MIRRORED, _KEPT, _OWN = "~", "m-", "own"
-_HELD = 64 * 2**20  # bytes of movement in the cache
+STORED = "m-"  # prefix of keys of movements stored in the project
 
 
 class Packed(msgspec.Struct, frozen=True):
@@ -107,7 +107,7 @@ class MotionRecord(msgspec.Struct, frozen=True):
                 packed.array() for packed in (self.offsets, self.tips, self.rotations, self.root, self.times)
             )
         except ValueError as error:
-            raise MotionMindError(f"{displayed(name)}: its numbers cannot be read: {error}") from error
+            raise MotionMindError(f"{displayed(name)}: its arrays are damaged: {error}") from error
         skeleton = Skeleton(self.body, self.names, self.parents, offsets, tips)
         credited = self.credits or ((),) * len(self.insertions)  # projects of 0.2 and before have none
         insertions = tuple(
@@ -159,10 +159,10 @@ class Movements:
         if (known := self._held.get(key)) is not None:
             self._held.move_to_end(key)
             return known
-        if key.lstrip(_MIRRORED).startswith(f"{_OWN}/"):  # not cached: the name may be saved anew
-            motion = self.get(self.saved(key.lstrip(_MIRRORED).partition("/")[2]))
-            return mirrored(motion) if key.startswith(_MIRRORED) else motion
-        if key.startswith(_MIRRORED):
+        if key.lstrip(MIRRORED).startswith(OWN):  # not cached: the name may be saved anew
+            motion = self.get(self.saved(key.lstrip(MIRRORED).partition("/")[2]))
+            return mirrored(motion) if key.startswith(MIRRORED) else motion
+        if key.startswith(MIRRORED):
             motion = mirrored(self.get(key[1:]))
         elif key in self._kept:
             motion = self._read(key)
@@ -174,7 +174,7 @@ class Movements:
 
     def title(self, key: str) -> str:
         """Return a movement's title."""
-        if key.startswith(_MIRRORED):
+        if key.startswith(MIRRORED):
             return f"{self.title(key[1:])} (mirrored)"
         if key in self._kept:
             return self._kept[key][0]
@@ -191,7 +191,7 @@ class Movements:
             MotionMindError: it cannot be written.
         """
         record = msgspec.json.encode(MotionRecord.of(motion))
-        key = _KEPT + hashlib.sha256(record).hexdigest()[:16]
+        key = STORED + hashlib.sha256(record).hexdigest()[:16]
         if key not in self._kept:
             title = displayed(title or motion.name or motion.skeleton.name)
             self.take_in(self._journal.append(MovementLine(key, title, msgspec.Raw(record))))
@@ -212,7 +212,7 @@ class Movements:
     def forget(self, corpus: str) -> None:
         """Drop cached data of a corpus that has changed."""
         self._collections.pop(corpus, None)
-        for key in [key for key in self._held if key.lstrip(_MIRRORED).startswith(f"{corpus}/")]:
+        for key in [key for key in self._held if key.lstrip(MIRRORED).startswith(f"{corpus}/")]:
             self._size -= _bytes(self._held.pop(key))
 
     def _read(self, key: str) -> Motion:
@@ -227,20 +227,20 @@ class Movements:
     def _split(self, key: str) -> tuple[_Corpus, str]:
         name, slash, clip = key.partition("/")
         if not slash or name not in store.list_corpora(self._home):
-            raise MotionMindError(f"there is no movement {displayed(key)}")
+            raise MotionMindError(f"no movement {displayed(key)}")
         return self._corpus(name), clip
 
     def _corpus(self, name: str) -> _Corpus:
         if name not in self._collections:
             if name not in (known := store.list_corpora(self._home)):
-                raise MotionMindError(f"there is no corpus {displayed(name)}{suggestion(name, known)}")
+                raise MotionMindError(f"no corpus {displayed(name)}{suggestion(name, known)}")
             self._collections[name] = _Corpus(name, self._home)
         return self._collections[name]
 
     def _hold(self, key: str, motion: Motion) -> None:
         self._held[key] = motion
         self._size += _bytes(motion)
-        while self._size > _HELD and len(self._held) > 1:
+        while self._size > 64 * 2**20 and len(self._held) > 1:
             self._size -= _bytes(self._held.popitem(last=False)[1])
 
 

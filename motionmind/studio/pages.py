@@ -14,15 +14,12 @@ from typing import NamedTuple
 import msgspec
 
 _PAGE = Path(__file__).parent / "page"
-_PLAYER = Path(__file__).parents[1] / "render" / "player"
-_TYPES = {
+_MEDIA_TYPES = {
     ".js": "text/javascript; charset=utf-8",
     ".css": "text/css; charset=utf-8",
     ".svg": "image/svg+xml",
     ".png": "image/png",
 }
-_IMPORT = re.compile(r'\b(?:from|import)\s*"([^"]+)"')
-_THREE = {"three": "three.module.min.js", "three/OrbitControls": "OrbitControls.js"}
 
 
 class File(NamedTuple):
@@ -54,14 +51,17 @@ class Page(NamedTuple):
 
 def read_page() -> Page:
     """Read all files of the page."""
-    own, players = _read(_PAGE), _read(_PLAYER)
+    own, players = _read(_PAGE), _read(Path(__file__).parents[1] / "render" / "player")
     index = Template((_PAGE / "index.html").read_text("utf-8"))
     tags = [(name, file.tag) for files in (own, players) for name, file in files.items()]
     version = hashlib.sha256(repr(tags).encode()).hexdigest()[:16]
     page, player = f"/page/{version}", f"/player/{version}"
     files = {f"{page}/{name}": file for name, file in own.items()}
     files |= {f"{player}/{name}": file for name, file in players.items()}
-    names = {name: f"{player}/vendor/{file}" for name, file in _THREE.items()}
+    names = {
+        "three": f"{player}/vendor/three.module.min.js",
+        "three/OrbitControls": f"{player}/vendor/OrbitControls.js",
+    }
     for name in players:
         if name.endswith(".js") and not name.startswith("vendor/"):
             names[f"motionmind/{name.removesuffix('.js')}"] = f"{player}/{name}"
@@ -81,9 +81,9 @@ def read_page() -> Page:
 def _read(folder: Path) -> dict[str, File]:
     """Return a folder's files for browsers, by relative path."""
     return {
-        path.relative_to(folder).as_posix(): _file(path.read_bytes(), _TYPES[path.suffix])
+        path.relative_to(folder).as_posix(): _file(path.read_bytes(), _MEDIA_TYPES[path.suffix])
         for path in sorted(folder.rglob("*"))
-        if path.suffix in _TYPES and not any(part.startswith((".", "node_modules")) for part in path.parts[-3:])
+        if path.suffix in _MEDIA_TYPES and not any(part.startswith((".", "node_modules")) for part in path.parts[-3:])
     }
 
 
@@ -96,7 +96,7 @@ def _loaded(files: Mapping[str, File], names: Mapping[str, str], start: str) -> 
         new = {
             named
             for path in new
-            for name in _IMPORT.findall(text[path])
+            for name in re.findall(r'\b(?:from|import)\s*"([^"]+)"', text[path])
             if (named := names.get(name) or posixpath.normpath(f"{posixpath.dirname(path)}/{name}")) in text
         } - found
     return sorted(found)

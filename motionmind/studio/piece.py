@@ -18,7 +18,7 @@ import msgspec
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.studio.edits import (
-    MOST_BLOCKS,
+    MAX_BLOCKS,
     Arrange,
     Ask,
     Block,
@@ -178,7 +178,7 @@ class State:
         try:
             return self._places[block]
         except KeyError:
-            raise MotionMindError("this stretch is not in the piece any more") from None
+            raise MotionMindError("this stretch is no longer in the piece") from None
 
     def block(self, block: str) -> Block:
         """Return the block with an id; raise MotionMindError if there is none."""
@@ -188,7 +188,7 @@ class State:
         """Return the seam between two neighbours; raise MotionMindError if they are not neighbours."""
         place = self.place(left)
         if self.place(right) != place + 1:
-            raise MotionMindError("these two stretches do not follow each other any more")
+            raise MotionMindError("these two stretches are no longer neighbours")
         return self.seams[place]
 
     def stable(self, key: str) -> str:
@@ -238,7 +238,7 @@ def _apply(state: State, edit: Single) -> State:  # noqa: PLR0911 (one case an e
             _check_new(state, block.id)
             before = len(state.blocks) if edit.before is None else state.place(edit.before)
             blocks = (*state.blocks[:before], block, *state.blocks[before:])
-            return replace(state, blocks=_countable(blocks), used=state.used | {block.id})
+            return replace(state, blocks=_check_count(blocks), used=state.used | {block.id})
         case Move():
             return _moved(state, edit)
         case Trim(block=name, first=first, last=last):
@@ -260,8 +260,8 @@ def _apply(state: State, edit: Single) -> State:  # noqa: PLR0911 (one case an e
             return _judged(state, (left, right), Verdict(verdict.ask, alternative))
         case Decide(left, right, decision):
             verdict = state.seam(left, right).verdict
-            found_in = (verdict.corpus or state.corpus) if decision == "locked" else ""
-            return _judged(state, (left, right), Verdict(verdict.ask, verdict.chosen, decision, found_in))
+            corpus = (verdict.corpus or state.corpus) if decision == "locked" else ""
+            return _judged(state, (left, right), Verdict(verdict.ask, verdict.chosen, decision, corpus))
         case Wish(left=left, right=right):
             _open(state.seam(left, right))
             passing = tuple(msgspec.structs.replace(one, posture=state.stable(one.posture)) for one in edit.ask.passing)
@@ -270,10 +270,10 @@ def _apply(state: State, edit: Single) -> State:  # noqa: PLR0911 (one case an e
             blocks = tuple(_checked(state, block) for block in given)
             names = {block.id for block in blocks}
             if len(names) < len(blocks):
-                raise MotionMindError("the stretches of an order must differ in their ids")
+                raise MotionMindError("two stretches have the same id")
             for block in blocks:
                 if block.id in state.used and block not in state.blocks:
-                    raise MotionMindError(f"{block.id} is another stretch: a new one needs a new id")
+                    raise MotionMindError(f"{block.id} is the id of another stretch: a new one needs a new id")
             return replace(arranged(state, blocks), used=state.used | names, about=about)
         case SavePosture(name, posture):
             return _saved(state, name, posture)
@@ -290,12 +290,12 @@ def arranged(state: State, blocks: tuple[Block, ...]) -> State:
         state: the piece.
         blocks: the blocks; one that was in the piece has its id if it is the same stretch.
     """
-    words = {seam.ends: seam.verdict for seam in state.seams if seam.verdict != Verdict()}
+    verdicts = {seam.ends: seam.verdict for seam in state.seams if seam.verdict != Verdict()}
     after = replace(state, blocks=blocks)
     new = {
-        seam.pair: Verdict(word.ask, word.chosen, "discarded" if word.decision == "discarded" else "open")
+        seam.pair: Verdict(old.ask, old.chosen, "discarded" if old.decision == "discarded" else "open")
         for seam in after.seams
-        if seam.pair not in state.verdicts and (word := words.get(seam.ends))
+        if seam.pair not in state.verdicts and (old := verdicts.get(seam.ends))
     }
     return replace(after, verdicts={**state.verdicts, **new}) if new else after
 
@@ -303,7 +303,7 @@ def arranged(state: State, blocks: tuple[Block, ...]) -> State:
 def _checked(state: State, block: Block) -> Block:
     """Return the block with a stable source; raise MotionMindError if it ends before it begins."""
     if block.first > block.last:
-        raise MotionMindError(f"a stretch cannot go from frame {block.first} back to frame {block.last}")
+        raise MotionMindError(f"a stretch cannot end before it begins: frames {block.first} to {block.last}")
     source, mirrored = state.stable(block.source), block.mirrored
     if source.startswith(MIRRORED):
         source, mirrored = source[1:], not mirrored
@@ -312,19 +312,19 @@ def _checked(state: State, block: Block) -> Block:
 
 def _check_new(state: State, block: str) -> None:
     if block in state.used:
-        raise MotionMindError(f"there is, or was, a stretch {displayed(block)}: a new one needs a new id")
+        raise MotionMindError(f"id {displayed(block)} is taken: a new stretch needs a new id")
 
 
-def _countable(blocks: tuple[Block, ...]) -> tuple[Block, ...]:
-    if len(blocks) > MOST_BLOCKS:
-        raise MotionMindError(f"a piece has at most {MOST_BLOCKS:,} stretches")
+def _check_count(blocks: tuple[Block, ...]) -> tuple[Block, ...]:
+    if len(blocks) > MAX_BLOCKS:
+        raise MotionMindError(f"a piece has at most {MAX_BLOCKS:,} stretches")
     return blocks
 
 
 def _moved(state: State, edit: Move) -> State:
     place = state.place(edit.block)
     if edit.before == edit.block:
-        raise MotionMindError("a stretch cannot stand before itself")
+        raise MotionMindError("a stretch cannot come before itself")
     block, rest = state.blocks[place], state.blocks[:place] + state.blocks[place + 1 :]
     before = len(rest)
     if edit.before is not None:
@@ -338,12 +338,10 @@ def _split(state: State, edit: Split) -> State:
     block = state.blocks[place]
     _check_new(state, edit.id)
     if not block.first < edit.at <= block.last:
-        raise MotionMindError(
-            f"the stretch goes from frame {block.first} to {block.last}: frame {edit.at} does not split it"
-        )
+        raise MotionMindError(f"cannot split at frame {edit.at}: the stretch has frames {block.first} to {block.last}")
     one = msgspec.structs.replace(block, last=edit.at - 1)
     other = msgspec.structs.replace(block, first=edit.at, id=edit.id)
-    blocks = _countable((*state.blocks[:place], one, other, *state.blocks[place + 1 :]))
+    blocks = _check_count((*state.blocks[:place], one, other, *state.blocks[place + 1 :]))
     # The verdict on the seam at the block's end moves with that end.
     verdicts = {
         (edit.id if left == block.id else left, right): verdict for (left, right), verdict in state.verdicts.items()
@@ -376,7 +374,7 @@ def _forget_ends(state: State, block: Block, *, begins: bool, ends: bool) -> Sta
 def _open(seam: Seam) -> Verdict:
     """Return the verdict on a seam; raise MotionMindError if it is locked."""
     if seam.verdict.decision == "locked":
-        raise MotionMindError("an insertion that this changes is locked: unlock it first")
+        raise MotionMindError("this would change a locked insertion: unlock it first")
     return seam.verdict
 
 

@@ -24,9 +24,6 @@ from motionmind.geometry import rotations as rot
 from motionmind.studio.piece import Seam, State, key_of
 from motionmind.variation.piece import LONE_POSTURE_S, Parts, Placement
 
-_STILL = 30.0  # frames a second of a missing movement
-_LEAST = 1e-9  # seconds that a part counts for in credits, at least: a single posture is credited too
-
 Movements = Callable[[str], Motion]  # returns a movement by key; raises MotionMindError if there is none
 
 
@@ -38,9 +35,9 @@ def check_body(key: str, motion: Motion, other_key: str, other: Motion) -> None:
     """
     difference = motion.skeleton.difference(other.skeleton)
     if difference is None and motion.skeleton.names != other.skeleton.names:
-        difference = "its joints come in another order"
+        difference = "their joints are in different order"
     if difference is not None:
-        raise SkeletonError(f"{other_key} is on another body than {key}: {difference}")
+        raise SkeletonError(f"{other_key} and {key} have different bodies: {difference}")
 
 
 class Part(msgspec.Struct, frozen=True):
@@ -79,7 +76,7 @@ class Mark(NamedTuple):
 class Marks:
     """Cached marks of movements' frames: a piece needs the same ones after every edit.
 
-    A missing movement or frame stands still at the origin, with `_STILL` frames a second.
+    A missing movement or frame stands still at the origin, with 30 frames a second.
 
     Attributes:
         facing: returns which way a corpus's dancers may face, by its name.
@@ -110,7 +107,7 @@ class Marks:
         """Return the mark of a frame."""
         if (known := self._marks.get((key, frame))) is None:
             if not self.has(key, frame):
-                return Mark(0.0, 0.0, 0.0, frame / _STILL)
+                return Mark(0.0, 0.0, 0.0, frame / 30.0)
             motion = self._movement(key)
             x, _, z = motion.root[frame].tolist()
             known = Mark(x, z, float(rot.heading(motion.rotations[frame, 0])), float(motion.times[frame]))
@@ -232,11 +229,11 @@ def performance(parts: Sequence[Part], movement: Movements) -> Motion:
         SkeletonError: the parts have different skeletons.
     """
     if not parts:
-        raise MotionMindError("the piece is empty: put a posture or a stretch of movement into it first")
+        raise MotionMindError("the piece is empty: add a posture or a clip first")
     joined = Parts()
     whole = movement(parts[0].key)
     own = [
-        replace(credit, share=credit.share * max(part.seconds, _LEAST))
+        replace(credit, share=credit.share * max(part.seconds, 1e-9))  # a single posture is credited too
         for part in parts
         if not part.inserted
         for credit in movement(part.key).own_credits
@@ -246,7 +243,7 @@ def performance(parts: Sequence[Part], movement: Movements) -> Motion:
     for place, part in enumerate(parts):
         motion = movement(part.key)
         if part.last >= len(motion):
-            raise MotionMindError(f"{part.key} has frames 0 to {len(motion) - 1}, no frame {part.last}")
+            raise MotionMindError(f"{part.key} has no frame {part.last}: its frames are 0 to {len(motion) - 1}")
         check_body(parts[0].key, whole, part.key, motion)
         begin, stop = part.first, part.last + 1
         if part.inserted:

@@ -14,7 +14,6 @@ from starlette.routing import BaseRoute, Route
 
 from motionmind.body.mirror import find_sides
 from motionmind.body.motion import Posture
-from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.studio.api import body_of, error, json
@@ -27,11 +26,8 @@ from motionmind.studio.score_lines import score_lines
 if TYPE_CHECKING:
     from motionmind.studio.studio import Studio
 
-_UNIT = 1e-3  # tolerance of a quaternion's length: the page rounds
-_REACH = 1e4  # metres from the origin, at most
-
 Name = Annotated[str, msgspec.Meta(max_length=200)]
-Metres = Annotated[float, msgspec.Meta(ge=-_REACH, le=_REACH)]
+Metres = Annotated[float, msgspec.Meta(ge=-1e4, le=1e4)]
 Coefficient = Annotated[float, msgspec.Meta(ge=-2.0, le=2.0)]
 
 
@@ -122,7 +118,7 @@ class Poser:
         """Return a frame of a movement, with what the editor shows of its body."""
         motion = self._studio.movements.get(asked.key)
         if asked.frame >= len(motion):
-            raise MotionMindError(f"{asked.key} has frames 0 to {len(motion) - 1}, no frame {asked.frame}")
+            raise MotionMindError(f"{asked.key} has no frame {asked.frame}: its frames are 0 to {len(motion) - 1}")
         posture = motion.posture(asked.frame)
         skeleton = posture.skeleton
         try:
@@ -157,7 +153,7 @@ class Poser:
             return self.told(put_on_floor(posture))
         memory = self._memory()
         if not memory.fits(posture):
-            raise MotionMindError("this corpus is of another body: it knows nothing of these joints")
+            raise MotionMindError("this corpus has a different body: it does not know these joints")
         if asked.to == "known":
             return self.told(memory.bring_joints(posture, asked.kept))
         found, clip, seconds = memory.bring_whole(posture)
@@ -195,17 +191,16 @@ class Poser:
 
     def posture(self, pose: Pose) -> Posture:
         """Return the posture that the page sent; raise MotionMindError if it is invalid."""
-        skeleton = self._skeleton(pose.key)
+        skeleton = self._studio.movements.get(pose.key).skeleton
         rotations = np.array(pose.rotations)
         if len(rotations) != 4 * len(skeleton):
-            raise MotionMindError(f"a posture of {skeleton.name} has {4 * len(skeleton)} numbers, not {len(rotations)}")
+            raise MotionMindError(
+                f"a posture of {skeleton.name} needs {4 * len(skeleton)} numbers, not {len(rotations)}"
+            )
         rotations = rotations.reshape(-1, 4)
-        if np.any(np.abs(rot.norm(rotations) - 1.0) > _UNIT):
-            raise MotionMindError("a rotation is no unit quaternion")
+        if np.any(np.abs(rot.norm(rotations) - 1.0) > 1e-3):  # the page rounds
+            raise MotionMindError("a rotation is not a unit quaternion")
         return Posture(skeleton, rot.normalise(rotations), np.array(pose.root))
-
-    def _skeleton(self, key: str) -> Skeleton:
-        return self._studio.movements.get(key).skeleton
 
 
 def routes(studio: Studio) -> list[BaseRoute]:

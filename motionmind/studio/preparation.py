@@ -9,15 +9,11 @@ from math import ceil
 Steps = Generator[tuple[int, int, bool]]  # steps done, steps in all, and whether searches may begin
 Told = Generator[tuple[int, int, str, bool]]  # the same, with a description before the last
 
-_FIRST, _REST = "getting ready, once", "getting the rest ready"
-_SOON = 10  # steps before the first estimate: the first functions compile many others
-_LATELY = 15  # last steps that the pace is measured over
-
 
 def told(steps: Steps, now: Callable[[], float] = time.monotonic) -> Told:
     """Describe each step, with the remaining time at the pace of the last few steps.
 
-    The pace depends on the load of the computer, so there is no fixed estimate. Closing the iterator closes `steps`.
+    The pace, over the last 15 steps, depends on the load of the computer. Closing the iterator closes `steps`.
 
     Args:
         steps: the steps; their counts may start anew once searches may begin.
@@ -30,9 +26,9 @@ def told(steps: Steps, now: Callable[[], float] = time.monotonic) -> Told:
             if is_ready != was_ready:
                 gone, was_ready = [], is_ready
             gone.append((now(), done))
-            words = _REST if is_ready else _FIRST
-            if done - gone[0][1] >= _SOON:
-                time_then, done_then = next((one for one in reversed(gone) if one[1] <= done - _LATELY), gone[0])
+            words = "getting the rest ready" if is_ready else "getting ready, first time only"
+            if done - gone[0][1] >= 10:  # the first functions compile many others
+                time_then, done_then = next((one for one in reversed(gone) if one[1] <= done - 15), gone[0])
                 words += f": {_duration((now() - time_then) * (of - done) / (done - done_then))}"
             yield done, of, words, is_ready
     finally:

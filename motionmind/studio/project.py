@@ -72,7 +72,7 @@ class Project:
         self._states: list[State] = []  # before the first change, and after every `_EVERY` changes
         self.state = State()
         if journal.dropped:
-            self.words.append("the last edit was not written whole when the studio ended, and is gone")
+            self.words.append("the last edit was lost: the studio ended while writing it")
         self._read()
 
     @classmethod
@@ -220,7 +220,7 @@ class Project:
         self.greet(window)
         change = self._last(window)
         if change is None:
-            raise RefusedError("this window has nothing to take back")
+            raise RefusedError("nothing to undo in this window")
         state = self._without_conflict(change, undone=True)
         self._journal.append(UndoLine(change.number, self.sequence, window))
         self._switch(change, True, state)
@@ -231,7 +231,7 @@ class Project:
         """Redo the edit that a window undid last; raise the errors of `undo`."""
         self.greet(window)
         if not (stack := self._redoable.get(window)):
-            raise RefusedError("this window has nothing to do again")
+            raise RefusedError("nothing to redo in this window")
         change = stack[-1]
         state = self._without_conflict(change, undone=False)
         self._journal.append(RedoLine(change.number, self.sequence, window))
@@ -269,10 +269,10 @@ class Project:
         place = self._changes.index(change)
         later = [one for one in self._changes[place + 1 :] if not one.undone]
         places, words = touched(change.edit), words_of(change.edit)
-        verb = "take back" if undone else "do again"
+        verb = "undo" if undone else "redo"
         for one in later:
             if places & touched(one.edit):
-                raise RefusedError(f"cannot {verb} “{words}”: a later edit, “{words_of(one.edit)}”, rests on it")
+                raise RefusedError(f"cannot {verb} “{words}”: a later edit, “{words_of(one.edit)}”, depends on it")
         number = place // _EVERY
         state = self._states[number]
         for one in self._changes[number * _EVERY :]:
@@ -281,7 +281,7 @@ class Project:
             try:
                 state = piece.apply(state, one.edit)
             except MotionMindError as error:
-                why = f"“{words_of(one.edit)}” rests on it" if one is not change else str(error)
+                why = f"“{words_of(one.edit)}” depends on it" if one is not change else str(error)
                 raise RefusedError(f"cannot {verb} “{words}”: {why}") from error
         return state
 
@@ -373,7 +373,7 @@ class Project:
             self.versions[name] = version
         if changed:
             names = enumerated([displayed(name) for name in changed])
-            self.words.append(f"{names} has changed since this piece was made: its seams are judged anew")
+            self.words.append(f"{names} has changed since this piece was made: its seams will be checked again")
             self._journal.append(Corpora({name: self.versions[name] for name in changed}))
 
     def _note_versions(self, state: State) -> None:

@@ -28,19 +28,11 @@ if TYPE_CHECKING:
     from motionmind.body.motion import Motion
     from motionmind.corpus.clip import JointFlip
 
-SUFFIXES = (".bvh", ".glb", ".vrm", ".vrma", ".amc", ".npz", ".json", ".score")  # of files that need no second file
-SECONDS = 60.0  # time limit for a file
-MEMORY = 2 * 2**30  # bytes of address space, of which Python's libraries take a few hundred million
-ORDER, FACTS = "order.json", "facts.json"
-_MOST_FILE = 2**30  # bytes of a file that the child writes, at most
-_MOST_CLIPS = 500
-_MOST_SHOWN = 12  # faults and notes in the facts, at most
-_LINE = 400  # characters
-_ZERO = 1e-3  # radians: a joint with a smaller rotation counts as not rotated
-_LEAP = 4.0  # an added first pose is this many times as far from the second frame as the next frames from each other
-_LEAST_LEAP = np.radians(10.0)
-_NEXT = 10  # frames that are compared
-_ARM_SLOPE = 0.35  # of a level arm, at most: height over length; 1 is upright
+READABLE_SUFFIXES = (".bvh", ".glb", ".vrm", ".vrma", ".amc", ".npz", ".json", ".score")  # without a second file
+TIME_LIMIT_S = 60.0
+ORDER_FILE, FACTS_FILE = "order.json", "facts.json"
+_MAX_CLIPS = 500
+_MAX_NOTES = 12
 
 
 class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -171,7 +163,7 @@ def load_clip(folder: Path, facts: Facts, number: int) -> Motion:
     from motionmind.body.skeleton import Skeleton
 
     if not (0 <= number < len(facts.clips) and facts.body):
-        raise MotionMindError(f"the file has {len(facts.clips)} clips, no clip {number + 1}")
+        raise MotionMindError(f"no clip {number + 1}: the file has {len(facts.clips)}")
     body, clip = facts.body, facts.clips[number]
     shape = len(body.names), 3
     skeleton = Skeleton(
@@ -189,19 +181,19 @@ def load_clip(folder: Path, facts: Facts, number: int) -> Motion:
 def main() -> None:
     """Read the file of the order in this folder, and write the answer."""
     _limit()
-    order = msgspec.json.decode(Path(ORDER).read_bytes(), type=Order)
+    order = msgspec.json.decode(Path(ORDER_FILE).read_bytes(), type=Order)
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             motions = _read(order)
             facts = _understand(order, motions)
-        notes = tuple(dict.fromkeys(_worded(str(one.message), order) for one in caught))[:_MOST_SHOWN]
+        notes = tuple(dict.fromkeys(_worded(str(one.message), order) for one in caught))[:_MAX_NOTES]
         answer = Answer(msgspec.structs.replace(facts, notes=notes))
     except MotionMindError as error:
         answer = Answer(error=_worded(str(error), order))
     except MemoryError:
-        answer = Answer(error=f"{displayed(order.name)}: would take more memory than is given to a file")
-    Path(FACTS).write_bytes(msgspec.json.encode(answer))
+        answer = Answer(error=f"{displayed(order.name)}: needs more memory than allowed")
+    Path(FACTS_FILE).write_bytes(msgspec.json.encode(answer))
 
 
 def _limit() -> None:
@@ -210,21 +202,21 @@ def _limit() -> None:
         return
     import resource
 
-    for what, most in (
-        (resource.RLIMIT_AS, MEMORY),
-        (resource.RLIMIT_CPU, int(SECONDS)),
-        (resource.RLIMIT_FSIZE, _MOST_FILE),
+    for kind, limit in (
+        (resource.RLIMIT_AS, 2 * 2**30),  # Python's libraries take a few hundred MB of it
+        (resource.RLIMIT_CPU, int(TIME_LIMIT_S)),
+        (resource.RLIMIT_FSIZE, 2**30),
         (resource.RLIMIT_CORE, 0),
     ):
-        _, hard = resource.getrlimit(what)
-        resource.setrlimit(what, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+        _, hard = resource.getrlimit(kind)
+        resource.setrlimit(kind, (limit if hard == resource.RLIM_INFINITY else min(limit, hard), hard))
 
 
 def _worded(message: str, order: Order) -> str:
     """Return a message in one line, with the file's original name."""
     for file, name in ((order.file, order.name), (order.asf or "", "the .asf")):
         message = message.replace(file, name) if file else message
-    return displayed(message.replace(f"{Path.cwd()}{os.sep}", ""), _LINE)
+    return displayed(message.replace(f"{Path.cwd()}{os.sep}", ""), 400)
 
 
 def _read(order: Order) -> list[Motion]:
@@ -243,9 +235,9 @@ def _read(order: Order) -> list[Motion]:
             message = re.sub("|".join(map(re.escape, taken)), lambda match: taken[match[0]], str(error))
             raise MotionMindError(message) from error
         if not found:
-            raise FormatError("holds no clip, which is what moves: write one that goes through its postures", path=path)
-        if len(found) > _MOST_CLIPS:
-            raise FormatError(f"holds {len(found)} clips; {_MOST_CLIPS} are the most", path=path)
+            raise FormatError("has no clip: write one that passes through its postures", path=path)
+        if len(found) > _MAX_CLIPS:
+            raise FormatError(f"has {len(found)} clips: at most {_MAX_CLIPS} are allowed", path=path)
         return [replace(one, name=displayed(one.name)) for one in found]
     return [replace(read_motion(path, unit=order.unit, asf=order.asf, fps=order.fps), name=stem)]
 
@@ -289,7 +281,7 @@ def _understand(order: Order, motions: list[Motion]) -> Facts:
         unit=unit,
         is_guessed=is_guessed,
         doubt=next(filter(None, map(question_tempo, own)), ""),
-        faults=tuple(sorted(faults, key=lambda fault: -fault.times)[:_MOST_SHOWN]),
+        faults=tuple(sorted(faults, key=lambda fault: -fault.times)[:_MAX_NOTES]),
     )
 
 
@@ -315,27 +307,31 @@ def _unit(order: Order) -> tuple[str, bool]:
 def is_posed_first(motion: Motion) -> bool:
     """Return whether the first frame of a recording seems to be a pose that a program added, such as a T-pose.
 
-    The body leaps away from such a frame, and either no joint is rotated in it or both arms are stretched out level.
+    The body turns at least four times as far from such a pose as between any two of the next frames. The pose either
+    rotates no joint or stretches out both arms level.
     """
     from motionmind.geometry import rotations as rot
 
-    if len(motion) < _NEXT or motion.keyframed:
+    if len(motion) < 10 or motion.keyframed:
         return False
-    turned = rot.angle(motion.rotations[: _NEXT - 1], motion.rotations[1:_NEXT]).max(axis=1)
-    if turned[0] < _LEAST_LEAP or turned[0] < _LEAP * turned[1:].max():
+    turned = rot.angle(motion.rotations[:9], motion.rotations[1:10]).max(axis=1)
+    if turned[0] < np.radians(10.0) or turned[0] < 4.0 * turned[1:].max():
         return False
-    unturned = float(rot.angle(motion.rotations[0, 1:], np.array([0.0, 0.0, 0.0, 1.0])).max()) < _ZERO
-    return unturned or _has_level_arms(motion)
+    unrotated = float(rot.angle(motion.rotations[0, 1:], np.array([0.0, 0.0, 0.0, 1.0])).max()) < 1e-3
+    return unrotated or _has_level_arms(motion)
 
 
 def _has_level_arms(motion: Motion) -> bool:
-    """Return whether both arms are level in the first frame; False for a body without human arms."""
+    """Return whether both arms rise or fall by less than 0.35 of their length in the first frame.
+
+    False for a body without human arms.
+    """
     names = motion.skeleton.names
     if not {"left_shoulder", "left_wrist", "right_shoulder", "right_wrist"} <= set(names):
         return False
     place = motion.skeleton.positions(motion.rotations[:1], motion.root[:1])[0]
     arms = [place[names.index(f"{side}_wrist")] - place[names.index(f"{side}_shoulder")] for side in ("left", "right")]
-    return all(abs(arm[1]) < _ARM_SLOPE * np.linalg.norm(arm) for arm in arms)
+    return all(abs(arm[1]) < 0.35 * np.linalg.norm(arm) for arm in arms)
 
 
 if __name__ == "__main__":

@@ -52,7 +52,7 @@ class RedoLine(msgspec.Struct, frozen=True):
     window: str
 
 
-_KINDS: Mapping[str, Any] = {
+_LINE_TYPES: Mapping[str, Any] = {
     "format": Head,
     "corpora": Corpora,
     "finding": Finding,
@@ -67,7 +67,7 @@ def decode_line(data: bytes) -> Any:
     fields = msgspec.json.decode(data, type=dict[str, msgspec.Raw])
     if "movement" in fields:
         return None
-    for name, kind in _KINDS.items():
+    for name, kind in _LINE_TYPES.items():
         if name in fields:
             return msgspec.json.decode(data, type=kind)
     raise ValueError(f"a line of unknown kind, with {enumerated(sorted(fields))}")

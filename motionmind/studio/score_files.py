@@ -8,7 +8,7 @@ from unicodedata import normalize
 
 from motionmind.errors import FormatError
 
-_MOST = 100  # scores, at most, with all that they include
+_MAX_SCORES = 100  # with all that they include
 
 
 def take_together(file: str, name: str, others: Mapping[str, str]) -> dict[str, str]:
@@ -39,15 +39,15 @@ def take_together(file: str, name: str, others: Mapping[str, str]) -> dict[str, 
                 # The path is on the user's computer: uploads have only a name.
                 included = PurePosixPath(wanted.strip().replace("\\", "/")).name
                 if included not in files:
-                    raise FormatError(f"takes in {included:.60}: bring that score, too", path=Path(own), line=number)
+                    raise FormatError(f"includes {included:.60}: upload that score too", path=Path(own), line=number)
                 if included not in here:
-                    if len(here) == _MOST:
-                        raise FormatError(f"takes in more than {_MOST} scores", path=Path(own), line=number)
+                    if len(here) == _MAX_SCORES:
+                        raise FormatError(f"includes more than {_MAX_SCORES} scores", path=Path(own), line=number)
                     here[included] = f"score-{len(here)}.score"
                     waiting.append(included)
                 kept = f"include {here[included]}{mark}{alias}"
             elif word == "body" and rest and rest[0].strip().endswith(".toml"):
-                raise FormatError("takes in a body: bring a score of a body that is known", path=Path(own), line=number)
+                raise FormatError("uses a body file: upload a score for a built-in body", path=Path(own), line=number)
             text.append(kept)
         Path(here[own]).write_text("\n".join([*text, ""]), encoding="utf-8")
     return {place: own for own, place in here.items()}

@@ -12,8 +12,6 @@ from motionmind.body.motion import Posture
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 
-_ZERO = 0.5  # degrees: angles that round to 0 are not written
-
 
 def score_lines(posture: Posture, name: str) -> str:
     """Return a posture as lines for a score on the same body.
@@ -29,7 +27,7 @@ def score_lines(posture: Posture, name: str) -> str:
     """
     anatomy = anatomy_of(posture.skeleton)
     if anatomy is None:
-        raise MotionMindError(f"scores are written on human23 and human44, not on {posture.skeleton.name}")
+        raise MotionMindError(f"scores need the body human23 or human44, not {posture.skeleton.name}")
     word = re.sub(r"[^A-Za-z0-9_]+", "-", name).strip("-") or "mine"
     rotations = posture.rotations.copy()
     rotations[0] = rot.mul(rot.about_vertical(-rot.heading(rotations[0])), rotations[0])
@@ -40,7 +38,7 @@ def score_lines(posture: Posture, name: str) -> str:
         for joint in joints:
             row = degrees[anatomy.named(joint, side)]
             values = ((called, angle.sign * row[angle.axis]) for called, angle in anatomy.joints[joint].angles.items())
-            if given := " ".join(f"{called} {value:g}" for called, value in values if abs(value) > _ZERO):
+            if given := " ".join(f"{called} {value:g}" for called, value in values if abs(value) > 0.5):
                 out.append(f"{joint} {given}")
         return ", ".join(out) or "neutral"
 

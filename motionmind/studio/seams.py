@@ -21,7 +21,7 @@ from motionmind.body.motion import Motion
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError, enumerated
 from motionmind.studio import api
-from motionmind.studio.alternatives import Account, account, find, usual_likelihoods
+from motionmind.studio.alternatives import MAX_ALTERNATIVES, Account, account, find, usual_likelihoods
 from motionmind.studio.edits import Ask, Pin
 from motionmind.studio.piece import Finding, Found, Seam
 from motionmind.studio.sides import Sides, options_of, sides_of
@@ -34,10 +34,7 @@ if TYPE_CHECKING:
     from motionmind.studio.studio import Studio
     from motionmind.studio.workers import Job, Report
 
-MOST_ALTERNATIVES = 4
-_SETTLE = 0.15  # seconds without another edit before the seams are judged
-_NO_WAY = "no way found that does all that is wished: let go of a posture, a hand or a foot"
-_NAMED = 3  # joints that a message names, at most
+_MAX_JOINTS_NAMED = 3
 
 
 class Question(NamedTuple):
@@ -68,7 +65,7 @@ def judge(report: Report, corpus: str, questions: Sequence[Question]) -> list[Fi
         corpus: name of the corpus.
         questions: the questions.
     """
-    report(0, len(questions), "looking at the seams")
+    report(0, len(questions), "checking the seams")
     test = TransitionTest(engine_of(corpus))
     findings = []
     for question in questions:
@@ -76,11 +73,11 @@ def judge(report: Report, corpus: str, questions: Sequence[Question]) -> list[Fi
         try:
             joints = test.abrupt_joints(a, b, seconds)
         except SkeletonError:
-            words = f"{displayed(corpus)} has another body than the piece: nothing of it can be inserted"
+            words = f"{displayed(corpus)} and the piece have different bodies: nothing can be inserted"
             findings.append(Finding(question.name, True, words, ()))
             continue
         except MotionMindError as error:
-            findings.append(Finding(question.name, True, f"cannot be judged: {_line(error)}", ()))
+            findings.append(Finding(question.name, True, f"cannot be checked: {_line(error)}", ()))
             continue
         searched = None if joints or question.wished else ()
         findings.append(Finding(question.name, bool(joints), why_abrupt(joints, corpus), searched))
@@ -103,32 +100,35 @@ def smooth(report: Report, corpus: str, question: Question) -> tuple[list[tuple[
     own = usual_likelihoods(engine)
     distinct: dict[bytes, tuple[Motion, str]] = {}
     first: Motion | None = None
-    report(0, MOST_ALTERNATIVES, "smoothing a seam")
+    report(0, MAX_ALTERNATIVES, "smoothing a seam")
     warnings.simplefilter("ignore", MotionMindWarning)  # the description says what goes beyond the corpus
     try:
-        tweens = find(engine, a, b, MOST_ALTERNATIVES, before=before, after=after, **question.options)
+        tweens = find(engine, a, b, MAX_ALTERNATIVES, before=before, after=after, **question.options)
         for number, tween in enumerate(tweens, start=1):
             if tween.path.tobytes() not in distinct:
                 motion, missed = in_place(tween.motion, question.stays)
                 distinct[tween.path.tobytes()] = motion, _words(account(tween, engine.corpus, own, first), missed)
                 first = first or tween.motion
-            report(number, MOST_ALTERNATIVES, "smoothing a seam")
+            report(number, MAX_ALTERNATIVES, "smoothing a seam")
     except MotionMindError as error:  # after the first: no other differs enough
         if not distinct:
             wished = question.options.keys() - {"duration"}
-            return [], _NO_WAY if wished else f"no way found: {_line(error)}"
+            impossible = "no movement meets all wishes: drop a posture, a hand or a foot"
+            return [], impossible if wished else f"no movement found: {_line(error)}"
     return list(distinct.values()), ""
 
 
 def why_abrupt(joints: tuple[AbruptJoint, ...], corpus: str) -> str:
     """Describe, for a choreographer, what makes a transition abrupt."""
     if not joints:
-        return f"known in {displayed(corpus)}"
+        return f"seen in {displayed(corpus)}"
     worst = sorted(joints, key=lambda one: -one.degrees)
     fast = [one.joint.replace("_", " ") for one in worst if one.fast]
     unseen = [one.joint.replace("_", " ") for one in worst if not one.fast]
-    said = [f"too sudden: {enumerated(fast, _NAMED)}"] if fast else []
-    return "; ".join(said + ([f"not seen in {displayed(corpus)}: {enumerated(unseen, _NAMED)}"] if unseen else []))
+    said = [f"too fast: {enumerated(fast, _MAX_JOINTS_NAMED)}"] if fast else []
+    return "; ".join(
+        said + ([f"not seen in {displayed(corpus)}: {enumerated(unseen, _MAX_JOINTS_NAMED)}"] if unseen else [])
+    )
 
 
 def _words(found: Account, missed: Sequence[str]) -> str:
@@ -180,7 +180,7 @@ class Smoother:
             await self._changed.wait()
             while self._changed.is_set():
                 self._changed.clear()
-                await asyncio.sleep(_SETTLE)
+                await asyncio.sleep(0.15)  # until no edit follows
             with suppress(JobCancelledError):
                 while not self._studio.has_stopped and await self._step():
                     pass

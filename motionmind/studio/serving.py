@@ -11,10 +11,6 @@ from motionmind.studio.app import app
 from motionmind.studio.studio import Studio
 from motionmind.studio.token import Keys
 
-_AT_ONCE = 100  # connections, at most
-_IDLE = 30  # seconds that an idle connection stays open
-_LAST = 2  # seconds for answers in progress when the server stops
-
 
 class Server(uvicorn.Server):
     """A server that closes the event streams when it stops, because they never end by themselves."""
@@ -36,9 +32,9 @@ class Server(uvicorn.Server):
             access_log=False,
             ws="none",
             server_header=False,
-            limit_concurrency=_AT_ONCE,
-            timeout_keep_alive=_IDLE,
-            timeout_graceful_shutdown=_LAST,
+            limit_concurrency=100,  # connections
+            timeout_keep_alive=30,  # seconds
+            timeout_graceful_shutdown=2,  # seconds for answers in progress
         )
         super().__init__(config)
         self._studio, self._ready = studio, ready

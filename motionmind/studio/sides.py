@@ -21,8 +21,7 @@ from motionmind.studio.piece import End
 from motionmind.studio.placement import Marks, Movements, check_body
 from motionmind.variation.piece import Piece
 
-_LEAD = 1.0  # seconds of movement on each side of a seam; `Piece.around` takes what it needs of them
-_OPTIONS = {"start": "A", "end": "B"}
+_CONTEXT_S = 1.0  # on each side of a seam; `Piece.around` takes what it needs
 
 
 class Sides(NamedTuple):
@@ -59,9 +58,9 @@ def sides_of(ends: tuple[End, End], movement: Movements, facing: Facing) -> Side
     check_body(ends[0].key, one, ends[1].key, other)
     begin, stop = ends[0].frame, ends[1].frame + 1
     if ends[0].moves:
-        begin = min(int(np.searchsorted(one.times, one.times[begin] - _LEAD)), max(begin - 1, 0))
+        begin = min(int(np.searchsorted(one.times, one.times[begin] - _CONTEXT_S)), max(begin - 1, 0))
     if ends[1].moves:
-        stop = max(int(np.searchsorted(other.times, other.times[stop - 1] + _LEAD)), min(stop + 1, len(other)))
+        stop = max(int(np.searchsorted(other.times, other.times[stop - 1] + _CONTEXT_S)), min(stop + 1, len(other)))
     before, after = one.slice(begin, ends[0].frame + 1), other.slice(ends[1].frame, stop)
     seconds = Marks(movement).step(ends[0].key, ends[0].frame)
     clock = float(before.times[-1]) + seconds - float(after.times[0])
@@ -102,7 +101,7 @@ def options_of(ask: Ask, skeleton: Skeleton, movement: Movements) -> dict[str, A
         if one.hold == "throughout":
             hold += [joint for joint in limb if joint not in hold]
         else:
-            pin |= dict.fromkeys(limb, _OPTIONS[one.hold])
+            pin |= dict.fromkeys(limb, "A" if one.hold == "start" else "B")
     if pin:
         options["pin"] = pin
     if hold:

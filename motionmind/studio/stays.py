@@ -19,9 +19,7 @@ from motionmind.display import displayed
 from motionmind.geometry import rotations as rot
 from motionmind.studio.edits import Ask, Pin
 
-_EASES = 0.3  # seconds, at least, in which a limb reaches or leaves its place
-_HASTE = 0.6  # body heights a second that this adds to its speed, at most, if time allows
-_MISSED = 0.01  # metres: a greater miss is reported
+_MIN_EASE_S = 0.3  # in which a limb reaches or leaves its place
 
 
 def stays_of(ask: Ask, skeleton: Skeleton) -> list[Pin]:
@@ -50,12 +48,12 @@ def in_place(motion: Motion, pins: Sequence[Pin]) -> tuple[Motion, list[str]]:
         first, last = np.searchsorted(shares, [pin.begins, pin.ends])
         anchor = last if pin.ends == 1.0 and pin.begins > 0.0 else first
         missed = _hold(motion, rotations, joint, _weights(motion, pin, places - places[anchor]), int(anchor))
-        if missed > _MISSED:
-            words.append(f"{_limb(pin.joint)} is up to {100 * missed:.0f} cm off its place")
+        if missed > 0.01:  # metres
+            words.append(f"{_hand_or_foot(pin.joint)} drifts up to {100 * missed:.0f} cm from its place")
     return replace(motion, rotations=rotations), words
 
 
-def _limb(joint: str) -> str:
+def _hand_or_foot(joint: str) -> str:
     """Return a hand or a foot in words, by its joint."""
     return displayed(joint).replace("wrist", "hand").replace("ankle", "foot").replace("_", " ")
 
@@ -73,15 +71,16 @@ def _weights(motion: Motion, pin: Pin, away: Floats) -> Floats:
     seconds = motion.times - motion.times[0]
     long = float(seconds[-1])
     first, last = pin.begins * long, pin.ends * long
-    # The greatest slope of the ease is 1.5 times its mean.
-    ways = np.linalg.norm([away[np.searchsorted(seconds, at - 1e-9)] for at in (first, last)], axis=1)
-    eases = np.maximum(1.5 * ways / (_HASTE * motion.skeleton.height), _EASES)
+    # The ease adds at most 0.6 body heights a second to the limb's speed if time allows. Its peak slope is 1.5 times
+    # its mean.
+    distances = np.linalg.norm([away[np.searchsorted(seconds, at - 1e-9)] for at in (first, last)], axis=1)
+    eases = np.maximum(1.5 * distances / (0.6 * motion.skeleton.height), _MIN_EASE_S)
     ramps = np.ones((2, len(seconds)))
     if pin.begins > 0.0:
-        first = max(first, min(_EASES, 0.25 * long))
+        first = max(first, min(_MIN_EASE_S, 0.25 * long))
         ramps[0] = 1.0 - (first - seconds) / min(float(eases[0]), first)
     if pin.ends < 1.0 or pin.begins == 0.0:
-        room = float(eases[1]) if pin.ends == 1.0 else _EASES  # seconds to leave the place
+        room = float(eases[1]) if pin.ends == 1.0 else _MIN_EASE_S  # seconds to leave the place
         last = min(last, max(long - room, 0.5 * (first + last)))
         ramps[1] = 1.0 - (seconds - last) / min(float(eases[1]), long - last)
     ramp = np.clip(ramps.min(axis=0), 0.0, 1.0)

@@ -16,15 +16,13 @@ from motionmind.studio.events import Events
 from motionmind.studio.movements import Movements
 from motionmind.studio.preparation import Steps, told
 from motionmind.studio.project import Project
-from motionmind.studio.thumbnails import HEIGHT, Thumbnails, thumbnail
+from motionmind.studio.thumbnails import THUMBNAIL_HEIGHT_PX, Thumbnails, thumbnail
 from motionmind.studio.view import view_of
+from motionmind.studio.worker_loop import MAX_ENGINES
 from motionmind.studio.workers import Job, Workers
 
 if TYPE_CHECKING:
     from motionmind.tween.engine import Engine
-
-_ENGINES = 2  # engines that the server keeps loaded
-_FIRST = 2.0  # seconds before workers start, so that they do not slow down the loading of the page
 
 
 class Studio:
@@ -73,7 +71,7 @@ class Studio:
         corpus = self.project.state.corpus
         self.workers = Workers(self.home, self._tell_of_job, corpus, self._processes)
         threading.Thread(target=self._draw_first, daemon=True).start()
-        asyncio.get_running_loop().call_later(_FIRST, self.workers.begin)
+        asyncio.get_running_loop().call_later(2.0, self.workers.begin)  # until the page has loaded
         if self._first is not None:
             self._preparing = asyncio.create_task(self.workers.prepare("getting ready", told(self._first)))
 
@@ -84,7 +82,9 @@ class Studio:
             name = next(iter([*collection.postures, *collection.clips]))
             motion = collection.find(name, as_clip=False)
             player_data(motion)
-            self.thumbnails.hold(f"{collection.word}/{name}", 0, HEIGHT, thumbnail(motion, 0, HEIGHT))
+            self.thumbnails.hold(
+                f"{collection.word}/{name}", 0, THUMBNAIL_HEIGHT_PX, thumbnail(motion, 0, THUMBNAIL_HEIGHT_PX)
+            )
 
     def close(self) -> None:
         """End the workers and release the project."""
@@ -103,7 +103,7 @@ class Studio:
 
         if name not in self._engines:
             self._engines[name] = Engine.load(name, self.home)
-            while len(self._engines) > _ENGINES:
+            while len(self._engines) > MAX_ENGINES:
                 self._engines.popitem(last=False)
         self._engines.move_to_end(name)
         return self._engines[name]

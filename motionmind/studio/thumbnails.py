@@ -19,11 +19,7 @@ from motionmind.render.figure import colour, draw, given_colours, halved, insert
 from motionmind.render.solids import bounding_box, posture_solids
 from motionmind.render.view import VIEWS, to_view
 
-SMALLEST, LARGEST = 32, 480  # pixels of a picture's height
-HEIGHT = 96  # pixels of a picture in the gallery, as in movements.js
-_WIDE = 0.9  # width over height
-_ROOM = 1.32  # body heights that a picture shows: leaves room for raised arms
-_HELD = 16 * 2**20  # bytes of pictures in the cache
+THUMBNAIL_HEIGHT_PX = 96  # in the gallery, as in places.js
 
 
 class Thumbnails:
@@ -44,7 +40,7 @@ class Thumbnails:
         if (key, frame, height) not in self._held:
             self._held[key, frame, height] = picture
             self._size += len(picture)
-        while self._size > _HELD:
+        while self._size > 16 * 2**20:
             self._size -= len(self._held.popitem(last=False)[1])
 
 
@@ -60,15 +56,18 @@ def thumbnail(motion: Motion, frame: int, height: int) -> bytes:
         MotionMindError: there is no such frame, or the height is out of range.
     """
     motion.posture(frame)
-    if not SMALLEST <= height <= LARGEST:
-        raise MotionMindError(f"a small picture is from {SMALLEST} to {LARGEST} pixels high, not {height}")
+    if not 32 <= height <= 480:
+        raise MotionMindError(f"a thumbnail must be 32 to 480 pixels high, not {height}")
     body, view = shape_of(motion.skeleton), VIEWS["quarter"]
     root = motion.root[frame]
     cones, balls = posture_solids(*body.solids(motion.rotations[frame][None], root[None]), 0)
     cones, balls = to_view(cones, balls, view, root * [1.0, 0.0, 1.0])
-    (left, bottom), (right, top) = bounding_box(cones, balls)[:, :2]
-    tall = max(_ROOM * body.height, 1.08 * (top - bottom), 1.08 * (right - left) / _WIDE)
-    wide = ceil(_WIDE * height)
+    low, high = np.concatenate([cones.reach(), balls.reach()], axis=-2)
+    (left, bottom), (right, top) = low.min(axis=0)[:2], high.max(axis=0)[:2]
+    aspect_ratio = 0.9
+    # 1.32 body heights leave room for raised arms.
+    tall = max(1.32 * body.height, 1.08 * (top - bottom), 1.08 * (right - left) / aspect_ratio)
+    wide = ceil(aspect_ratio * height)
     scale = height / tall
     # A standing body stands at the bottom of the picture; a leaping body is above it.
     floor = min(bottom, max(0.0, top - 0.96 * tall)) - 0.04 * tall

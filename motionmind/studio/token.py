@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import secrets
 
-_BYTES = 32
-
 
 class Keys:
     """The secrets of one process.
@@ -20,8 +18,8 @@ class Keys:
     """
 
     def __init__(self) -> None:
-        self.token = secrets.token_urlsafe(_BYTES)
-        self._cookie = secrets.token_urlsafe(_BYTES)
+        self.token = secrets.token_urlsafe(32)
+        self._cookie = secrets.token_urlsafe(32)
 
     def __repr__(self) -> str:
         return "<Keys>"  # keeps the secrets out of logs

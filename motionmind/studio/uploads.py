@@ -23,18 +23,24 @@ from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.files import make_room
 from motionmind.formats.units import UNITS
-from motionmind.studio.reading import FACTS, ORDER, SECONDS, SUFFIXES, Answer, Facts, Order, load_clip
+from motionmind.studio.reading import (
+    FACTS_FILE,
+    ORDER_FILE,
+    READABLE_SUFFIXES,
+    TIME_LIMIT_S,
+    Answer,
+    Facts,
+    Order,
+    load_clip,
+)
 
-MOST_BYTES = 64 * 2**20  # of a file, at most
-_MOST_ALL = 2**30  # bytes of all files, at most
-_MOST_FILES = 300
-_AT_ONCE = 2  # files that are read at the same time
-_GRACE = 5.0  # seconds, in addition, to start a child
-_SKELETON = ".asf"  # read only together with an AMC
-_REFUSED = {
-    ".fbx": "FBX is not read: open it in Blender (File, Import, FBX) and export glTF (.glb), or BVH",
-    ".c3d": "C3D holds markers on the skin, not joints: solve a skeleton from them, and export that as BVH",
-    ".gltf": "a .gltf takes in other files: export it as one .glb",
+MAX_UPLOAD_BYTES = 64 * 2**20  # of a file
+_MAX_FILES = 300
+_START_S = 5.0  # to start a child process
+_REFUSALS = {  # as in imports.js
+    ".fbx": "FBX is not supported: import it into Blender (File, Import, FBX) and export glTF (.glb) or BVH",
+    ".c3d": "C3D contains skin markers, not joints: solve a skeleton and export it as BVH",
+    ".gltf": "a .gltf refers to other files: export a single .glb",
 }
 
 
@@ -89,7 +95,7 @@ class Uploads:
         self._folder = make_room("studio")
         self._goes = finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
         self._uploads: dict[str, Upload] = {}
-        self._reading = asyncio.Semaphore(_AT_ONCE)
+        self._reading = asyncio.Semaphore(2)
 
     def list(self) -> tuple[Upload, ...]:
         """Return all uploads, the earliest first."""
@@ -98,7 +104,7 @@ class Uploads:
     def get(self, upload: str) -> Upload:
         """Return an upload; raise MotionMindError if there is none with this id."""
         if upload not in self._uploads:
-            raise MotionMindError("this file is no longer here: bring it again")
+            raise MotionMindError("this file is gone: upload it again")
         return self._uploads[upload]
 
     async def take(self, name: str, chunks: AsyncIterator[bytes]) -> Upload:
@@ -112,11 +118,11 @@ class Uploads:
             MotionMindError: its format is unknown, it is too large, or there are too many uploads.
         """
         shown, suffix = displayed(name), Path(name).suffix.lower()
-        if suffix not in (*SUFFIXES, _SKELETON):
-            reason = _REFUSED.get(suffix, f"files that can be read end in {', '.join((*SUFFIXES, _SKELETON))}")
+        if suffix not in (accepted := (*READABLE_SUFFIXES, ".asf")):
+            reason = _REFUSALS.get(suffix, f"supported formats are {', '.join(accepted)}")
             raise MotionMindError(f"{shown}: {reason}")
-        if len(self._uploads) >= _MOST_FILES:
-            raise MotionMindError(f"{shown}: {_MOST_FILES} files are here already; take some away first")
+        if len(self._uploads) >= _MAX_FILES:
+            raise MotionMindError(f"{shown}: there are already {_MAX_FILES} files; remove some first")
         upload = secrets.token_hex(8)
         folder = self._place(upload)
         folder.mkdir()
@@ -126,21 +132,21 @@ class Uploads:
             shutil.rmtree(folder, ignore_errors=True)
             raise
         self._uploads[upload] = Upload(upload, shown, size, suffix[1:])
-        if suffix == _SKELETON:
+        if suffix == ".asf":
             return self._uploads[upload]
         asf = next((one.id for one in reversed(self.list()) if one.kind == "asf"), None)
         return await self.read(upload, Choices(asf=asf if suffix == ".amc" else None))
 
     async def _write(self, path: Path, shown: str, chunks: AsyncIterator[bytes]) -> int:
-        room = _MOST_ALL - sum(one.size for one in self._uploads.values())
+        room = 2**30 - sum(one.size for one in self._uploads.values())
         size = 0
         with path.open("xb") as file:
             async for chunk in chunks:
                 size += len(chunk)
-                if size > MOST_BYTES:
-                    raise MotionMindError(f"{shown}: is larger than {MOST_BYTES >> 20} MB; bring a part of it")
+                if size > MAX_UPLOAD_BYTES:
+                    raise MotionMindError(f"{shown}: larger than {MAX_UPLOAD_BYTES >> 20} MB; upload a part of it")
                 if size > room:
-                    raise MotionMindError(f"{shown}: there is no room for it; take some files away first")
+                    raise MotionMindError(f"{shown}: no room left; remove some files first")
                 file.write(chunk)
         return size
 
@@ -152,17 +158,17 @@ class Uploads:
         """
         own = self.get(upload)
         if choices.unit is not None and choices.unit not in UNITS:
-            raise MotionMindError(f"no unit {displayed(choices.unit)}: there are {', '.join(UNITS)}")
+            raise MotionMindError(f"unknown unit {displayed(choices.unit)}: choose from {', '.join(UNITS)}")
         folder = self._place(upload)
         asf = None
         if choices.asf is not None:
             skeleton = self.get(choices.asf)
             if skeleton.kind != "asf":
-                raise MotionMindError(f"{skeleton.name} is no skeleton of an AMC: those end in .asf")
+                raise MotionMindError(f"{skeleton.name} is not an .asf skeleton")
             asf = "upload.asf"
             shutil.copyfile(self._place(skeleton.id) / asf, folder / asf)
         if own.kind == "amc" and asf is None:
-            answer = Answer(error=f"{own.name}: bring the .asf that belongs to it, too: an .amc holds no body")
+            answer = Answer(error=f"{own.name}: upload its .asf too: an .amc has no skeleton")
         else:
             scores = {one.name: str(self._place(one.id) / "upload.score") for one in self.list() if one.kind == "score"}
             others = scores if own.kind == "score" else {}
@@ -184,11 +190,11 @@ class Uploads:
         """
         own = self.get(upload)
         if own.facts is None:
-            raise MotionMindError(own.error or f"{own.name} holds no movement")
+            raise MotionMindError(own.error or f"{own.name} has no movement")
         motion = load_clip(self._place(upload), own.facts, clip)
         skip = own.skip(clip)
         if skip >= len(motion):
-            raise MotionMindError(f"{motion.name} has {len(motion)} frames; leaving out {skip} leaves none")
+            raise MotionMindError(f"{motion.name} has {len(motion)} frames; skipping {skip} leaves none")
         return motion.slice(skip, len(motion)) if skip else motion
 
     def folder(self, upload: str) -> Path:
@@ -213,8 +219,8 @@ class Uploads:
 async def _read(folder: Path, order: Order) -> Answer:
     """Let a child process read a file, within the time limit."""
     shown = displayed(order.name)
-    (folder / FACTS).unlink(missing_ok=True)
-    (folder / ORDER).write_bytes(msgspec.json.encode(order))
+    (folder / FACTS_FILE).unlink(missing_ok=True)
+    (folder / ORDER_FILE).write_bytes(msgspec.json.encode(order))
     threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     child = await asyncio.create_subprocess_exec(
         *(sys.executable, "-P", "-m", "motionmind.studio.reading"),
@@ -225,14 +231,14 @@ async def _read(folder: Path, order: Order) -> Answer:
         stderr=asyncio.subprocess.DEVNULL,
     )
     try:
-        await asyncio.wait_for(child.wait(), SECONDS + _GRACE)
+        await asyncio.wait_for(child.wait(), TIME_LIMIT_S + _START_S)
     except TimeoutError:
-        return Answer(error=f"{shown}: took longer to read than {SECONDS:g} s")
+        return Answer(error=f"{shown}: took longer to read than {TIME_LIMIT_S:g} s")
     finally:
         with suppress(ProcessLookupError):
             child.kill()
         await child.wait()
     try:
-        return msgspec.json.decode((folder / FACTS).read_bytes(), type=Answer)
+        return msgspec.json.decode((folder / FACTS_FILE).read_bytes(), type=Answer)
     except (OSError, msgspec.MsgspecError):
-        return Answer(error=f"{shown}: cannot be read: it takes more time or memory than a file is given")
+        return Answer(error=f"{shown}: cannot be read within the limits of time and memory")

@@ -25,7 +25,7 @@ from motionmind.studio.edits import Arrange, Block
 from motionmind.studio.piece import State, arranged
 from motionmind.studio.project import RefusedError
 from motionmind.studio.varying import (
-    EVERY,
+    STEPS_PER_PLACE,
     Clock,
     Clocks,
     Estimates,
@@ -42,9 +42,7 @@ from motionmind.studio.view import view_of
 if TYPE_CHECKING:
     from motionmind.studio.studio import Studio
 
-_WORDS = "vary the piece"
-_ANOTHER = 412  # status "precondition failed"
-_MOST_ESTIMATED = 800  # units, at most, to estimate insertions between every two of them; takes 1.5 s
+_MAX_ESTIMATED_UNITS = 800  # estimates between all pairs of them take 1.5 s
 
 
 class Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -86,7 +84,7 @@ def routes(studio: Studio) -> list[BaseRoute]:
         """Make a proposed order the piece, unless the piece has changed since."""
         given = await api.body_of(request, Ordering)
         if given.basis != basis_of(studio.project.state):
-            return api.error("the piece has become another meanwhile: look at its variation again", _ANOTHER)
+            return api.error("the piece has changed: look at its variation again", 412)
         try:
             studio.project.edit(given.window, given.edit)
         except RefusedError as refusal:
@@ -109,7 +107,7 @@ async def propose(studio: Studio, wish: Wish) -> dict[str, Any]:
     project = studio.project
     state = project.state
     if missing := project.missing:
-        raise MotionMindError(f"the piece cannot be varied: {missing[0]}")
+        raise MotionMindError(f"cannot vary the piece: {missing[0]}")
     base = base_of(state)
     locked = locked_in(state)
     asked = [one for one in wish.kept if one.block.id not in locked]
@@ -118,7 +116,7 @@ async def propose(studio: Studio, wish: Wish) -> dict[str, Any]:
     clocks = {source: clock_of(project.movements.get(source), recorded) for source in known}
     for one in asked:
         if one.block.first > one.block.last or one.block.last >= len(clocks[one.block.source].times):
-            raise MotionMindError("a stretch that is kept is not there any more: choose again")
+            raise MotionMindError("a kept stretch no longer exists: choose again")
     staying = (locked | set(wish.stay)) - {one.block.id for one in asked}
     total, standing = standing_in(state, clocks.__getitem__)
     kept = (*asked, *(one for one in standing if one.block.id in staying))
@@ -142,9 +140,9 @@ def _estimates(studio: Studio, units: Sequence[Unit], clocks: Clocks) -> Estimat
     from motionmind.variation.piece import Piece
     from motionmind.variation.seams import TransitionTest
 
-    if len(units) > _MOST_ESTIMATED:
+    if len(units) > _MAX_ESTIMATED_UNITS:
         raise MotionMindError(
-            f"insertions are limited in pieces of up to {_MOST_ESTIMATED} postures, not of {len(units):,}: vary a part"
+            f"insertions can be limited in up to {_MAX_ESTIMATED_UNITS} postures, not {len(units):,}: vary a part"
         )
     test = TransitionTest(studio.engine(studio.project.state.corpus))
     keys = ["~" * unit.mirrored + unit.source for unit in units]
@@ -178,7 +176,7 @@ def _shown(
 
     steps = np.diff(order.indices)
     about = {
-        "words": _WORDS,
+        "words": "vary the piece",
         "variation": {
             "flow": wish.flow,
             "nudge": order.nudge,
@@ -198,7 +196,7 @@ def _shown(
         "locked": sorted(locked),
         "departs": order.departs,
         "nudge": order.nudge,
-        "every": EVERY if len(drawn(order.other)) == len(order.other) else 1,
+        "every": STEPS_PER_PLACE if len(drawn(order.other)) == len(order.other) else 1,
         "trail": encoded(drawn(order.piece)),
         "other": encoded(drawn(order.other)),
         "jumps": (np.flatnonzero((steps != 0) & (steps != 1)) + 1).tolist(),

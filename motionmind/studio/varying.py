@@ -28,9 +28,8 @@ from motionmind.variation.limits import Limits, check_departure, check_limits, k
 from motionmind.variation.stretches import cheapest_order
 from motionmind.variation.variation import SKIP
 
-MOST = 4_000  # units of a piece: with a minimum stretch above 1, memory grows with their square
-EVERY = SKIP + 1  # trajectory steps from one place to the next
-_COARSELY = 5  # every fifth nudge is tried if stretches have a minimum length
+MAX_UNITS = 4_000  # of a piece: with a minimum stretch above 1, memory grows with their square
+STEPS_PER_PLACE = SKIP + 1  # of a trajectory
 
 
 class Clock(NamedTuple):
@@ -218,18 +217,14 @@ def vary_blocks(
     for one, own in kept:
         stands = slice(one.place, one.place + len(own))
         if stands.stop > total or taken[stands].any():
-            raise MotionMindError(
-                "the stretches that are kept do not fit beside each other any more: choose them again"
-            )
+            raise MotionMindError("the kept stretches no longer fit: choose them again")
         taken[stands] = True
     free = _without(units_of(blocks, clocks), [unit for _, own in kept for unit in own])
     places = np.flatnonzero(~taken)
     if len(free) < 2 or len(places) < 2:
-        raise MotionMindError("nothing is left to vary: let go of a stretch that is kept, or put more into the piece")
-    if max(len(free), total) > MOST:
-        raise MotionMindError(
-            f"a piece of {max(len(free), total):,} postures is too long to vary: {MOST:,} are the most"
-        )
+        raise MotionMindError("nothing left to vary: release a kept stretch or add to the piece")
+    if max(len(free), total) > MAX_UNITS:
+        raise MotionMindError(f"too long to vary: {max(len(free), total):,} postures, at most {MAX_UNITS:,}")
     order = find_order(wanted, len(free), len(places), insertions(free) if insertions else None)
     naming = _Naming(present, used, [one.block for one in wanted.kept])
     found = [(place, naming.block(run)) for place, run in _runs(order.indices, places, free)]
@@ -251,7 +246,7 @@ def find_order(wanted: Wanted, count: int, length: int, insertions: Estimates | 
         limits = check_limits(None, stretch, count, length) if stretch > 1 else None
         depart = min(wanted.depart, 1.0 / stretch)
         check_departure(depart, limits)
-        nudge = find_nudge(course.order, depart, every=1 if stretch == 1 else _COARSELY)
+        nudge = find_nudge(course.order, depart, every=1 if stretch == 1 else 5)  # a minimum makes each trial slow
     order = course.order(nudge)
     if wanted.inserted is not None and insertions is not None:
         order = course.within(Limits(wanted.inserted, stretch), nudge, insertions)
@@ -279,12 +274,12 @@ class _Course:
     def follow(self, nudge: float) -> Floats:
         """Return the variation's trajectory, every step [(L - 1) * 11 + 1, d]."""
         begin = self.piece[0] + nudge * np.eye(1, self.piece.shape[1])[0]
-        return trajectory(self.flow, begin, count=(self.length - 1) * EVERY + 1, every=1, transient=0)
+        return trajectory(self.flow, begin, count=(self.length - 1) * STEPS_PER_PLACE + 1, every=1, transient=0)
 
     def order(self, nudge: float) -> Ints:
         """Return the unit at each place [L]."""
         if nudge not in self.found:
-            sites, points = self.piece[::EVERY], self.follow(nudge)[::EVERY]
+            sites, points = self.piece[::STEPS_PER_PLACE], self.follow(nudge)[::STEPS_PER_PLACE]
             indices = reorder(sites, points)
             if self.stretch > 1:
                 free = np.zeros((len(sites), len(sites)), dtype=np.float32)
@@ -294,7 +289,7 @@ class _Course:
 
     def within(self, limits: Limits, nudge: float, insertions: Estimates) -> Ints:
         """Return the unit at each place [L], with insertions within limits."""
-        sites, points = self.piece[::EVERY], self.follow(nudge)[::EVERY]
+        sites, points = self.piece[::STEPS_PER_PLACE], self.follow(nudge)[::STEPS_PER_PLACE]
         itinerary = Itinerary(sites, points, reorder(sites, points))
         kept, _ = keep_within(limits, itinerary, insertions.durations, insertions.seconds, None)
         return np.array(kept.order)
@@ -305,7 +300,7 @@ def _course(flow: str, start: tuple[float, float, float] | None, count: int, len
     """Return the course of a request; a start that the user chose is on the attractor and needs no transient."""
     own = find_flow(flow)
     transient = own.transient if start is None else 0
-    piece = trajectory(own, start, count=(count - 1) * EVERY + 1, every=1, transient=transient)
+    piece = trajectory(own, start, count=(count - 1) * STEPS_PER_PLACE + 1, every=1, transient=transient)
     return _Course(own, piece, length, stretch, {})
 
 

@@ -15,8 +15,6 @@ SeamState = Literal["smooth", "abrupt", "waiting", "inserted", "discarded", "non
 Findings = Callable[[Seam], Finding | None]  # returns the finding at a seam; None if there is none yet
 Standing = Callable[[Seam], Found | None]  # returns the insertion from before a seam's latest request
 
-_GOES_ON = "goes on as recorded"
-
 
 def state_of(seam: Seam, finding: Finding | None) -> SeamState:
     """Return the state of a seam."""
@@ -98,7 +96,7 @@ def _seam_view(
         "right": seam.right.id,
         "number": number,
         "state": state_of(seam, finding),
-        "words": _GOES_ON if seam.goes_on else finding.words if finding is not None else "",
+        "words": "continues as recorded" if seam.goes_on else finding.words if finding is not None else "",
         "chosen": min(seam.verdict.chosen, len(found)) if found else seam.verdict.chosen,
         "alternatives": [msgspec.to_builtins(one) for one in found or ()],
         "decision": seam.verdict.decision,

@@ -19,7 +19,7 @@ from motionmind.errors import MotionMindError
 if TYPE_CHECKING:
     from motionmind.tween.engine import Engine
 
-_ENGINES = 2  # engines that a worker keeps loaded
+MAX_ENGINES = 2  # that a process keeps loaded
 
 _home: Path | None = None
 _engines: OrderedDict[tuple[str, int, int], Engine] = OrderedDict()
@@ -38,7 +38,7 @@ def engine_of(name: str) -> Engine:
     known = name, status.st_ino, status.st_mtime_ns
     if known not in _engines:
         _engines[known] = Engine.load(name, _home)
-        while len(_engines) > _ENGINES:
+        while len(_engines) > MAX_ENGINES:
             _engines.popitem(last=False)
     _engines.move_to_end(known)
     return _engines[known]
@@ -68,7 +68,7 @@ def work(connection: Connection, home: Path | None, warm: str) -> None:
         try:
             answer = "done", function(report, *arguments)
         except MemoryError:
-            answer = "failed", "there is not enough memory for this"
+            answer = "failed", "not enough memory"
         except Exception as error:
             answer = "failed", words_of(error)
         with suppress(OSError):
@@ -86,4 +86,4 @@ def words_of(error: Exception) -> str:
     if isinstance(error, MotionMindError):
         return str(error)
     traceback.print_exception(error, file=sys.stderr)
-    return "this went wrong; the terminal says how"
+    return "internal error: see the terminal"

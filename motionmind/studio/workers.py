@@ -20,12 +20,6 @@ from motionmind.studio.preparation import Told
 from motionmind.studio.worker_loop import words_of, work
 
 JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
-_TRIES = 3  # starts of a worker that dies before it is ready
-_JOBS = 200  # finished jobs that remain available
-_FEW = 2  # processors that two workers need
-_LOST = "this took more than this computer has, and was ended"
-_LOOK = 0.2  # seconds between updates of a preparation's progress
-_MEMORY = 2**30  # free bytes that two workers need; the second takes less than a fifth
 
 
 class Report(Protocol):
@@ -219,7 +213,7 @@ class Workers:
                 if may_begin:
                     self._release(job)
                 self._tell(job)
-                await asyncio.sleep(_LOOK)
+                await asyncio.sleep(0.2)
         finally:
             steps.close()
             job.end("done")
@@ -233,17 +227,17 @@ class Workers:
             self.go_on()
 
     def _add(self, job: Job) -> Job:
-        """Register a job, and drop the oldest finished ones."""
+        """Register a job, and drop all but the latest 200 finished ones."""
         self._jobs[job.id] = job
         over = [one.id for one in self._jobs.values() if one.state not in ("waiting", "running")]
-        for old in over[: max(0, len(over) - _JOBS)]:
+        for old in over[: max(0, len(over) - 200)]:
             del self._jobs[old]
         return job
 
     def find(self, job: str) -> Job:
         """Return a job by id; raise MotionMindError if it is unknown or was dropped."""
         if job not in self._jobs:
-            raise MotionMindError("there is no such job, or no more")
+            raise MotionMindError("no such job")
         return self._jobs[job]
 
     def cancel(self, job: Job) -> None:
@@ -263,7 +257,7 @@ class Workers:
         """Cancel all jobs and kill all workers."""
         self._has_begun = True
         for job in self.jobs:
-            job.end("cancelled", words="the studio ends")
+            job.end("cancelled", words="the studio is closing")
         self._waiting.clear()
         for worker in self._workers:
             worker.kill()
@@ -273,7 +267,7 @@ class Workers:
         """Give waiting jobs to free workers."""
         while self._waiting and not self._workers:
             job = self._waiting.popleft()
-            job.end("failed", words="the engine does not start; the terminal says why")
+            job.end("failed", words="the engine failed to start: see the terminal")
             self._tell(job)
         for worker in self._workers:
             if self._held_by is None and worker.has_begun and worker.job is None and (chosen := self._next()):
@@ -297,10 +291,10 @@ class Workers:
         if message is None:
             self._failures += not worker.has_begun
             self._workers.remove(worker)
-            if self._failures < _TRIES:
+            if self._failures < 3:
                 self._workers.append(_Worker(self, *self._theirs))
             if job:
-                job.end("failed", words=_LOST, error=WorkerLostError)
+                job.end("failed", words="stopped: this computer ran out of memory", error=WorkerLostError)
         elif message[0] == "begun":
             worker.has_begun, self._failures = True, 0
         elif job is None:
@@ -390,10 +384,10 @@ def _nothing(_: Report) -> None:
 
 
 def _room() -> int:
-    """Return the number of workers for this computer's processors and memory."""
+    """Return the number of workers: two need two processors and 1 GiB of free memory, of which they take a fifth."""
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     try:
         memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_AVPHYS_PAGES")
     except (AttributeError, ValueError, OSError):
         memory = 0
-    return 2 if processors >= _FEW and memory >= _MEMORY else 1
+    return 2 if processors >= 2 and memory >= 2**30 else 1

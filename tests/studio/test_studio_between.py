@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from studio_server import Served
 
-from motionmind.studio.alternatives import COUNT
+from motionmind.studio.alternatives import MAX_ALTERNATIVES
 from motionmind.studio.between import Between, Place, accepted
 from motionmind.studio.edits import Ask, Choose, Insert, Several, Wish
 from motionmind.studio.piece import State, apply
@@ -34,7 +34,7 @@ def test_the_gallery_lists_what_the_corpus_has(studio_server: Served) -> None:
 
 def test_alternatives_come_one_by_one_and_lead_from_a_to_b(studio_server: Served) -> None:
     job, accounts = found(studio_server)
-    assert [one["number"] for one in accounts] == list(range(1, COUNT + 1))
+    assert [one["number"] for one in accounts] == list(range(1, MAX_ALTERNATIVES + 1))
     ends = [studio_server.studio.movements.get(place["key"]).posture(0) for place in (A, B)]
     search = studio_server.studio.movements  # the movements that were found are not kept in the project
     assert not any(key.startswith("m-") for key in search._kept)
@@ -42,7 +42,7 @@ def test_alternatives_come_one_by_one_and_lead_from_a_to_b(studio_server: Served
         data = studio_server.get(f"/api/between/{job}/{one['number']}")
         assert data["skeleton"]["names"] == list(ends[0].skeleton.names)
         assert len(one["joints"]) == len(ends[0].skeleton)
-    assert studio_server.send("GET", f"/api/between/{job}/{COUNT + 1}").status == 400
+    assert studio_server.send("GET", f"/api/between/{job}/{MAX_ALTERNATIVES + 1}").status == 400
 
 
 def test_accepting_puts_both_postures_and_the_choice_into_the_piece(studio_server: Served) -> None:
@@ -50,7 +50,7 @@ def test_accepting_puts_both_postures_and_the_choice_into_the_piece(studio_serve
     state = studio_server.post("/api/between/accept", {"job": job, "alternative": 3, "window": "w1"})
     blocks, (seam,) = state["piece"]["blocks"], state["piece"]["seams"]
     assert [block["key"] for block in blocks] == [A["key"], B["key"]]
-    assert (seam["state"], seam["chosen"], len(seam["alternatives"])) == ("inserted", 3, COUNT)
+    assert (seam["state"], seam["chosen"], len(seam["alternatives"])) == ("inserted", 3, MAX_ALTERNATIVES)
     assert seam["seconds"] == pytest.approx(accounts[2]["seconds"])
     assert state["undo"] == "go from A to B"
     motion = studio_server.studio.movements.get(seam["alternatives"][2]["key"])
@@ -86,11 +86,11 @@ def test_a_length_is_kept_to(studio_server: Served) -> None:
     ("body", "words"),
     [
         ({"a": {"key": "ballet/nothing"}, "b": B}, "nothing"),
-        ({"a": {"key": "ballet/adagio", "frame": 100000}, "b": B}, "frames 0 to"),
+        ({"a": {"key": "ballet/adagio", "frame": 100000}, "b": B}, "its frames are"),
         ({"a": A}, "b"),
         ({"a": A, "b": B, "options": {"seconds": -1}}, "seconds"),
         ({"a": {"key": "own/bow"}, "b": B}, "no posture is saved as bow"),
-        ({"a": {"key": "../../etc/passwd"}, "b": B}, "there is no movement"),
+        ({"a": {"key": "../../etc/passwd"}, "b": B}, "no movement"),
     ],
 )
 def test_what_cannot_be_asked_is_refused_in_one_line(studio_server: Served, body: Any, words: str) -> None:
@@ -103,7 +103,7 @@ def test_what_cannot_be_asked_is_refused_in_one_line(studio_server: Served, body
 def test_an_alternative_that_is_not_there_is_not_accepted(studio_server: Served) -> None:
     ask = {"job": "j99", "alternative": 1, "window": "w1"}
     answer = studio_server.send("POST", "/api/between/accept", ask)
-    assert (answer.status, "look for them again" in answer.value["error"]) == (400, True)
+    assert (answer.status, "search again" in answer.value["error"]) == (400, True)
     assert studio_server.project()["piece"]["blocks"] == []
 
 

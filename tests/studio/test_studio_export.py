@@ -105,7 +105,7 @@ def test_frames_that_are_not_even_are_a_file_all_the_same(studio_server: Served,
 
 def test_nothing_is_taken_away_of_an_empty_piece(studio_server: Served) -> None:
     answer = studio_server.send("GET", "/api/export/bvh")
-    assert (answer.status, answer.value["error"]) == (400, "the piece is empty: there is nothing to take away yet")
+    assert (answer.status, answer.value["error"]) == (400, "the piece is empty: nothing to export")
 
 
 def test_an_unknown_format_is_refused(with_piece: Served) -> None:

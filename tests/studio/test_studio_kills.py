@@ -147,11 +147,9 @@ def test_on_a_full_disk_an_edit_is_refused_in_a_line_and_the_project_stays_whole
         handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (len(whole) + room, hard))
         try:
-            with pytest.raises(
-                MotionMindError, match=r"this was not done, for piece\.motionmind cannot be written"
-            ) as error:
+            with pytest.raises(MotionMindError, match=r"not done: piece\.motionmind cannot be written") as error:
                 project.edit("w1", Insert("b1", "ballet/adagio", 0, 9))
-            with pytest.raises(MotionMindError, match="this was not done"):
+            with pytest.raises(MotionMindError, match="not done"):
                 project.undo("w1")
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
@@ -172,8 +170,8 @@ def test_errors_of_the_command_are_one_line(tmp_path: Path, run: Run) -> None:
     with running(tmp_path / "piece.motionmind", home=tmp_path / "home") as (_, client):
         port = client.url.rpartition(":")[2]
         for arguments, words in (
-            ((tmp_path / "piece.motionmind",), f"is open at {client.url}"),
-            ((other,), "is no project of the studio"),
+            ((tmp_path / "piece.motionmind",), f"already open in a studio at {client.url}"),
+            ((other,), "not a studio project"),
             (
                 (tmp_path / "new.motionmind", "--port", port),
                 f"cannot listen at 127.0.0.1:{port}: address already in use",

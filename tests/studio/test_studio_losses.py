@@ -64,14 +64,14 @@ def test_what_ends_workers_again_and_again_is_given_up_in_a_line(served: Served)
     for _ in range(2):
         _kill_worker(served, "seam")
     seam = _until(lambda: (seam := _seam(served))["state"] == "none found" and seam)
-    assert seam["words"] == "this took more than this computer has, and was ended"
+    assert seam["words"] == "stopped: this computer ran out of memory"
 
 
 def test_a_search_whose_worker_was_killed_fails_in_a_line_and_the_next_finds(served: Served) -> None:
     asked = {"a": {"key": "ballet/arabesque"}, "b": {"key": "ballet/fifth"}}
     served.post("/api/between", asked)
     job = _kill_worker(served, "between")
-    assert served.get(f"/api/jobs/{job}")["words"] == "this took more than this computer has, and was ended"
+    assert served.get(f"/api/jobs/{job}")["words"] == "stopped: this computer ran out of memory"
     again = served.wait_for(served.post("/api/between", asked)["job"])
     assert again["state"] == "done"
     assert len(again["partial"]) == 4

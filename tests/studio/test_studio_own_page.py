@@ -114,7 +114,7 @@ def test_a_piece_is_varied_by_mouse(served: Served, open_page: Open, size: str) 
     until(
         page, "was => [...document.querySelectorAll('.tiles img')].map(i => i.src).join() !== was", arg=",".join(first)
     )
-    assert page.get_by_test_id("map").get_attribute("aria-valuetext") != "its usual start"
+    assert page.get_by_test_id("map").get_attribute("aria-valuetext") != "default"
     # What is kept stays while the rest is varied anew.
     page.get_by_test_id("tile-2").get_by_role("button", name=re.compile("^Keep")).click()
     name = page.locator(".tiles li.kept .keep").get_attribute("aria-label").partition(": ")[2]
@@ -147,9 +147,9 @@ def test_a_piece_is_varied_by_keyboard(served: Served, open_page: Open) -> None:
     page.get_by_test_id("tile-3").wait_for()
     tab_to(page, "map")
     page.keyboard.press("PageUp")
-    until(page, "document.querySelector('[data-testid=map]').getAttribute('aria-valuetext') !== 'its usual start'")
+    until(page, "document.querySelector('[data-testid=map]').getAttribute('aria-valuetext') !== 'default'")
     page.keyboard.press("Home")
-    until(page, "document.querySelector('[data-testid=map]').getAttribute('aria-valuetext') === 'its usual start'")
+    until(page, "document.querySelector('[data-testid=map]').getAttribute('aria-valuetext') === 'default'")
     tab_to(page, "depart")
     page.keyboard.press("Home")
     until(page, "document.querySelector('[data-testid=departs]').textContent === 'as it is'")
@@ -204,8 +204,8 @@ def test_a_stretch_selected_on_the_time_line_is_kept(served: Served, open_page: 
 def test_nothing_to_vary_says_what_to_do(open_page: Open) -> None:
     page = open_page()
     page.get_by_test_id("open-vary").click()
-    page.get_by_text("There are too few postures for it yet").wait_for()
-    page.get_by_role("button", name="Bring one of your own").click()
+    page.get_by_text("The piece is too short").wait_for()
+    page.get_by_role("button", name="Use your own").click()
     page.get_by_test_id("choose-files").wait_for(state="attached")
 
 
@@ -225,7 +225,7 @@ def test_own_movement_by_mouse(served: Served, open_page: Open, tmp_path: Path) 
     until(page, "document.querySelectorAll('[data-testid=file-error]').length === 2")
     errors = sorted(page.get_by_test_id("file-error").all_inner_texts())
     assert errors[0].startswith("broken.bvh:")
-    assert errors[1].startswith("dance.fbx: FBX is not read")
+    assert errors[1].startswith("dance.fbx: FBX is not supported")
     assert "a person of 23 joints" in page.get_by_test_id("understood").inner_text()
     page.emulate_media(reduced_motion="no-preference")  # what is looked at plays then
     page.get_by_test_id("look").click()
@@ -318,17 +318,17 @@ def test_a_recording_leaves_questions(served: Served, open_page: Open, shared_da
     assert "right hip 10×" in card.inner_text()
     assert card.get_by_test_id("skip").is_checked()
     card.get_by_test_id("unit").select_option("m")
-    card.get_by_text("no person is so tall").wait_for()
+    card.get_by_text("no person has this height").wait_for()
     card.get_by_test_id("unit").select_option("")
-    card.get_by_text("no person is so tall").wait_for(state="detached")
+    card.get_by_text("no person has this height").wait_for(state="detached")
     rate = card.get_by_test_id("fps")
     for wrong in ("0", "2000"):
         rate.fill(wrong)
         rate.press("Tab")
         assert rate.input_value() == "120"  # which is in use
     card.get_by_test_id("skip").click()
-    card.get_by_text("is being read again").wait_for()
-    card.get_by_text("is being read again").wait_for(state="detached")
+    card.get_by_text("Reading again").wait_for()
+    card.get_by_text("Reading again").wait_for(state="detached")
     card.get_by_test_id("put").click()
     until(page, "studio.store.state.piece.blocks[0]?.frames === 886")
     page.get_by_test_id("open-vary").click()

@@ -72,7 +72,7 @@ def test_an_order_is_taken_only_by_the_piece_that_it_was_proposed_for(served: Se
         other.edit(**edit)
         before = served.project()
         answer = served.send("POST", "/api/vary/accept", order | {"basis": found["basis"]})
-        assert (answer.status, "has become another" in answer.value["error"]) == (412, True)
+        assert (answer.status, "the piece has changed" in answer.value["error"]) == (412, True)
         assert served.project() == before
         other.post("/api/undo", {"window": "w2"})
     # What no variation rests on may change meanwhile.
@@ -109,11 +109,11 @@ def test_the_map(served: Served) -> None:
     ("wish", "words"),
     [
         ({"flow": "opera"}, "no attractor"),
-        ({"depart": 7}, "this was not understood"),
+        ({"depart": 7}, "invalid request"),
         ({"start": [1e300, 0, 0]}, "diverges"),
         (
             {"kept": [{"block": {"id": "x", "source": "ballet/adagio", "first": 0, "last": 10**6}, "place": 0}]},
-            "is kept",
+            "kept stretch",
         ),
         ({"kept": [{"block": {"id": "x", "source": "/etc/passwd", "first": 0, "last": 1}, "place": 0}]}, "no movement"),
     ],
@@ -127,7 +127,7 @@ def test_wishes_that_cannot_be_met(served: Served, wish: dict[str, Any], words: 
 
 def test_nothing_to_vary(studio_server: Served) -> None:
     answer = studio_server.send("POST", "/api/vary", {})
-    assert (answer.status, "nothing is left to vary" in answer.value["error"]) == (400, True)
+    assert (answer.status, "nothing left to vary" in answer.value["error"]) == (400, True)
 
 
 # --- one's own movement -----------------------------------------------------------------------------------------------
@@ -200,8 +200,8 @@ def test_what_cannot_be_learned_says_why(served: Served) -> None:
     for wish, words in (
         ({"name": "ballet", "parts": [{"upload": upload["id"]}]}, "bundled"),
         ({"name": "../up", "parts": [{"upload": upload["id"]}]}, "cannot be a corpus's name"),
-        ({"name": "mine", "parts": [{"upload": upload["id"], "clip": 4}]}, "no such movement"),
-        ({"name": "mine", "parts": [{"upload": "../.."}]}, "no longer here"),
+        ({"name": "mine", "parts": [{"upload": upload["id"], "clip": 4}]}, "has no clip"),
+        ({"name": "mine", "parts": [{"upload": "../.."}]}, "this file is gone"),
     ):
         answer = served.send("POST", "/api/corpora", wish)
         assert answer.status == 400

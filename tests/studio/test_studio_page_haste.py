@@ -60,7 +60,7 @@ def test_what_another_window_does_before_the_order_comes_is_varied_too(studio_se
     page.get_by_test_id("vary").click()
     wait_for(page, "studio.store.state.undo === 'vary the piece'", 20.0)
     assert [block["id"] for block in studio_server.studio.project.state.about["original"]] == ["c0", "c1", "b1"]
-    page.get_by_text("edited in another window").wait_for()
+    page.get_by_text("Another window edited").wait_for()
     page.get_by_test_id("undo").click()
     wait_for(page, "piece.blocks.map(({ id }) => id).join() === 'c0,c1,b1'", 20.0)
 

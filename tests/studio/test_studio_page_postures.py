@@ -32,7 +32,7 @@ def test_a_posture_is_renamed_and_what_was_made_of_it_stays(studio_server: Serve
     field = page.get_by_test_id("name-reach")
     field.fill("rest")
     field.press("Enter")
-    page.get_by_text("rest is there already").wait_for()
+    page.get_by_text("rest already exists").wait_for()
     assert field.input_value() == "reach"
     assert saved(page) == ["reach", "rest"]
     field.fill("far away")
@@ -62,7 +62,7 @@ def test_a_posture_is_deleted_and_comes_back(studio_server: Served, studio_page:
     page.get_by_test_id("open-between").click()
     page.get_by_test_id("manage-postures").click()
     page.get_by_test_id("delete-rest").click()
-    page.get_by_text("rest is deleted").wait_for()
+    page.get_by_text("Deleted rest").wait_for()
     assert saved(page) == []
     assert len(blocks(page)) == 1
     assert page.evaluate("document.activeElement.dataset.testid") == "restore"

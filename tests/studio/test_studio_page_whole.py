@@ -207,7 +207,7 @@ def test_what_is_shown_is_named_where_there_is_little_room(studio_server: Served
         assert other["y"] >= half["y"] + 32 or other["x"] >= half["x"] + 130
     page.set_viewport_size({"width": 820, "height": 900})
     page.get_by_test_id("open-pose").click()
-    page.get_by_text("being changed").wait_for()
+    page.get_by_text("being edited").wait_for()
     needed, given = name.evaluate(needs)
     assert needed <= given
     boxes = [one.bounding_box() for one in (name, page.locator(".caption .button"), views)]

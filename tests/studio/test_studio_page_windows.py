@@ -138,7 +138,7 @@ def test_a_browser_without_the_token_is_told_where_to_look(
     context = browser.new_context()
     page = context.new_page()
     page.goto(studio_server.url + end)
-    expect(page.get_by_test_id("toast").get_by_text("that the terminal shows")).to_be_visible()
+    expect(page.get_by_test_id("toast").get_by_text("shown in the terminal")).to_be_visible()
     if not end:  # as a page that is still open when the studio is started again
         expect(page.get_by_test_id("offline")).to_contain_text("nothing is saved; open the studio at the address")
     page.goto(studio_server.entry)  # in the same tab: nothing but the end of the address is another
@@ -223,7 +223,7 @@ def test_a_search_is_begun_again_by_the_studio_that_was_started_again(
     page.route("**/api/export/*", lambda route: route.abort())
     page.get_by_test_id("open-take").click()
     page.get_by_test_id("export-project").click()
-    expect(page.get_by_test_id("toast")).to_contain_text("The studio does not answer: has it ended?")
+    expect(page.get_by_test_id("toast")).to_contain_text("The studio does not answer. Is it still running?")
     context.close()
 
 

@@ -137,7 +137,7 @@ def test_states_of_a_seam():
     assert state_of(seam, Finding("q", True, "", ())) == "none found"
     assert state_of(seam, Finding("q", True, "", found)) == "inserted"
     wished = seam._replace(verdict=type(seam.verdict)(e.Ask(2.0)))
-    assert state_of(wished, Finding("q", False, "no way found", ())) == "none found"
+    assert state_of(wished, Finding("q", False, "no movement found", ())) == "none found"
     discarded = seam._replace(verdict=type(seam.verdict)(decision="discarded"))
     assert state_of(discarded, Finding("q", True, "", found)) == "discarded"
     assert state_of(piece_of(("c/one", 0, 5), ("c/one", 6, 9)).seams[0], None) == "smooth"
@@ -165,10 +165,10 @@ def test_parts_that_cannot_be_one_movement_are_refused():
         performance([], movement)
     other = replace(MOVEMENTS["c/two"], skeleton=replace(BODY, names=("root", "left_arm", "tail")))
     parts = list(lay_out(piece_of(("c/one", 0, 5), ("c/two", 3, 5)), lambda _: None, Marks(movement)).parts)
-    with pytest.raises(MotionMindError, match="c/two is on another body than c/one"):
+    with pytest.raises(MotionMindError, match="c/two and c/one have different bodies"):
         performance(parts, {**MOVEMENTS, "c/two": other}.__getitem__)
     longer = lay_out(piece_of(("c/two", 3, 25)), lambda _: None, Marks(movement))
-    with pytest.raises(MotionMindError, match="c/two has frames 0 to 19, no frame 25"):
+    with pytest.raises(MotionMindError, match="c/two has no frame 25: its frames are 0 to 19"):
         performance(list(longer.parts), movement)
 
 
@@ -190,6 +190,6 @@ def test_what_was_inserted_stands_until_a_wish_is_answered() -> None:
     abrupt = Finding("q", True, "not seen", None)  # is looked at, but what joins it is still sought
     view = view_of(piece, lambda _: abrupt, Marks(movement), str.upper, lambda _: found)
     assert [part["key"] for part in view["parts"]] == ["c/one", "m-found", "c/two"]
-    none = Finding("q", True, "no way found", ())
+    none = Finding("q", True, "no movement found", ())
     view = view_of(piece, lambda _: none, Marks(movement), str.upper, lambda _: found)
     assert [part["key"] for part in view["parts"]] == ["c/one", "c/two"]

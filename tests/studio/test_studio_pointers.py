@@ -89,7 +89,7 @@ def test_a_heel_is_dragged_up_into_a_releve(page: Any, pointer: Pointer) -> None
     page.get_by_test_id("open-pose").click()
     page.get_by_test_id("handle-pelvis").wait_for()
     page.get_by_test_id("pose-from").and_(page.locator(":has(optgroup)")).select_option("ballet/arabesque")
-    page.get_by_text("arabesque, being changed").wait_for()
+    page.get_by_text("arabesque, being edited").wait_for()
     heel, head = (f"[data-testid=handle-{name}][style*=translate]" for name in ("left_heel", "atlantal"))
     before = rest(page, head)
     drag(page, pointer, heel, (0.0, -40.0))

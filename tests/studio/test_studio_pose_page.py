@@ -102,11 +102,11 @@ def test_a_hand_is_dragged_brought_to_what_is_known_and_saved_by_mouse(studio_se
     page.wait_for_function("() => window.studio.store.state.piece.blocks.length === 1")
     # At the line of time the keys are the piece's, and the posture is come back to.
     page.locator(".stretches [role=option]").click()
-    page.get_by_text("Go on with the posture").wait_for()
+    page.get_by_text("Back to the posture").wait_for()
     page.keyboard.press("Control+z")
     page.wait_for_function("() => window.studio.store.state.piece.blocks.length === 0")
     page.get_by_test_id("mirror-posture").click()  # which is seen
-    page.get_by_text("Go on with the posture").wait_for(state="detached")
+    page.get_by_text("Back to the posture").wait_for(state="detached")
     page.get_by_test_id("use-a").click()
     page.get_by_test_id("panel-between").wait_for()
 
@@ -202,16 +202,16 @@ def test_a_posture_is_come_back_to_from_another_one(studio_page: Any) -> None:
     page.get_by_test_id("pose-undo").and_(page.locator(":enabled")).wait_for()
     made = page.evaluate("JSON.stringify(studio.viewer.motion.rotations)")
     page.get_by_test_id("pose-from").select_option("ballet/fifth")
-    page.get_by_text("fifth, being changed").wait_for()
+    page.get_by_text("fifth, being edited").wait_for()
     _settled(page)
     page.keyboard.press("Control+z")
-    page.get_by_text("arabesque, being changed").wait_for()
+    page.get_by_text("arabesque, being edited").wait_for()
     _settled(page)
     assert page.evaluate("JSON.stringify(studio.viewer.motion.rotations)") == made
     page.keyboard.press("Control+Shift+Z")
-    page.get_by_text("fifth, being changed").wait_for()
+    page.get_by_text("fifth, being edited").wait_for()
     page.get_by_test_id("pose-undo").click()
-    page.get_by_text("arabesque, being changed").wait_for()
+    page.get_by_text("arabesque, being edited").wait_for()
     page.get_by_test_id("pose-undo").click()
     page.get_by_test_id("pose-undo").and_(page.locator(":disabled")).wait_for()
 
@@ -223,10 +223,10 @@ def test_the_piece_is_taken_back_while_it_is_what_is_shown(studio_server: Served
     page.get_by_test_id("pose-undo").and_(page.locator(":enabled")).wait_for()
     page.get_by_test_id("posture-to-timeline").click()
     page.get_by_text("Back to the piece").click()
-    page.get_by_text("Go on with the posture").wait_for()
+    page.get_by_text("Back to the posture").wait_for()
     page.locator(".bar .brand").click()  # no key is the time line's then
     page.keyboard.press("Control+z")
     page.wait_for_function("() => window.studio.store.state.piece.blocks.length === 0")
     assert page.get_by_test_id("pose-undo").is_enabled()
     page.get_by_test_id("pose-undo").click()  # whoever takes back a step sees it
-    page.get_by_text("arabesque, being changed").wait_for()
+    page.get_by_text("arabesque, being edited").wait_for()

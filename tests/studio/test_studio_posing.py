@@ -72,10 +72,10 @@ def test_postures_change_and_are_kept(studio_server: Served, opened: dict[str, A
     [
         ("open", {"key": KEY, "frame": 7}, "no frame 7"),
         ("open", {"key": "ballet/nothing"}, "nothing"),
-        ("open", {"key": KEY, "more": 1}, "not understood"),
+        ("open", {"key": KEY, "more": 1}, "invalid request"),
         ("turn", {"joint": "tail", "angle": "flexion", "degrees": 1.0}, "no joint 'tail'"),
         ("turn", {"joint": "left_knee", "angle": "twist", "degrees": 1.0}, "no angle twist"),
-        ("drag", {"start": None, "joint": "pelvis", "place": [0, 0, 0], "standing": []}, "not understood"),
+        ("drag", {"start": None, "joint": "pelvis", "place": [0, 0, 0], "standing": []}, "invalid request"),
     ],
 )
 def test_what_makes_no_sense_gets_one_line(

@@ -54,7 +54,7 @@ def test_undo_takes_back_this_windows_edit_and_no_other(make_project: Make) -> N
     project.edit("w2", block(2))
     project.undo("w1")
     assert order(project) == ["b2"]
-    with pytest.raises(RefusedError, match="nothing to take back"):
+    with pytest.raises(RefusedError, match="nothing to undo"):
         project.undo("w1")
     project.redo("w1")
     assert order(project) == ["b1", "b2"]
@@ -65,7 +65,7 @@ def test_undo_is_refused_where_a_later_edit_rests_on_it(make_project: Make) -> N
     project.edit("w1", block(1))
     project.edit("w2", Mirror("b1"))
     before = project.state
-    with pytest.raises(RefusedError, match="mirror a stretch”, rests on it"):
+    with pytest.raises(RefusedError, match="mirror a stretch”, depends on it"):
         project.undo("w1")
     assert project.state == before
     project.undo("w2")
@@ -99,7 +99,7 @@ def with_insertion(project: Project) -> Found:
     (seam,) = project.state.seams
     motion = ballet_clip("plies").slice(0, 9)
     found = Found(project.movements.keep(motion), 2.0, "usual")
-    project.keep_finding(Finding(project.question(seam), True, "too sudden", (found,)))
+    project.keep_finding(Finding(project.question(seam), True, "too fast", (found,)))
     return found
 
 
@@ -199,7 +199,7 @@ def test_what_cannot_be_applied_changes_nothing(make_project: Make) -> None:
 def test_one_process_holds_a_project(make_project: Make) -> None:
     project = make_project()
     project.tell("http://127.0.0.1:1234")
-    with pytest.raises(MotionMindError, match=r"is open at http://127\.0\.0\.1:1234"):
+    with pytest.raises(MotionMindError, match=r"already open in a studio at http://127\.0\.0\.1:1234"):
         Project.open(project.path)
 
 
@@ -214,7 +214,7 @@ def test_a_torn_last_line_is_dropped_with_a_word(make_project: Make) -> None:
         project.path.write_bytes(torn[:length])
         again = Project.open(project.path)
         assert order(again) == ["b1"]
-        assert again.words == ["the last edit was not written whole when the studio ended, and is gone"]
+        assert again.words == ["the last edit was lost: the studio ended while writing it"]
         assert again.path.read_bytes() == whole
         again.close()
     project.path.write_bytes(torn[:-1])  # all but its end: nothing is lost
@@ -228,11 +228,11 @@ def test_a_torn_last_line_is_dropped_with_a_word(make_project: Make) -> None:
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (b"", "is no project of the studio"),
-        (b"HIERARCHY\nROOT hips\n", "is no project of the studio"),
+        (b"", "not a studio project"),
+        (b"HIERARCHY\nROOT hips\n", "not a studio project"),
         (b'{"format": "motionmind studio", "version": 2}\n', "version 1 can be read"),
-        (b"\x00" * 5000, "is no project of the studio"),
-        (b"[" * 100_000, "is no project of the studio"),
+        (b"\x00" * 5000, "not a studio project"),
+        (b"[" * 100_000, "not a studio project"),
     ],
 )
 def test_what_is_no_project_is_refused_in_a_line(tmp_path: Path, data: bytes, words: str) -> None:
@@ -277,7 +277,7 @@ def test_the_project_over_http(studio_server: Served) -> None:
     state = studio_server.post("/api/undo", {"window": "w1"})
     assert state["piece"]["blocks"] == []
     refused = studio_server.send("POST", "/api/undo", {"window": "w1"})
-    assert (refused.status, refused.value["error"]) == (409, "this window has nothing to take back")
+    assert (refused.status, refused.value["error"]) == (409, "nothing to undo in this window")
     assert studio_server.post("/api/redo", {"window": "w1"})["piece"]["blocks"] != []
 
 
@@ -293,7 +293,7 @@ def test_two_windows_see_each_others_edits(studio_server: Served) -> None:
 
 
 def test_the_studio_notices_that_a_window_has_closed(studio_server: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motionmind.studio.api._GONE", 0.05)
+    monkeypatch.setattr("motionmind.studio.api._WINDOW_GONE_S", 0.05)
     other = studio_server.another("w2")
     studio_server.insert("b1", "ballet/adagio", 0, 9)
     with studio_server.listening() as events:

@@ -59,7 +59,7 @@ def test_a_corpus_that_was_built_again_alike_is_the_same(home: Path, path: Path)
 def test_a_corpus_that_has_changed_is_said_once_and_its_seams_are_judged_anew(home: Path, path: Path) -> None:
     learn(home, "plies", "tendus", "jump")
     project = Project.open(path, home)
-    assert project.words == ["mine has changed since this piece was made: its seams are judged anew"]
+    assert project.words == ["mine has changed since this piece was made: its seams will be checked again"]
     assert project.finding(project.state.seams[0]) is None
     project.close()
     again = Project.open(path, home)
@@ -71,7 +71,7 @@ def test_a_corpus_that_is_missing_is_named(home: Path, path: Path) -> None:
     data = path.read_bytes()
     store.delete("mine", home)
     project = Project.open(path, home)
-    assert project.missing == ["the corpus mine is missing: build it again by that name"]
+    assert project.missing == ["corpus mine is missing: build it again under that name"]
     (seam,) = project.state.seams
     assert project.lacks(seam)
     assert project.finding(seam) is not None  # what was found stays
@@ -89,7 +89,7 @@ def test_a_piece_without_its_corpus_is_shown_and_edited(home: Path, path: Path) 
     store.delete("mine", home)
     with serving(Project.open(path, home), home) as client:
         view = client.project()
-        assert view["missing"] == ["the corpus mine is missing: build it again by that name"]
+        assert view["missing"] == ["corpus mine is missing: build it again under that name"]
         assert [block["missing"] for block in view["piece"]["blocks"]] == [True, True]
         assert [corpus["name"] for corpus in client.get("/api/gallery")["corpora"]] == []
         refused = client.send("GET", "/api/export/bvh")
@@ -106,7 +106,7 @@ def test_a_stretch_that_its_corpus_lacks_now_is_named(home: Path, path: Path) ->
     learn(home, "plies")
     project = Project.open(path, home)
     last = project.state.blocks[0].last
-    assert project.missing == [f"frame {last} of mine/tendus is missing, which the piece needs"]
+    assert project.missing == [f"the piece needs frame {last} of mine/tendus, which is missing"]
     project.close()
 
 
@@ -134,7 +134,7 @@ def test_the_page_says_what_is_missing(home: Path, path: Path, browser: Any) -> 
         page.on("console", lambda message: message.type == "error" and errors.append(message.text))
         try:
             page.goto(client.entry)
-            page.get_by_text("the corpus mine is missing").wait_for()
+            page.get_by_text("corpus mine is missing").wait_for()
             page.locator(".stretch.missing").nth(1).wait_for()
             assert page.locator(".stretch.missing").count() == 2
             assert "missing" in page.get_by_test_id("block-b1").get_attribute("aria-label")

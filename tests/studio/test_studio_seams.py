@@ -7,9 +7,10 @@ import pytest
 
 from motionmind.geometry import rotations as rot
 from motionmind.studio import worker_loop
+from motionmind.studio.alternatives import MAX_ALTERNATIVES
 from motionmind.studio.edits import Ask, Passing, Pin
 from motionmind.studio.piece import End
-from motionmind.studio.seams import MOST_ALTERNATIVES, Question, judge, smooth
+from motionmind.studio.seams import Question, judge, smooth
 from motionmind.studio.sides import options_of, sides_of
 from motionmind.tween.engine import Engine
 from motionmind.variation.piece import Piece
@@ -46,7 +47,7 @@ def test_seams_are_abrupt_where_a_variation_says_so(engine, clips):
     assert {found.abrupt for found in findings} == {True, False}
     for found in findings:
         assert found.insertions == (None if found.abrupt else ())
-        assert found.words.startswith(("known in ballet",) if not found.abrupt else ("too sudden: ", "not seen in"))
+        assert found.words.startswith(("seen in ballet",) if not found.abrupt else ("too fast: ", "not seen in"))
 
 
 def test_insertions_lead_exactly_from_one_side_to_the_other(clips):
@@ -54,7 +55,7 @@ def test_insertions_lead_exactly_from_one_side_to_the_other(clips):
     asked = question(clips, ends)
     found, failure = smooth(say_nothing, "ballet", asked)
     assert failure == ""
-    assert 1 < len(found) <= MOST_ALTERNATIVES
+    assert 1 < len(found) <= MAX_ALTERNATIVES
     assert len({motion.rotations.tobytes() for motion, _ in found}) == len(found)
     for motion, words in found:
         assert np.array_equal(motion.rotations[[0, -1]], [asked.sides.a.rotations, asked.sides.b.rotations])
@@ -81,7 +82,7 @@ def test_what_cannot_be_is_said_in_a_line(clips):
     )
     found, failure = smooth(say_nothing, "ballet", question(clips, ends, held))
     assert found == []
-    assert failure == "no way found that does all that is wished: let go of a posture, a hand or a foot"
+    assert failure == "no movement meets all wishes: drop a posture, a hand or a foot"
 
 
 def test_a_corpus_of_another_body_is_said_in_a_line(clips):
@@ -89,7 +90,7 @@ def test_a_corpus_of_another_body_is_said_in_a_line(clips):
     (found,) = judge(say_nothing, "walk-hexapod", [question(clips, ends)])
     assert found.abrupt
     assert found.insertions == ()
-    assert found.words == "walk-hexapod has another body than the piece: nothing of it can be inserted"
+    assert found.words == "walk-hexapod and the piece have different bodies: nothing can be inserted"
 
 
 def wait_for(served, wanted, seconds=60.0):

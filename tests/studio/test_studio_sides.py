@@ -64,7 +64,7 @@ def test_the_last_frame_has_nothing_after_it(clip):
 def test_bodies_must_be_one(clip):
     hexapod = Engine.load("walk-hexapod").corpus
     movements = {"c/x": clip, "hexapod/x": hexapod.motion(hexapod.clips[0])}
-    with pytest.raises(MotionMindError, match=r"hexapod/x is on another body than c/x: .*"):
+    with pytest.raises(MotionMindError, match=r"hexapod/x and c/x have different bodies: .*"):
         sides_of((End("c/x", 4, True), End("hexapod/x", 1, True)), movements.__getitem__, "free")
 
 

@@ -161,7 +161,7 @@ def test_a_posture_is_dropped_on_an_insertion_and_a_foot_is_pinned(page: Any) ->
         "frame: 0, last: 20 })); return data; }"
     )
     target.dispatch_event("drop", {"dataTransfer": clip})
-    page.get_by_text("An insertion passes a posture").wait_for()
+    page.get_by_text("An insertion passes single postures").wait_for()
     assert piece(page)["seams"][1]["ask"]["passing"] == [{"posture": "ballet/tendus", "frame": 12}]
     target.click()
     page.get_by_test_id("wishes").click()
@@ -309,10 +309,10 @@ def test_edits_come_in_the_order_in_which_they_were_made(page: Any) -> None:
 def test_smoothing_tells_how_far_it_is_and_can_be_stopped(page: Any) -> None:
     page.evaluate("studio.api.edit({ edit: 'mirror', block: 'b2' })")
     page.get_by_text(re.compile(r"^smoothing: [12] of 2 seams")).wait_for()
-    page.get_by_role("button", name="Stop", exact=True).click()
-    page.get_by_text(re.compile(r"^not smoothed: [12] of 2 seams")).wait_for()
+    page.get_by_role("button", name="Pause", exact=True).click()
+    page.get_by_text(re.compile(r"^paused: [12] of 2 seams")).wait_for()
     page.reload()
-    page.get_by_role("button", name="Go on", exact=True).click()
+    page.get_by_role("button", name="Resume", exact=True).click()
     wait_for_states(page, ["inserted", "inserted"])
     assert page.get_by_test_id("smoothing").count() == 0
 

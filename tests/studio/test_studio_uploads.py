@@ -89,7 +89,7 @@ def test_unit_and_rate_are_choices(uploads: Uploads, tmp_path: Path) -> None:
     assert again.facts.height == pytest.approx(170.0, abs=15.0)
     assert again.facts.clips[0].fps == pytest.approx(60.0)
     assert len(uploads.motion(found.id, 0)) == 58
-    with pytest.raises(MotionMindError, match="no unit ell: there are cm"):
+    with pytest.raises(MotionMindError, match="unknown unit ell: choose from cm"):
         asyncio.run(uploads.read(found.id, Choices(unit="ell")))
 
 
@@ -152,7 +152,7 @@ def test_recorded_movement(uploads: Uploads, shared_data: Path) -> None:
 def test_an_amc_needs_its_asf(uploads: Uploads, shared_data: Path) -> None:
     amc, asf = ((shared_data / "cmu-135" / name).read_bytes() for name in ("135_04.amc", "135.asf"))
     alone = bring(uploads, "135_04.amc", amc)
-    assert "bring the .asf" in alone.error
+    assert "upload its .asf" in alone.error
     skeleton = bring(uploads, "135.asf", asf)
     assert (skeleton.facts, skeleton.error) == (None, "")
     again = asyncio.run(uploads.read(alone.id, Choices(asf=skeleton.id)))
@@ -167,7 +167,7 @@ def test_goes_with_the_studio(tmp_path: Path) -> None:
     assert folder.is_dir()
     uploads.forget(found.id)
     assert not folder.exists()
-    with pytest.raises(MotionMindError, match="no longer here"):
+    with pytest.raises(MotionMindError, match="this file is gone"):
         uploads.motion(found.id, 0)
     other = uploads.folder(bring(uploads, "bends.score", TITLED.encode()).id)
     uploads.close()
@@ -251,12 +251,12 @@ def test_no_file_does_harm(uploads: Uploads, kind: str) -> None:
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("include secret.score", "takes in secret.score: bring that score, too"),
-        ("include\t../secret.score as x", "takes in secret.score: bring that score, too"),
-        ("include\u00a0/etc/secret.score", "takes in secret.score: bring that score, too"),
-        ("include /etc/passwd", "takes in passwd: bring that score, too"),
-        ("body secret.toml", "takes in a body: bring a score of a body that is known"),
-        ("body\u00a0../secret.toml", "takes in a body: bring a score of a body that is known"),
+        ("include secret.score", "includes secret.score: upload that score too"),
+        ("include\t../secret.score as x", "includes secret.score: upload that score too"),
+        ("include\u00a0/etc/secret.score", "includes secret.score: upload that score too"),
+        ("include /etc/passwd", "includes passwd: upload that score too"),
+        ("body secret.toml", "uses a body file: upload a score for a built-in body"),
+        ("body\u00a0../secret.toml", "uses a body file: upload a score for a built-in body"),
     ],
 )
 def test_a_score_names_no_files_of_this_machine(uploads: Uploads, line: str, words: str) -> None:
@@ -268,11 +268,11 @@ def test_scores_take_in_others_that_were_brought(uploads: Uploads) -> None:
     words, phrases = TITLED.partition("clip")[0], "include words.score\nphrase dip\n  1 | bend\n"
     top = "include ../steps/phrases.score\nclip two\n  start | stand\n  dip\n  1 | stand\n"
     first = bring(uploads, "top.score", top.encode())
-    assert first.error == "top.score:1: takes in phrases.score: bring that score, too"
+    assert first.error == "top.score:1: includes phrases.score: upload that score too"
     bring(uploads, "phrases.score", phrases.encode())
     assert (
         asyncio.run(uploads.read(first.id, Choices())).error
-        == "phrases.score:1: takes in words.score: bring that score, too"
+        == "phrases.score:1: includes words.score: upload that score too"
     )
     bring(uploads, "words.score", words.encode())
     found = asyncio.run(uploads.read(first.id, Choices()))
@@ -304,7 +304,7 @@ def test_other_files_are_refused(uploads: Uploads, name: str) -> None:
 
 
 def test_a_file_that_is_too_large_leaves_nothing(uploads: Uploads, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_BYTES", 2**20)
+    monkeypatch.setattr(module, "MAX_UPLOAD_BYTES", 2**20)
     with pytest.raises(MotionMindError, match="larger than 1 MB"):
         bring(uploads, "large.bvh", bytes(2**20 + 1))
     assert uploads.list() == ()
@@ -312,8 +312,8 @@ def test_a_file_that_is_too_large_leaves_nothing(uploads: Uploads, monkeypatch: 
 
 
 def test_a_file_that_takes_too_long_is_given_up(uploads: Uploads, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "SECONDS", 0.01)
-    monkeypatch.setattr(module, "_GRACE", 0.0)
+    monkeypatch.setattr(module, "TIME_LIMIT_S", 0.01)
+    monkeypatch.setattr(module, "_START_S", 0.0)
     found = bring(uploads, "bends.score", TITLED.encode())
     assert "took longer" in found.error
 
@@ -345,7 +345,7 @@ def test_learns_a_corpus_of_what_was_brought(uploads: Uploads, tmp_path: Path) -
     [
         (Lesson("ballet", parts=(Part("a"),)), "bundled"),
         (Lesson("../up", parts=(Part("a"),)), "cannot be a corpus's name"),
-        (Lesson("new"), "choose what to learn from"),
+        (Lesson("new"), "nothing to learn from"),
         (Lesson("new", mix=(Mixed("/etc"),)), "no corpus /etc"),
     ],
 )

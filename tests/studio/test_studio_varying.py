@@ -139,7 +139,7 @@ def test_a_start_on_the_map_is_where_the_piece_begins() -> None:
         (Wanted(flow="opera"), "no attractor 'opera'"),
         (Wanted(flow="duffing"), "no attractor"),  # in four dimensions
         (Wanted(start=(1e12, 0.0, 0.0)), "diverges"),
-        (Wanted(kept=kept_in(PIECE, {"b1", "b2"}, clocks)), "let go"),
+        (Wanted(kept=kept_in(PIECE, {"b1", "b2"}, clocks)), "release"),
         (Wanted(kept=(Kept(PIECE[0], 0), Kept(PIECE[1], 50))), "choose them again"),
     ],
 )

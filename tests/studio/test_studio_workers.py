@@ -90,8 +90,8 @@ def test_a_job_that_runs_is_cancelled_at_once_and_the_next_one_runs() -> None:
     ("function", "words"),
     [
         (working.refuse, "this cannot be"),
-        (working.crash, "this went wrong; the terminal says how"),
-        (working.die, "this took more than this computer has, and was ended"),
+        (working.crash, "internal error: see the terminal"),
+        (working.die, "stopped: this computer ran out of memory"),
     ],
 )
 def test_a_job_that_fails_says_so_in_a_line_and_the_next_one_runs(function: Any, words: str) -> None:
@@ -107,7 +107,7 @@ def test_a_job_that_fails_says_so_in_a_line_and_the_next_one_runs(function: Any,
 
 @pytest.mark.parametrize("hook", ["finish", "collect"])
 @pytest.mark.parametrize(
-    ("error", "words"), [(MotionMindError("no space left"), "no space left"), (KeyError(), "went wrong")]
+    ("error", "words"), [(MotionMindError("no space left"), "no space left"), (KeyError(), "internal error")]
 )
 def test_what_cannot_be_taken_in_fails_and_the_next_job_runs(hook: str, error: Exception, words: str) -> None:
     def broken(_: int) -> None:
@@ -163,7 +163,7 @@ def test_workers_that_do_not_begin_are_given_up(monkeypatch: pytest.MonkeyPatch)
 
     async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
         for _ in range(2):
-            with pytest.raises(MotionMindError, match="the engine does not start"):
+            with pytest.raises(MotionMindError, match="the engine failed to start"):
                 await workers.submit("sum", working.add, 2, 3).result()
 
     run(check)
@@ -233,7 +233,7 @@ def test_a_window_that_reads_slowly_is_told_the_latest_of_each_thing() -> None:
 
 
 def test_a_stream_says_that_it_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(events_module, "_BEAT", 0.01)
+    monkeypatch.setattr(events_module, "_HEARTBEAT_S", 0.01)
 
     async def check() -> None:
         stream = Events().open({})
@@ -245,8 +245,8 @@ def test_a_stream_says_that_it_is_there(monkeypatch: pytest.MonkeyPatch) -> None
 def test_streams_are_limited_and_those_that_end_make_room() -> None:
     async def check() -> None:
         hub = Events()
-        streams: list[AsyncIterator[bytes]] = [hub.open({}) for _ in range(events_module._MOST)]
-        with pytest.raises(MotionMindError, match="windows are open"):
+        streams: list[AsyncIterator[bytes]] = [hub.open({}) for _ in range(events_module._MAX_STREAMS)]
+        with pytest.raises(MotionMindError, match="too many open windows"):
             hub.open({})
         await anext(streams[0])
         await streams[0].aclose()  # type: ignore[attr-defined]
@@ -317,10 +317,10 @@ def test_it_is_told_how_long_it_takes_to_get_ready_at_the_pace_that_it_goes() ->
             ended.append(True)
 
     found = told(steps(), lambda: clock[0])
-    assert [next(found)[2] for _ in range(4)] == ["getting ready, once"] * 4
+    assert [next(found)[2] for _ in range(4)] == ["getting ready, first time only"] * 4
     assert [next(found) for _ in range(4)] == [
-        (110, 160, "getting ready, once: about 2 minutes", False),
-        (120, 160, "getting ready, once: about 9 minutes", False),
+        (110, 160, "getting ready, first time only: about 2 minutes", False),
+        (120, 160, "getting ready, first time only: about 9 minutes", False),
         (130, 190, "getting the rest ready", True),
         (189, 190, "getting the rest ready: a few seconds", True),
     ]

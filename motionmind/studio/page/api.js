@@ -1,33 +1,31 @@
-/** Requests to the studio's server. What fails throws an Error whose message is one line for people. */
+/** Requests to the studio's server. A failure throws an Error with a one-line message for the user. */
 
-const AWAY = "The studio does not answer: has it ended?";
+const AWAY = "The studio does not answer. Is it still running?";
 
-const ANOTHER = 412; // the status of what was asked for a piece that is another now
-
-/** The request could not be made, for nobody answers. */
+/** The server does not answer. */
 export class AwayError extends Error {}
 
-/** What was asked for is of a piece that has become another meanwhile. */
-export class AnotherError extends Error {}
+/** The piece has changed since the request was prepared. */
+export class StaleError extends Error {}
 
 export class Api extends EventTarget {
   constructor() {
     super();
-    /** This window's name: what it did, it alone takes back; a reload keeps it. */
+    /** This window's name, which survives a reload: only this window undoes its edits. */
     this.window = sessionStorage.getItem("motionmind-window") ?? `w${crypto.randomUUID().slice(0, 12)}`;
     sessionStorage.setItem("motionmind-window", this.window);
-    /** @type {(state: any) => void} called with what every edit answers */
+    /** @type {(state: any) => void} called with the answer to every edit */
     this.taken = () => {};
-    /** @type {Promise<any>} over with the last change that was asked for: the next waits, for requests overtake others */
+    /** @type {Promise<any>} settles with the last change: the next one waits, because requests may overtake each other */
     this.changed = Promise.resolve();
-    /** @type {Map<string, Promise<any>>} answers that were asked for before anybody needs them, by their path */
-    this.expected = new Map();
-    /** @type {Promise<any>} over when this browser is let in */
+    /** @type {Map<string, Promise<any>>} prefetched answers by path */
+    this.prefetched = new Map();
+    /** @type {Promise<any>} settles when this browser is authorised */
     this.entered = this.#enter();
-    this.entered.catch(() => {}); // who waits for it hears why
+    this.entered.catch(() => {}); // requests that wait for it report the error
   }
 
-  /** Exchange the token in the address, if there is one, for the cookie that lets this browser in. */
+  /** Exchange the token in the URL, if there is one, for the cookie. */
   async #enter() {
     const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? location.hash.slice(1);
     if (!token) return;
@@ -35,18 +33,18 @@ export class Api extends EventTarget {
     await this.post("/api/enter", { token });
   }
 
-  /** Ask now for what will be needed soon, once. @param {string} path @returns {Promise<any>} */
-  expect(path) {
+  /** Fetch a path now for one later `get`. @param {string} path @returns {Promise<any>} */
+  prefetch(path) {
     const answer = this.entered.then(() => this.#ask(path, { method: "GET" }));
     answer.catch(() => {});
-    this.expected.set(path, answer);
+    this.prefetched.set(path, answer);
     return answer;
   }
 
   /** @param {string} path @returns {Promise<any>} */
   get(path) {
-    const answer = this.expected.get(path);
-    this.expected.delete(path);
+    const answer = this.prefetched.get(path);
+    this.prefetched.delete(path);
     return answer ?? this.#ask(path, { method: "GET" });
   }
 
@@ -65,22 +63,22 @@ export class Api extends EventTarget {
     return this.#ask(path, { method: "POST", body: file, headers: { "X-Name": encodeURIComponent(name) } });
   }
 
-  /** A file that the server makes: its answer. @param {string} path @returns {Promise<Response>} */
+  /** Fetch a file that the server makes. @param {string} path @returns {Promise<Response>} */
   file(path) {
     return this.#answer(path, { method: "GET" });
   }
 
-  /** Edit the project: the new state, which the store has taken over. @param {object} edit */
+  /** Edit the project; return the new state, which the store has taken. @param {object} edit */
   edit(edit) {
     return this.#change("/api/edits", { edit });
   }
 
-  /** Put an alternative that a search found onto the line of time. @param {string} job @param {number} alternative from 1 */
+  /** Add an alternative that a search found to the time line. @param {string} job @param {number} alternative from 1 */
   accept(job, alternative) {
     return this.#change("/api/between/accept", { job, alternative });
   }
 
-  /** Make the order of a variation the piece that it was proposed for. @param {object} edit @param {string} basis of the proposal */
+  /** Make a proposed variation the piece. @param {object} edit @param {string} basis of the proposal */
   arrange(edit, basis) {
     return this.#change("/api/vary/accept", { edit, basis });
   }
@@ -101,7 +99,7 @@ export class Api extends EventTarget {
       return state;
     };
     const changed = this.changed.then(change);
-    this.changed = changed.catch(() => {}); // who asked hears of what failed
+    this.changed = changed.catch(() => {}); // the caller gets the error
     return changed;
   }
 
@@ -112,14 +110,14 @@ export class Api extends EventTarget {
 
   /** @param {string} path @param {RequestInit} request */
   async #answer(path, request) {
-    if (request.method !== "GET") this.expected.clear(); // what was answered before may be so no more
+    if (request.method !== "GET") this.prefetched.clear(); // prefetched answers may be out of date
     const headers = { "X-MotionMind": "studio", ...request.headers };
     const answer = await fetch(path, { ...request, headers, credentials: "same-origin" }).catch(() => {
       throw new AwayError(AWAY);
     });
     if (answer.ok) return answer;
     const { error } = await answer.json().catch(() => ({}));
-    const Kind = answer.status === ANOTHER ? AnotherError : Error;
+    const Kind = answer.status === 412 ? StaleError : Error;
     throw new Kind(error ?? `The studio answered with ${answer.status}.`);
   }
 }

@@ -1,4 +1,4 @@
-/** The page put together: what every panel gets as `studio`, and where each panel stands. */
+/** Assemble the page: the `studio` object that every panel gets, and the layout of the panels. */
 
 import { html, render, useLayoutEffect, useRef } from "./vendor/htm-preact-standalone.js";
 import { api, pictured } from "./begin.js";
@@ -18,13 +18,13 @@ import { Panel as Timeline } from "./timeline/panel.js";
 import * as vary from "./vary/panel.js";
 import { Viewer } from "./viewer.js";
 
-/** The panels by name, in their order on the rail: what each is called, and its views. */
+/** The panels in their order on the rail: labels and views. */
 const PANELS = [
   { name: "between", words: "A to B", about: "From one posture to another", views: between },
   { name: "vary", words: "Variations", about: "The piece in another order", views: vary },
-  { name: "pose", words: "Pose", about: "A posture, moved by hand", views: pose },
-  { name: "movement", words: "Movement", about: "One's own movement, and corpora", views: movement },
-  { name: "take", words: "Take away", about: "Film, Blender, a page: take the piece away", views: take },
+  { name: "pose", words: "Pose", about: "Pose a body by hand", views: pose },
+  { name: "movement", words: "Movement", about: "Your own movement, and corpora", views: movement },
+  { name: "take", words: "Export", about: "Export the piece: film, Blender, web page", views: take },
 ];
 
 class Open extends EventTarget {
@@ -43,7 +43,7 @@ function Studio({ studio, open }) {
   const { views, about } = PANELS.find((panel) => panel.name === name) ?? PANELS[0];
   const Centre = "Centre" in views ? views.Centre : null;
   const aside = useRef(/** @type {any} */ (null));
-  useLayoutEffect(() => (aside.current.scrollTop = 0), [name]); // where the panel before was scrolled to is not where this begins
+  useLayoutEffect(() => (aside.current.scrollTop = 0), [name]); // each panel starts at the top
   return html`<${Bar} studio=${studio} />
     <${Rail} name=${name} open=${open} />
     <aside ref=${aside} class="panel" aria-label="Panel">
@@ -59,7 +59,7 @@ function Studio({ studio, open }) {
     <${Shown} toasts=${studio.toasts} />`;
 }
 
-/** The five panels, one stop of the Tab key; arrows lead on. @param {{name: string, open: Open}} props */
+/** Tabs of the five panels: one Tab stop, and arrow keys move between them. @param {{name: string, open: Open}} props */
 function Rail({ name, open }) {
   const move = (/** @type {KeyboardEvent} */ event) => {
     const by = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 }[event.key];
@@ -91,21 +91,21 @@ function Rail({ name, open }) {
   </nav>`;
 }
 
-const LONGEST = 3000; // milliseconds that the body waits for the small pictures
+const PICTURES_TIMEOUT_MS = 3000; // the 3D view waits this long for the thumbnails
 
-/** Wait until what is on the page now is painted. */
+/** Wait until the page is painted. */
 function painted() {
   return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
 }
 
 async function start() {
-  const shown = Promise.race([pictured.then(painted), new Promise((done) => setTimeout(done, LONGEST))]);
+  const shown = Promise.race([pictured.then(painted), new Promise((done) => setTimeout(done, PICTURES_TIMEOUT_MS))]);
   const open = new Open();
   const toasts = new Toasts();
   const keys = new Keys();
   const store = new Store(api);
   const viewer = new Viewer();
-  /** Do something that may fail, and say in one line why it did. @param {() => Promise<any>} doing */
+  /** Run an action; show its error in one line. @param {() => Promise<any>} doing */
   const act = async (doing) => {
     try {
       return await doing();
@@ -121,15 +121,15 @@ async function start() {
     toasts,
     keys,
     window: api.window,
-    /** Wait until the first small pictures are painted, but not for long. @returns {Promise<unknown>} */
+    /** Wait, briefly, until the first thumbnails are painted. @returns {Promise<unknown>} */
     pictured: () => shown,
     open: (/** @type {string} */ panel) => open.set(panel),
     say: toasts.say.bind(toasts),
     act,
-    /** As `act`, but not again while the same, by its name, is being done: for what a button or a key begins. */
+    /** Like `act`, but ignore a repeat with the same name while it runs: for buttons and keys. */
     once: oncer(act),
   };
-  Object.assign(window, { studio }); // for tests, and for whoever is curious
+  Object.assign(window, { studio }); // for tests and the console
   render(html`<${Studio} studio=${studio} open=${open} />`, /** @type {Element} */ (document.getElementById("studio")));
   await studio.act(() => store.start());
   for (const words of store.state?.words ?? []) studio.say(words);

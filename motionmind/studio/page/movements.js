@@ -1,14 +1,14 @@
-/** Movement by its key, as the player shows it; what was fetched once is kept as long as there is room. */
+/** Movements by key, for the player, with a cache. */
 
 import { Body } from "motionmind/body";
 import { Motion } from "motionmind/motion";
 import { movementAt, stable } from "./places.js";
 
-const MOST = 48; // movements that are kept, the latest used
+const MAX_CACHED = 48; // movements, the most recently used
 /** @type {Map<string, Promise<any>>} */
-const kept = new Map();
+const cache = new Map();
 /** @type {Map<string, {body: Body, colours: object}>} */
-const bodies = new Map(); // bodies are many movements', and what draws them takes a while to make
+const bodies = new Map(); // shared by many movements: meshes take a while to build
 
 /**
  * Fetch a movement: a Motion of the player, with its `key`, its `body` and its `colours`.
@@ -17,18 +17,18 @@ const bodies = new Map(); // bodies are many movements', and what draws them tak
  * @returns {Promise<any>}
  */
 export function movement(api, key) {
-  const now = stable(key); // one's own posture may have been saved again since
-  const known = kept.get(now);
-  kept.delete(now);
+  const now = stable(key); // a saved posture may have been replaced since
+  const known = cache.get(now);
+  cache.delete(now);
   const found = known ?? api.get(movementAt(key)).then((/** @type {object} */ data) => playable(data, key));
-  if (!known) found.catch(() => kept.delete(now));
-  kept.set(now, found);
-  if (kept.size > MOST) kept.delete(kept.keys().next().value ?? "");
+  if (!known) found.catch(() => cache.delete(now));
+  cache.set(now, found);
+  if (cache.size > MAX_CACHED) cache.delete(cache.keys().next().value ?? "");
   return found;
 }
 
 /**
- * Make what the server tells of a movement one that plays.
+ * Convert the server's data of a movement to a Motion of the player.
  * @param {any} data
  * @param {string} key
  */

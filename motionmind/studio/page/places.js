@@ -1,14 +1,14 @@
-/** Where on the server a movement and its pictures are, by its key. */
+/** URLs of a movement and its thumbnails, by its key. */
 
-/** @type {Map<string, string>} the movements that one's own postures are now, by their keys */
+/** @type {Map<string, string>} keys of the movements that hold the saved postures, by the postures' keys */
 let own = new Map();
 
-/** Know what is saved: a posture that is replaced is another movement. @param {{name: string, key: string}[]} postures */
+/** Update the saved postures: a replaced posture has another movement. @param {{name: string, key: string}[]} postures */
 export function knowPostures(postures) {
   own = new Map(postures.map(({ name, key }) => [`own/${name}`, key]));
 }
 
-/** The key of what a movement is now, which no other has. @param {string} key */
+/** The key of the movement that a key stands for now. @param {string} key */
 export function stable(key) {
   return own.get(key) ?? key;
 }
@@ -17,7 +17,7 @@ export function movementAt(/** @type {string} */ key) {
   return `/api/movements/${path(key)}`;
 }
 
-/** Where a picture of a frame is, so many pixels high; it stands on any paper, and a browser keeps it. */
+/** The URL of a thumbnail of a frame, with its height in pixels; the browser caches it. */
 export function thumbnail(/** @type {string} */ key, /** @type {number} */ frame, height = 96) {
   return `/api/thumbnails/${path(stable(key))}/${frame}.png?height=${height}`;
 }

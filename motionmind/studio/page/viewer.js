@@ -1,24 +1,24 @@
-/** The viewer: a movement, or two beside each other, from where the camera is. It knows no edits. */
+/** The viewer: one movement, or two side by side, seen from one camera. It knows no edits. */
 
 import { Pictures } from "motionmind/pictures";
 import { Player } from "motionmind/player";
 import { Stage } from "motionmind/stage";
 import { Theme } from "motionmind/theme";
 
-const STRAYED = 0.1; // share of its reach by which a movement may lead elsewhere before the camera follows
-const STILL = { length: 1, start: 0, end: 0, times: [0], frameAt: () => 0 }; // as long as there is nothing to show
+const CAMERA_SLACK_RATIO = 0.1; // the camera follows a movement that shifts by more than this share of its reach
+const STILL = { length: 1, start: 0, end: 0, times: [0], frameAt: () => 0 }; // while there is nothing to show
 
 /** A stage on a canvas of its own in `half`. @param {HTMLElement} half @param {any} motion @param {() => void} changed */
 function stageIn(half, motion, changed) {
   const canvas = document.createElement("canvas");
   canvas.tabIndex = 0;
   canvas.setAttribute("role", "img");
-  canvas.setAttribute("aria-label", "The body in 3D: drag to turn, scroll to come nearer");
+  canvas.setAttribute("aria-label", "The body in 3D: drag to rotate, scroll to zoom");
   half.append(canvas);
   return new Stage(canvas, motion, motion.body, motion.colours, changed);
 }
 
-/** Fires "show" when another movement is shown, and "change" when something beside the time has changed. */
+/** Fires "show" when another movement is shown, and "draw" after each picture. */
 export class Viewer extends EventTarget {
   #covered = false;
 
@@ -43,14 +43,14 @@ export class Viewer extends EventTarget {
     this.stage = undefined;
     /** @type {any} */
     this.other = undefined;
-    /** @type {{middle: any, reach: number} | undefined} where the movement led when the camera was set up */
+    /** @type {{middle: any, reach: number} | undefined} the region of movement that the camera was set up for */
     this.framed = undefined;
     this.pictures = new Pictures(this.player, () => this.#draw());
     this.theme.addEventListener("change", () => this.#colour());
     this.#colour();
   }
 
-  /** Whether something else is shown over it. */
+  /** Whether something else covers it. */
   get covered() {
     return this.#covered;
   }
@@ -61,17 +61,17 @@ export class Viewer extends EventTarget {
   }
 
   /**
-   * Show the piece, now or when whoever looks at something else comes back.
+   * Show the piece, now or when the user returns to it.
    * @param {any} motion
    * @param {{time?: number}} how
    */
   home(motion, { time } = {}) {
     this.piece = motion;
     if (this.isHome || !this.motion) this.#take(motion, { time, title: "", home: true, look: false });
-    else this.dispatchEvent(new Event("show")); // there is a piece to come back to
+    else this.dispatchEvent(new Event("show")); // there is a piece to return to
   }
 
-  /** Forget the piece, which nothing is left of; whoever looks at something else goes on. */
+  /** Forget the piece, which is empty now; another movement stays in view. */
   clear() {
     this.piece = undefined;
     if (!this.isHome || !this.motion) return;
@@ -85,14 +85,14 @@ export class Viewer extends EventTarget {
 
   /** Show the piece again. */
   back() {
-    this.isHome = true; // also of a piece that is to come
+    this.isHome = true; // also if the piece is yet to load
     if (this.piece) this.#take(this.piece, { title: "", home: true, look: true });
     else this.dispatchEvent(new Event("show"));
   }
 
   /**
    * Show a movement that is not the piece.
-   * @param {any} motion a Motion, or what has its interface, with `body` and `colours`
+   * @param {any} motion a Motion, or an object with its interface, with `body` and `colours`
    * @param {{time?: number, beside?: any, title?: string, besideTitle?: string, play?: boolean, look?: boolean}} how
    */
   show(motion, { time, beside, title = "", besideTitle = "", play = false, look = true } = {}) {
@@ -101,7 +101,7 @@ export class Viewer extends EventTarget {
     if (play && !matchMedia("(prefers-reduced-motion: reduce)").matches) this.player.play();
   }
 
-  /** Have another picture drawn. */
+  /** Request a new picture. */
   stale() {
     this.pictures.ask();
   }
@@ -114,7 +114,7 @@ export class Viewer extends EventTarget {
     this.stale();
   }
 
-  /** Where what is shown now comes from: a movement's key and frame; null where that is not known. */
+  /** The movement's key and frame in view; null if unknown. */
   get moment() {
     const { motion, player } = this;
     if (!motion) return null;
@@ -150,11 +150,11 @@ export class Viewer extends EventTarget {
     if (look || this.#strays()) this.look(this.stage.view ?? "quarter");
   }
 
-  /** Whether a movement leads elsewhere than the one that the camera was set up for, and nobody has turned it since. */
+  /** Whether the movement goes elsewhere than the one that the camera was set up for, and the user has not turned it since. */
   #strays() {
     const { middle, reach, view } = this.stage;
     const before = this.framed;
-    return Boolean(view) && (!before || before.middle.distanceTo(middle) + Math.abs(before.reach - reach) > STRAYED * reach);
+    return Boolean(view) && (!before || before.middle.distanceTo(middle) + Math.abs(before.reach - reach) > CAMERA_SLACK_RATIO * reach);
   }
 
   /** @param {HTMLElement} half @param {any} motion */
@@ -167,7 +167,7 @@ export class Viewer extends EventTarget {
     return stage;
   }
 
-  /** Let both cameras be one. @param {HTMLElement} half the one that was turned */
+  /** Synchronise both cameras. @param {HTMLElement} half the half that the user turned */
   #follow(half) {
     const [stage, other] = half === this.halves[0] ? [this.stage, this.other] : [this.other, this.stage];
     if (!this.beside || !other || !stage?.dragged) return;
@@ -184,7 +184,7 @@ export class Viewer extends EventTarget {
     const message = made("message empty");
     message.setAttribute("role", "alert");
     message.textContent =
-      "This browser shows no 3D pictures (WebGL 2 is not available). Turn on hardware acceleration in its settings, or " +
+      "This browser cannot show 3D (WebGL 2 is not available). Turn on hardware acceleration in its settings, or " +
       "open the studio in another browser.";
     this.element.append(message);
   }

@@ -1,17 +1,16 @@
-/** Alternatives side by side, in step: what each shows, how sure and how usual it is, and where each joint was seen. */
+/** Alternatives side by side, in step: how good and how usual each is, and where the corpus shows each joint. */
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { thumbnail } from "../places.js";
 import { awaited } from "../store.js";
 import { useChange, useKeys } from "../shell/hooks.js";
 import { icon } from "../shell/icons.js";
-import { deskOf } from "./desk.js";
+import { deskOf, MAX_ALTERNATIVES } from "./desk.js";
 import { Joints, seenWords, jointName } from "./joints.js";
-import { Quartet, STILL } from "./quartet.js";
+import { CLICK_SLACK_PX, Quartet } from "./quartet.js";
 
-const COUNT = 4;
 const GROUP = "Alternatives";
-const NEARER = 0.95;
+const ZOOM_RATIO = 0.95;
 
 /** @param {{studio: any}} props */
 export function Centre({ studio }) {
@@ -36,7 +35,7 @@ function Alternatives({ studio }) {
   const dark = useChange(theme, () => theme.dark);
   const [quartet, setQuartet] = useState(/** @type {Quartet | null} */ (null));
   const section = useRef(/** @type {any} */ (null));
-  // Whoever came from the gallery by keys goes on there.
+  // Return the focus to the gallery on closing.
   useLayoutEffect(() => {
     const before = /** @type {HTMLElement | null} */ (document.activeElement);
     return () => {
@@ -55,59 +54,59 @@ function Alternatives({ studio }) {
   }, [quartet, found]);
   const accept = () => desk.accept();
   useKeys(studio, [
-    { keys: [" "], does: "play or pause all of them", group: GROUP, act: () => quartet?.player.toggle() },
-    ...Array.from({ length: COUNT }, (_, i) => ({
+    { keys: [" "], does: "play or pause all", group: GROUP, act: () => quartet?.player.toggle() },
+    ...Array.from({ length: MAX_ALTERNATIVES }, (_, i) => ({
       keys: [String(i + 1)],
       does: `choose alternative ${i + 1}`,
       group: GROUP,
       act: () => {
         desk.choose(i);
-        document.getElementById(`alternative-${i}`)?.focus(); // where Enter accepts, and arrows go from joint to joint
+        document.getElementById(`alternative-${i}`)?.focus(); // there Enter accepts, and arrow keys go from joint to joint
       },
     })),
-    { keys: ["Enter"], does: "accept the one that is chosen", group: GROUP, act: accept },
+    { keys: ["Enter"], does: "accept the chosen one", group: GROUP, act: accept },
     { keys: ["Escape"], does: "back to the viewer", group: GROUP, act: () => desk.show(false) },
   ]);
   const searching = state === "searching";
   return html`<section ref=${section} class="centre alternatives" data-testid="alternatives" data-state=${state} aria-label="Alternatives" aria-busy=${String(searching)}>
     <header class="row">
       <h2 class="grow">${desk.away ? "Not searched yet" : heading(state, found.length)}</h2>
-      <p class="hint" role="status">${searching && words && getting ? `${getting}; then it begins, and all else works meanwhile.` : words}</p>
+      <p class="hint" role="status">${searching && words && getting ? `${getting}. The search starts then.` : words}</p>
       ${searching && html`<button class="button" onClick=${() => desk.stop()}>Cancel</button>`}
       <button class="button quiet icon" aria-label="Back to the viewer" title="Back to the viewer (Esc)" onClick=${() => desk.show(false)}>
         ${icon("close")}
       </button>
     </header>
-    ${state === "failed" && !desk.away && html`<p class="empty">No movement joins these two postures. Try another posture, or another length.</p>`}
+    ${state === "failed" && !desk.away && html`<p class="empty">No movement joins these postures. Try another posture or duration.</p>`}
     <div class="four" role="radiogroup" aria-label="Alternatives" hidden=${state === "failed"}>
-      ${Array.from({ length: state === "found" ? found.length : COUNT }, (_, i) =>
+      ${Array.from({ length: state === "found" ? found.length : MAX_ALTERNATIVES }, (_, i) =>
         found[i]
           ? html`<${Alternative} key=${i} desk=${desk} quartet=${quartet} index=${i} chosen=${chosen === i} account=${found[i].account} motion=${found[i].motion} />`
           : html`<${Waiting} key=${i} ends=${searching ? desk.ends : {}} begun=${!words} />`,
       )}
     </div>
-    <p class="hint chosen-words">${said(found[chosen]?.account)}</p>
+    <p class="hint chosen-words">${summary(found[chosen]?.account)}</p>
     <footer class="row">
       ${quartet && html`<${Play} quartet=${quartet} ready=${found.length > 0} />`}
-      <button class="button primary" data-testid="accept" disabled=${!found[chosen]} title="Put it onto the line of time (Enter)" onClick=${accept}>
+      <button class="button primary" data-testid="accept" disabled=${!found[chosen]} title="Add it to the time line (Enter)" onClick=${accept}>
         ${icon("check")} Accept ${found.length > 1 ? chosen + 1 : ""}
       </button>
     </footer>
   </section>`;
 }
 
-/** What stands below each, for where there is no room below them. @param {any} account */
-function said(account) {
+/** The description of an alternative in one line, for small screens. @param {any} account */
+function summary(account) {
   return account ? [account.differs, account.usual, account.sure, ...account.beyond].filter(Boolean).join("; ") : "";
 }
 
-/** The place of one that is yet to be found: both its ends, pale. @param {any} props */
+/** A placeholder for an alternative to come: both its ends, pale. @param {any} props */
 function Waiting({ ends, begun }) {
   const places = [ends.a, ends.b].filter(Boolean);
   return html`<div class="alternative card waiting">
     <div class="window">
       ${places.length > 0 && html`<div>${places.map(({ key, frame }) => html`<img src=${thumbnail(key, frame, 128)} alt="" />`)}</div>
-        <span class="hint">${begun ? "looking…" : "waiting…"}</span>`}
+        <span class="hint">${begun ? "searching…" : "waiting…"}</span>`}
     </div>
   </div>`;
 }
@@ -116,7 +115,7 @@ function Waiting({ ends, begun }) {
 function heading(state, count) {
   if (state === "failed") return "Nothing found";
   if (state === "searching") return "From A to B…";
-  return count === 1 ? "From A to B: one way" : `From A to B: ${count} ways`;
+  return count === 1 ? "From A to B: one movement" : `From A to B: ${count} movements`;
 }
 
 /** @param {any} props */
@@ -136,7 +135,7 @@ function Alternative({ desk, quartet, index, chosen, account, motion }) {
       return;
     }
     const { x, y } = from.current;
-    if (!from.current.moved && Math.hypot(event.clientX - x, event.clientY - y) < STILL) return;
+    if (!from.current.moved && Math.hypot(event.clientX - x, event.clientY - y) < CLICK_SLACK_PX) return;
     const { clientWidth, clientHeight } = canvas.current;
     quartet?.turn((event.clientX - x) / clientWidth, (event.clientY - y) / clientHeight);
     from.current = { x: event.clientX, y: event.clientY, moved: true };
@@ -165,7 +164,7 @@ function Alternative({ desk, quartet, index, chosen, account, motion }) {
       data-testid="alternative-${index + 1}"
       role="radio"
       aria-checked=${String(chosen)}
-      aria-label="Alternative ${index + 1}: ${[account.words, account.differs].filter(Boolean).join("; ")}. Up and down go from joint to joint."
+      aria-label="Alternative ${index + 1}: ${[account.words, account.differs].filter(Boolean).join("; ")}. Up and down arrows go from joint to joint."
       tabindex=${chosen ? 0 : -1}
       onClick=${() => !from.current?.moved && desk.choose(index)}
       onKeyDown=${key}
@@ -182,7 +181,7 @@ function Alternative({ desk, quartet, index, chosen, account, motion }) {
         }}
         onWheel=${(/** @type {WheelEvent} */ event) => {
           event.preventDefault();
-          quartet?.near(event.deltaY < 0 ? NEARER : 1 / NEARER);
+          quartet?.zoom(event.deltaY < 0 ? ZOOM_RATIO : 1 / ZOOM_RATIO);
         }}
       ></canvas>
       <span class="number" aria-hidden="true">${chosen ? icon("check") : ""}${index + 1}</span>
@@ -223,7 +222,7 @@ function Play({ quartet, ready }) {
       aria-label="Time of all alternatives"
       disabled=${!ready}
       onInput=${(/** @type {any} */ event) => {
-        const share = Number(event.target.value); // before pausing, which puts the line back
+        const share = Number(event.target.value); // before pausing, which resets the slider
         player.pause();
         player.seek(share * player.motion.end);
       }}

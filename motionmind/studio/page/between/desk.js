@@ -1,39 +1,39 @@
-/** From A to B: which two postures, what was found between them, and which of it is chosen. It knows no views. */
+/** From A to B: both postures, the alternatives found, and the chosen one. It knows no views. */
 
 import { AwayError } from "../api.js";
 import { playable } from "../movements.js";
 
-const MOST = 4; // alternatives
-export const DRAGGED = "application/x-motionmind-posture";
+export const MAX_ALTERNATIVES = 4;
+export const POSTURE_TYPE = "application/x-motionmind-posture"; // of data in a drag
 
 /**
- * @typedef {{key: string, frame: number, title: string}} Place
+ * @typedef {{key: string, frame: number, last?: number, title: string}} Place
  * @typedef {{begins: number, ends: number, how: string, where: string, key: string, at: number, degrees: number}} Stretch
  * @typedef {{number: number, seconds: number, words: string, differs: string, sure: string, usual: string,
  *   beyond: string[], joints: Record<string, Stretch[]>}} Account
  */
 
-export class Desk extends EventTarget {
+class Desk extends EventTarget {
   /** @param {any} studio */
   constructor(studio) {
     super();
     this.studio = studio;
     /** @type {{a: Place | null, b: Place | null}} */
     this.ends = { a: null, b: null };
-    /** @type {Place | null} what was picked in the gallery last */
+    /** @type {Place | null} the posture last picked in the gallery */
     this.choice = null;
-    this.seconds = 0; // that the movement is to take; 0 leaves it to the corpus
+    this.seconds = 0; // wished duration; 0 leaves it to the corpus
     /** @type {{account: Account, motion: any}[]} */
     this.found = [];
     this.chosen = 0;
-    /** @type {string | null} the job that searches, or searched */
+    /** @type {string | null} the search's job */
     this.job = null;
     this.state = "idle"; // "idle" | "searching" | "found" | "failed"
     this.words = "";
-    this.away = false; // whether nobody was there to search
+    this.away = false; // whether the server did not answer
     this.shown = false;
-    this.asked = 0; // counts searches, so that what comes late is known
-    /** @type {any} what was heard of the job last */
+    this.asked = 0; // counts searches, to recognise late answers
+    /** @type {any} the job's last known state */
     this.seen = null;
     this.taking = 0; // the search whose movements are being fetched
     studio.store.addEventListener("change", () => this.#follow());
@@ -69,7 +69,7 @@ export class Desk extends EventTarget {
     this.search();
   }
 
-  /** Find alternatives, if both ends are there; what was being sought before is given up. */
+  /** Search for alternatives if both ends are set; cancel an earlier search. */
   async search() {
     this.stop();
     const { a, b } = this.ends;
@@ -93,7 +93,7 @@ export class Desk extends EventTarget {
     }
   }
 
-  /** Give up what is being sought. */
+  /** Cancel the search. */
   stop() {
     this.asked++;
     if (this.state === "searching" && this.job) this.studio.api.delete(`/api/jobs/${this.job}`).catch(() => {});
@@ -115,7 +115,7 @@ export class Desk extends EventTarget {
     this.#changed();
   }
 
-  /** Put the chosen alternative onto the line of time. */
+  /** Add the chosen alternative to the time line. */
   accept() {
     return this.studio.once("accept", () => this.#accept());
   }
@@ -125,45 +125,45 @@ export class Desk extends EventTarget {
     if (!this.found[chosen]) return;
     const { viewer, api, store } = this.studio;
     await api.accept(/** @type {string} */ (job), chosen + 1);
-    // The next movement goes on from here.
+    // The next movement starts here.
     Object.assign(this, { ends: { a: this.ends.b, b: null }, choice: null, found: [], state: "idle", shown: false, job: null });
     viewer.back();
     const seam = store.state.piece.seams.at(-1);
     if (seam) {
       store.set({ selection: { seam: [seam.left, seam.right] } });
-      viewer.player.seek(seam.at); // where what was accepted begins
+      viewer.player.seek(seam.at); // the start of the accepted movement
     }
     this.#changed();
     this.dispatchEvent(new Event("accepted"));
   }
 
-  /** What the job has come to. */
+  /** Handle the job's new state. */
   async #follow() {
     const job = this.#latest;
     if (!job || job === this.seen) return;
     this.seen = job;
-    this.words = job.state === "waiting" ? "It waits until the engine is free." : "";
+    this.words = job.state === "waiting" ? "Waiting for the engine." : "";
     if (job.state === "failed") {
       if (job.lost) {
-        this.job = null; // nobody is left to give it up
+        this.job = null; // the job no longer exists
         this.search();
       } else this.#fail(job.words);
       return;
     }
     this.#changed();
-    if (this.taking === this.asked) return; // whoever takes in movements sees this, too
+    if (this.taking === this.asked) return; // the loop under way sees this too
     const { asked } = this;
     this.taking = asked;
     await this.studio.act(() => this.#takeIn(asked));
     if (this.taking === asked) this.taking = 0;
     if (asked === this.asked && this.#latest?.state === "done") {
-      this.words = this.found.length < MOST ? "Nothing else differs enough." : "";
+      this.words = this.found.length < MAX_ALTERNATIVES ? "No other movement differs enough." : "";
       this.state = "found";
       this.#changed();
     }
   }
 
-  /** Fetch the movements that are found, one after another. @param {number} asked */
+  /** Fetch the found movements, one after another. @param {number} asked */
   async #takeIn(asked) {
     for (;;) {
       const account = this.#latest?.partial?.[this.found.length];
@@ -175,7 +175,7 @@ export class Desk extends EventTarget {
     }
   }
 
-  /** The job that searches, as it was told of last. */
+  /** The last known state of the search's job. */
   get #latest() {
     return this.job && this.state === "searching" ? this.studio.store.jobs.get(this.job) : undefined;
   }
@@ -201,10 +201,10 @@ function bare({ key, frame }) {
   return { key, frame };
 }
 
-/** The place that is being dragged onto something, or null. @param {DragEvent} event @returns {Place | null} */
+/** The place in a drag, or null. @param {DragEvent} event @returns {Place | null} */
 export function dropped(event) {
   try {
-    return JSON.parse(event.dataTransfer?.getData(DRAGGED) ?? "");
+    return JSON.parse(event.dataTransfer?.getData(POSTURE_TYPE) ?? "");
   } catch {
     return null;
   }

@@ -1,14 +1,15 @@
-/** The gallery: postures that have names, clips whose every frame is one, and one's own. */
+/** The gallery: named postures, frames of clips, and the user's own postures. */
 
 import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { useChange } from "../shell/hooks.js";
 import { icon } from "../shell/icons.js";
 import { movement } from "../movements.js";
 import { thumbnail } from "../places.js";
-import { deskOf, DRAGGED, same } from "./desk.js";
+import { insert, newId } from "../timeline/items.js";
+import { deskOf, POSTURE_TYPE, same } from "./desk.js";
 import { Own } from "./own.js";
 
-const FEW = 24; // clips that are listed before somebody asks for all
+const MAX_LISTED = 24; // clips, until the user asks for all
 
 /** @param {{studio: any}} props */
 export function Gallery({ studio }) {
@@ -19,14 +20,14 @@ export function Gallery({ studio }) {
   const [managing, manage] = useState(false);
   const [sought, seek] = useState("");
   useEffect(() => {
-    if (corpora === "null") return; // nobody has let this browser in yet
+    if (corpora === "null") return; // not authorised yet
     act(() => api.get("/api/gallery")).then((/** @type {any} */ found) => {
       if (!found) return;
       setGallery(found);
-      greet(studio, found);
+      showFirst(studio, found);
     });
   }, [corpora]);
-  // Which stay, though the posture is called something else.
+  // Keys of movements do not change when a posture is renamed.
   const own = (saved ?? []).map((/** @type {any} */ { name, key }) => ({ key, title: name }));
   const fits = (/** @type {{title: string}} */ { title }) => title.toLowerCase().includes(sought.trim().toLowerCase());
   return html`<section class="gallery" data-testid="gallery" aria-label="Gallery">
@@ -35,24 +36,24 @@ export function Gallery({ studio }) {
       ${icon("search")}<span class="aside">Search postures and clips</span>
       <input class="field" type="search" placeholder="Search postures and clips" onInput=${(/** @type {any} */ event) => seek(event.target.value)} />
     </label>
-    ${!gallery && html`<p class="hint" role="status">Looking through the corpus…</p>`}
+    ${!gallery && html`<p class="hint" role="status">Loading the corpus…</p>`}
     ${gallery && own.some(fits) && html`<div class="row"><h3 class="grow">Your own</h3>
-        <button class="button quiet" data-testid="manage-postures" aria-haspopup="dialog" onClick=${() => manage(true)}>Rename, delete</button></div>
+        <button class="button quiet" data-testid="manage-postures" aria-haspopup="dialog" onClick=${() => manage(true)}>Rename or delete</button></div>
       <${Postures} studio=${studio} postures=${own.filter(fits)} />`}
     ${gallery?.corpora.map(
       (/** @type {any} */ corpus) => html`
         ${corpus.postures.filter(fits).length > 0 && html`<h3>Postures of ${corpus.name}</h3>
           <${Postures} studio=${studio} postures=${corpus.postures.filter(fits)} />`}
-        ${corpus.clips.filter(fits).length > 0 && html`<h3>Any moment of ${corpus.name}</h3>
+        ${corpus.clips.filter(fits).length > 0 && html`<h3>Clips of ${corpus.name}</h3>
           <${Clips} studio=${studio} clips=${corpus.clips.filter(fits)} />`}
       `,
     )}
-    ${gallery && sought && !own.some(fits) && nothing(gallery, fits) && html`<p class="empty">Nothing is called “${sought}”.</p>`}
+    ${gallery && sought && !own.some(fits) && nothing(gallery, fits) && html`<p class="empty">No posture or clip is named “${sought}”.</p>`}
   </section>`;
 }
 
-/** Let somebody stand on an empty stage. @param {any} studio @param {any} gallery */
-async function greet(studio, gallery) {
+/** Show the first posture on an empty stage. @param {any} studio @param {any} gallery */
+async function showFirst(studio, gallery) {
   const first = [gallery.own, ...gallery.corpora.flatMap((/** @type {any} */ one) => [one.postures, one.clips])].flat()[0];
   if (!first || studio.viewer.motion || studio.store.state.piece.blocks.length > 0) return;
   const [motion] = await Promise.all([movement(studio.api, first.key), studio.pictured()]);
@@ -80,7 +81,7 @@ function Postures({ studio, postures }) {
           aria-pressed=${String(Boolean(choice && same(choice, place)))}
           title=${title}
           draggable="true"
-          onDragStart=${(/** @type {DragEvent} */ event) => event.dataTransfer?.setData(DRAGGED, JSON.stringify(place))}
+          onDragStart=${(/** @type {DragEvent} */ event) => event.dataTransfer?.setData(POSTURE_TYPE, JSON.stringify(place))}
           onClick=${() => pick(studio, place)}
         >
           <img src=${thumbnail(key, 0)} alt="" loading="lazy" draggable="false" />
@@ -92,7 +93,7 @@ function Postures({ studio, postures }) {
   </ul>`;
 }
 
-/** Pick a posture, and look at it. @param {any} studio @param {any} place */
+/** Pick a posture, and show it. @param {any} studio @param {any} place */
 async function pick(studio, place) {
   const desk = deskOf(studio);
   desk.pick(place);
@@ -106,7 +107,7 @@ function Clips({ studio, clips }) {
   const [open, setOpen] = useState("");
   const [all, setAll] = useState(false);
   return html`<ul class="clips">
-      ${(all ? clips : clips.slice(0, FEW)).map(
+      ${(all ? clips : clips.slice(0, MAX_LISTED)).map(
         (clip) => html`<li key=${clip.key} class=${clip.key === open ? "card" : ""}>
           <button
             class="clip"
@@ -114,7 +115,7 @@ function Clips({ studio, clips }) {
             aria-expanded=${String(clip.key === open)}
             title=${clip.about}
             draggable="true"
-            onDragStart=${(/** @type {DragEvent} */ event) => event.dataTransfer?.setData(DRAGGED, JSON.stringify(whole(clip)))}
+            onDragStart=${(/** @type {DragEvent} */ event) => event.dataTransfer?.setData(POSTURE_TYPE, JSON.stringify(whole(clip)))}
             onClick=${() => setOpen(clip.key === open ? "" : clip.key)}
           >
             <img src=${thumbnail(clip.key, clip.frames >> 1, 64)} alt="" loading="lazy" draggable="false" />
@@ -127,35 +128,34 @@ function Clips({ studio, clips }) {
     </ul>
     ${
       !all &&
-      clips.length > FEW &&
+      clips.length > MAX_LISTED &&
       html`<button class="button" onClick=${() => setAll(true)}>All ${clips.length} clips</button>`
     }`;
 }
 
-/** What is dragged of a clip: all its frames. @param {any} clip */
+/** All frames of a clip, for a drag. @param {any} clip */
 function whole({ key, frames, title }) {
   return { key, frame: 0, last: frames - 1, title };
 }
 
 /**
- * Put a posture, or the frames of a clip up to `last`, at the end of the line of time.
+ * Add a posture, or the frames of a clip up to `last`, to the end of the time line.
  * @param {any} studio
  * @param {{key: string, frame: number, last?: number}} place
  */
-export async function insert(studio, { key, frame, last = frame }) {
-  const id = `b-${crypto.randomUUID().slice(0, 13)}`;
-  const edit = { edit: "insert", id, source: key, first: frame, last, mirrored: false, before: null };
-  if (await studio.once(`insert ${key} ${frame} ${last}`, () => studio.api.edit(edit))) studio.viewer.back();
+export async function append(studio, place) {
+  const edit = insert(newId(studio.window), place);
+  if (await studio.once(`append ${JSON.stringify(place)}`, () => studio.api.edit(edit))) studio.viewer.back();
 }
 
-/** A clip's moments: the viewer shows the one that is scrubbed to. @param {{studio: any, clip: any}} props */
+/** A slider for a clip's frames, which the viewer shows. @param {{studio: any, clip: any}} props */
 function Frames({ studio, clip }) {
   const desk = deskOf(studio);
   const { viewer } = studio;
   const [frame, setFrame] = useState(0);
   const motion = useRef(/** @type {any} */ (null));
-  const wanted = useRef(-1); // the frame that was sought before the movement came
-  const taken = useRef(false); // whether all of it was put onto the time line before that
+  const wanted = useRef(-1); // the frame wanted before the movement loaded
+  const taken = useRef(false); // whether the whole clip was added before that
   const place = (/** @type {number} */ at) => ({ key: clip.key, frame: at, title: `${clip.title} ${at}` });
   useEffect(() => {
     let here = true;
@@ -163,9 +163,9 @@ function Frames({ studio, clip }) {
     studio.act(() => movement(studio.api, clip.key)).then((/** @type {any} */ found) => {
       if (!here || !found) return;
       motion.current = found;
-      if (desk.shown || taken.current) return; // somebody was quicker
-      const sought = wanted.current >= 0;
-      viewer.show(found, { time: sought ? found.times[wanted.current] : found.start, title: clip.title, play: !sought });
+      if (desk.shown || taken.current) return; // the user was quicker
+      const isWanted = wanted.current >= 0;
+      viewer.show(found, { time: isWanted ? found.times[wanted.current] : found.start, title: clip.title, play: !isWanted });
     });
     const follow = () => viewer.motion === motion.current && setFrame(viewer.player.frame);
     viewer.player.addEventListener("change", follow);
@@ -194,7 +194,7 @@ function Frames({ studio, clip }) {
       min="0"
       max=${clip.frames - 1}
       value=${frame}
-      aria-label="Moment of ${clip.title}"
+      aria-label="Frame of ${clip.title}"
       aria-valuetext="frame ${frame} of ${clip.frames - 1}"
       data-testid="frames"
       onInput=${seek}
@@ -204,8 +204,8 @@ function Frames({ studio, clip }) {
         class="hint numbers grow moment"
         data-testid="moment"
         draggable="true"
-        title="Drag this moment to A, to B or to the time line"
-        onDragStart=${(/** @type {DragEvent} */ event) => event.dataTransfer?.setData(DRAGGED, JSON.stringify(place(frame)))}
+        title="Drag this frame to A, B or the time line"
+        onDragStart=${(/** @type {DragEvent} */ event) => event.dataTransfer?.setData(POSTURE_TYPE, JSON.stringify(place(frame)))}
         >⠿ frame ${frame} of ${clip.frames - 1}</span
       >
       <button class="button" onClick=${() => set("a")}>As A</button>
@@ -213,7 +213,7 @@ function Frames({ studio, clip }) {
     </div>
     <button class="button" data-testid="insert-clip" onClick=${() => {
       taken.current = true;
-      insert(studio, whole(clip));
-    }}>All of it, onto the time line</button>
+      append(studio, whole(clip));
+    }}>Add the clip to the time line</button>
   </div>`;
 }

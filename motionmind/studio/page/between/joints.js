@@ -1,11 +1,11 @@
-/** Where each joint of an alternative was seen, in words. */
+/** Where the corpus shows each joint of an alternative, in words. */
 
 import { html } from "../vendor/htm-preact-standalone.js";
 
 const HOW = /** @type {Record<string, string>} */ ({
   waits: "waits",
-  new: "moves as in no clip",
-  between: "goes smoothly between what was seen",
+  new: "not in any clip",
+  between: "blends seen movements",
 });
 
 /** A joint's name in words. @param {string} name */
@@ -14,7 +14,7 @@ export function jointName(name) {
 }
 
 /**
- * What a joint does at a moment.
+ * Describe a joint's movement at a time.
  * @param {import("./desk.js").Stretch[] | undefined} stretches
  * @param {number} time seconds
  */
@@ -28,7 +28,7 @@ function words(stretch) {
   return stretch.how === "seen" ? `seen in ${stretch.where}` : HOW[stretch.how];
 }
 
-/** Each joint's way from beginning to end. @param {{account: import("./desk.js").Account, point: (joint: string | null) => void}} props */
+/** The stretches of each joint. @param {{account: import("./desk.js").Account, point: (joint: string | null) => void}} props */
 export function Joints({ account, point }) {
   return html`<details class="joints">
     <summary>Joint by joint</summary>

@@ -1,29 +1,29 @@
-/** Postures of one's own: renamed and deleted. What was made of them stays as it is. */
+/** Rename and delete the user's own postures. The piece does not change. */
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { thumbnail } from "../places.js";
 import { useChange } from "../shell/hooks.js";
 
-const LONGEST = 40; // characters of a name, as where it is saved
+const MAX_NAME_LENGTH = 40; // as in pose/keep.js
 
 /** @typedef {{name: string, key: string}} Saved */
 
-/** The sheet on which they are. @param {{studio: any, close: () => void}} props */
+/** The dialog. @param {{studio: any, close: () => void}} props */
 export function Own({ studio, close }) {
   const { store, api } = studio;
   const dialog = useRef(/** @type {any} */ (null));
   const restore = useRef(/** @type {any} */ (null));
-  const brought = useRef(0); // whoever brings a posture back may delete it at once again
+  const restored = useRef(0); // counts restored postures, which the user may delete again at once
   /** @type {Saved[]} */
   const postures = useChange(store, () => store.state.postures);
   const [wrong, setWrong] = useState("");
   const [gone, setGone] = useState(/** @type {Saved | null} */ (null));
   useLayoutEffect(() => dialog.current.showModal(), []);
-  useEffect(() => restore.current?.focus(), [gone]); // what had the focus is gone
+  useEffect(() => restore.current?.focus(), [gone]); // the focused row is gone
   const has = (/** @type {string} */ name) => store.state.postures.some((/** @type {Saved} */ one) => one.name === name);
   const rename = (/** @type {Saved} */ one, /** @type {string} */ name) => {
     setGone(null);
-    setWrong(has(name) ? `${name} is there already: choose another name.` : "");
+    setWrong(has(name) ? `${name} already exists: choose another name.` : "");
     if (has(name)) return;
     const edits = [
       { edit: "posture", name, posture: one.key },
@@ -32,32 +32,32 @@ export function Own({ studio, close }) {
     studio.once(`rename ${one.name}`, () => api.edit({ edit: "several", words: "rename a posture", edits }));
   };
   const remove = (/** @type {Saved} */ one) =>
-    studio.once(`delete ${one.name} ${brought.current}`, async () => {
+    studio.once(`delete ${one.name} ${restored.current}`, async () => {
       await api.edit({ edit: "posture", name: one.name, posture: null });
       setWrong("");
       setGone(one);
     });
-  const bring = (/** @type {Saved} */ { name, key }) => {
+  const bringBack = (/** @type {Saved} */ { name, key }) => {
     setGone(null);
-    studio.once(`restore ${name} ${brought.current++}`, () => api.edit({ edit: "posture", name, posture: key }));
+    studio.once(`restore ${name} ${restored.current++}`, () => api.edit({ edit: "posture", name, posture: key }));
   };
   return html`<dialog ref=${dialog} class="sheet own-postures" data-testid="own-postures" aria-label="Your own postures" onClose=${close}>
     <form method="dialog" class="row">
       <h2 class="grow">Your own postures</h2>
       <button class="button">Close</button>
     </form>
-    <p class="hint">What is on the time line stays there, whatever becomes of the posture.</p>
+    <p class="hint">The time line does not change.</p>
     <p role="status" class="row">
       ${wrong && html`<span class="said error">${wrong}</span>`}
       ${gone &&
       !has(gone.name) &&
-      html`<span class="grow cut">${gone.name} is deleted.</span>
-        <button ref=${restore} class="button" data-testid="restore" onClick=${() => bring(gone)}>Bring it back</button>`}
+      html`<span class="grow cut">Deleted ${gone.name}.</span>
+        <button ref=${restore} class="button" data-testid="restore" onClick=${() => bringBack(gone)}>Restore</button>`}
     </p>
     <ul class="stack">
       ${postures.map((one) => html`<${Row} key=${one.name} one=${one} rename=${rename} remove=${remove} />`)}
     </ul>
-    ${postures.length === 0 && html`<p class="empty">No posture is saved. Pose one, and save it by name.</p>`}
+    ${postures.length === 0 && html`<p class="empty">No saved postures. Pose one and save it by name.</p>`}
   </dialog>`;
 }
 
@@ -71,7 +71,7 @@ function Row({ one, rename, remove }) {
   };
   return html`<li class="row">
     <img src=${thumbnail(one.key, 0, 64)} alt="" width="48" height="64" />
-    <input class="field grow" data-testid="name-${one.name}" aria-label="Name of ${one.name}" maxlength=${LONGEST} value=${written}
+    <input class="field grow" data-testid="name-${one.name}" aria-label="Name of ${one.name}" maxlength=${MAX_NAME_LENGTH} value=${written}
       onInput=${(/** @type {any} */ event) => write(event.target.value)}
       onBlur=${save}
       onKeyDown=${(/** @type {any} */ event) => event.key === "Enter" && save()} />

@@ -1,11 +1,11 @@
-/** Flow 1, from A to B: both postures, and the gallery that they are taken from. */
+/** From A to B: both postures, and the gallery to pick them from. */
 
 import { html } from "../vendor/htm-preact-standalone.js";
 import { useChange, useKeys } from "../shell/hooks.js";
 import { icon } from "../shell/icons.js";
 import { thumbnail } from "../places.js";
 import { deskOf, dropped } from "./desk.js";
-import { Gallery, insert } from "./gallery.js";
+import { append, Gallery } from "./gallery.js";
 
 export { Centre } from "./alternatives.js";
 
@@ -21,8 +21,8 @@ export function Panel({ studio }) {
   const state = useChange(desk, () => desk.state);
   const shown = useChange(desk, () => desk.shown);
   useKeys(studio, [
-    { keys: ["a"], does: "set A: the posture picked, or what the viewer shows", group: GROUP, act: () => take(studio, "a") },
-    { keys: ["b"], does: "set B", group: GROUP, act: () => take(studio, "b") },
+    { keys: ["a"], does: "set A to the picked posture, or the viewer's", group: GROUP, act: () => take(studio, "a") },
+    { keys: ["b"], does: "set B likewise", group: GROUP, act: () => take(studio, "b") },
   ]);
   return html`<div class="between">
     <h2 class="aside">From one posture to another</h2>
@@ -40,13 +40,13 @@ export function Panel({ studio }) {
       <${End} studio=${studio} name="b" place=${ends.b} />
     </div>
     <label class="row hint">
-      How long
+      Duration
       <select
         data-testid="how-long"
         value=${seconds}
         onChange=${(/** @type {any} */ event) => desk.take(Number(event.target.value))}
       >
-        <option value="0">as it likes</option>
+        <option value="0">automatic</option>
         ${LENGTHS.map((length) => html`<option value=${length}>${length} s</option>`)}
       </select>
       ${
@@ -55,14 +55,14 @@ export function Panel({ studio }) {
         html`<button class="button" onClick=${() => desk.show(true)}>Show the alternatives</button>`
       }
     </label>
-    <button class="button cut" data-testid="insert-posture" disabled=${!choice} onClick=${() => choice && insert(studio, choice)}>
-      Put ${choice?.title ?? "it"} onto the time line
+    <button class="button cut" data-testid="insert-posture" disabled=${!choice} onClick=${() => choice && append(studio, choice)}>
+      Add ${choice?.title ?? "it"} to the time line
     </button>
     <${Gallery} studio=${studio} />
   </div>`;
 }
 
-/** One of both ends: its picture, and what sets it. @param {{studio: any, name: "a" | "b", place: any}} props */
+/** A or B: its picture, and the button that sets it. @param {{studio: any, name: "a" | "b", place: any}} props */
 function End({ studio, name, place }) {
   const desk = deskOf(studio);
   const letter = name.toUpperCase();
@@ -81,12 +81,12 @@ function End({ studio, name, place }) {
             <span class="letter" aria-hidden="true">${letter}</span>
             <span class="cut name">${place.title}</span>`
         : html`<span class="letter" aria-hidden="true">${letter}</span>
-            <p>${name === "a" ? "Where it starts: pick one below" : "Where it leads"}</p>`
+            <p>${name === "a" ? "Start: pick a posture below" : "End"}</p>`
     }
     <button
       class="button"
       data-testid="set-${name}"
-      title="Set ${letter}: the posture picked, or what the viewer shows (${letter})"
+      title="Set ${letter} to the picked posture, or the viewer's (${letter})"
       onClick=${() => take(studio, name)}
     >
       Set ${letter}
@@ -94,13 +94,13 @@ function End({ studio, name, place }) {
   </div>`;
 }
 
-/** Set an end to what was picked, or to the moment that the viewer shows. @param {any} studio @param {"a" | "b"} name */
+/** Set an end to the picked posture, or to the one in the viewer. @param {any} studio @param {"a" | "b"} name */
 function take(studio, name) {
   const desk = deskOf(studio);
   const { viewer } = studio;
   const moment = viewer.moment;
   const picked = desk.choice && (!moment || moment.key === desk.choice.key) ? { ...desk.choice, frame: moment?.frame ?? desk.choice.frame } : desk.choice;
-  const place = picked ?? (moment && { ...moment, title: viewer.title || "this moment" });
+  const place = picked ?? (moment && { ...moment, title: viewer.title || "this posture" });
   if (place) desk.set(name, place);
-  else studio.say("Pick a posture in the gallery first, or let the viewer show one.");
+  else studio.say("Pick a posture in the gallery first, or show one in the viewer.");
 }

@@ -1,4 +1,4 @@
-/** Up to four movements in step, drawn by one renderer: a browser has few, and they are seen from one camera. */
+/** Up to four movements in step, drawn by one renderer with one camera: a browser allows few renderers. */
 
 import { MOMENT } from "motionmind/motion";
 import { Pictures } from "motionmind/pictures";
@@ -6,12 +6,12 @@ import { Player } from "motionmind/player";
 import { Stage } from "motionmind/stage";
 import { Vector3 } from "three";
 
-const TURN = Math.PI; // by a drag over the whole of a picture
-export const STILL = 3; // CSS pixels that a click may move
-const NEAR = 36; // CSS pixels from a joint at which it is pointed at
+const DRAG_TURN_RAD = Math.PI; // by a drag across the whole picture
+export const CLICK_SLACK_PX = 3; // CSS pixels
+const JOINT_RADIUS_PX = 36; // CSS pixels from a joint within which the pointer hits it
 const GHOSTS = { ends: true, onion: 0 };
 
-/** Movements after one another, as far as a stage needs to know to find where all of them lead. */
+/** Movements in sequence, with enough of `Motion` for a stage to frame all of them. */
 class All {
   /** @param {any[]} motions */
   constructor(motions) {
@@ -31,12 +31,12 @@ class All {
   }
 }
 
-/** Fires "change" when time has gone on or stopped. */
+/** The stage, player and pictures that the alternatives share. */
 export class Quartet {
   /** @param {boolean} dark */
   constructor(dark) {
     this.dark = dark;
-    /** Where the canvas of the renderer is, unseen; put into one of the pictures it is as large as each. */
+    /** Holds the renderer's canvas, hidden, inside one of the pictures, so that it has their size. */
     this.room = Object.assign(document.createElement("div"), { className: "room" });
     /** @type {any} */
     this.stage = undefined;
@@ -44,7 +44,7 @@ export class Quartet {
     this.motions = [];
     /** @type {CanvasRenderingContext2D[]} */
     this.pens = [];
-    /** @type {(number | null)[]} the joint of each that is marked */
+    /** @type {(number | null)[]} the marked joint of each */
     this.marked = [];
     /** @type {any} */
     this.player = new Player(/** @type {any} */ ({ length: 1, start: 0, end: 0, times: [0], frameAt: () => 0 }));
@@ -52,7 +52,7 @@ export class Quartet {
     this.ended = false;
   }
 
-  /** Play these movements. @param {any[]} motions @param {boolean} still whether they wait to be played */
+  /** Play these movements. @param {any[]} motions @param {boolean} still whether not to start */
   take(motions, still) {
     const first = this.motions.length === 0;
     this.motions = motions;
@@ -80,7 +80,7 @@ export class Quartet {
     this.pictures.ask();
   }
 
-  /** Draw onto a canvas, and let it turn all of them. @param {number} index @param {HTMLCanvasElement} canvas */
+  /** Draw a movement onto a canvas. @param {number} index @param {HTMLCanvasElement} canvas */
   onto(index, canvas) {
     this.pens[index] = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", { alpha: false }));
     this.pictures.ask();
@@ -90,18 +90,18 @@ export class Quartet {
   turn(across, along) {
     const { controls } = this.stage;
     this.stage.view = undefined;
-    controls.rotateLeft(TURN * across);
-    controls.rotateUp(TURN * along);
+    controls.rotateLeft(DRAG_TURN_RAD * across);
+    controls.rotateUp(DRAG_TURN_RAD * along);
   }
 
-  /** Come nearer, or go farther. @param {number} factor */
-  near(factor) {
+  /** Zoom all pictures. @param {number} factor */
+  zoom(factor) {
     this.stage.view = undefined;
     this.stage.controls.dollyIn(factor);
   }
 
   /**
-   * The joint of a movement that is shown near a place in its picture; null if none is.
+   * The joint of a movement nearest to a position in its picture; null if none is near.
    * @param {number} index
    * @param {number} x CSS pixels from the left
    * @param {number} y CSS pixels from the top
@@ -116,7 +116,7 @@ export class Quartet {
     stage.body.pose(stage.rotations, stage.root);
     const place = new Vector3();
     let best = null;
-    let least = NEAR;
+    let least = JOINT_RADIUS_PX;
     for (let joint = 0; joint < motion.joints.length; joint++) {
       place.fromArray(stage.body.joints, joint * 3).project(stage.camera);
       const distance = Math.hypot((0.5 + 0.5 * place.x) * width - x, (0.5 - 0.5 * place.y) * height - y);
@@ -125,7 +125,7 @@ export class Quartet {
     return best;
   }
 
-  /** Mark a joint of one of them, or none. @param {number} index @param {number | null} joint */
+  /** Mark a joint of a movement, or none. @param {number} index @param {number | null} joint */
   mark(index, joint) {
     this.marked[index] = joint;
     this.pictures.ask();

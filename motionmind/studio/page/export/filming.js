@@ -1,34 +1,28 @@
-/** A film of the piece while it is made: with a body of its own, so that all else goes on meanwhile. */
+/** Film the piece, with a stage of its own so that the page stays usable. */
 
 import { film, obstacle } from "motionmind/film";
 import { Stage } from "motionmind/stage";
 import { movement } from "../movements.js";
+import { perStudio } from "../shell/hooks.js";
 import { Composed, Movements } from "../timeline/composed.js";
 
-const UNSAFE = /[\\/:*?"<>|\u0000-\u001f\u007f]+/g; // in names of files, on some system
-/** @type {WeakMap<object, Filming>} */
-const known = new WeakMap(); // so that another panel can be opened meanwhile
+const UNSAFE = /[\\/:*?"<>|\u0000-\u001f\u007f]+/g; // in file names, on some system
+/** The films of a studio. */
+export const filmingOf = perStudio((studio) => new Filming(studio));
 
-/** @param {any} studio */
-export function filmingOf(studio) {
-  const filming = known.get(studio) ?? new Filming(studio);
-  known.set(studio, filming);
-  return filming;
-}
-
-/** Fires "change" when a film begins, gets on or ends. */
+/** Fires "change" when a film begins, progresses or ends. */
 class Filming extends EventTarget {
   /** @param {any} studio */
   constructor(studio) {
     super();
     this.studio = studio;
-    /** @type {number | null} how much of a film is made; null while none is */
+    /** @type {number | null} share that is done; null if no film is in the making */
     this.share = null;
     this.stopper = new AbortController();
     addEventListener("beforeunload", (event) => this.share !== null && event.preventDefault()); // the browser asks
   }
 
-  /** Film the piece as the viewer shows it, from where its camera is, and offer the file. */
+  /** Film the piece from the viewer's camera, and offer the file. */
   async make() {
     const { studio } = this;
     const wrong = obstacle();
@@ -38,15 +32,15 @@ class Filming extends EventTarget {
     this.stopper = new AbortController();
     const { signal } = this.stopper;
     const title = (studio.store.state.title || "piece").replace(UNSAFE, "-").replace(/^[. ]+|[. ]+$/g, "") || "piece";
-    this.#told(0);
+    this.#progress(0);
     try {
-      const made = await filmed(studio, (share) => this.#told(share), signal);
+      const made = await filmed(studio, (share) => this.#progress(share), signal);
       offer(made, `${title}.webm`);
-      studio.say(`The film is made: ${title}.webm.`);
+      studio.say(`Film saved: ${title}.webm.`);
     } catch (error) {
-      if (!signal.aborted) studio.say(`No film was made: ${error instanceof Error ? error.message : error}`, { kind: "error" });
+      if (!signal.aborted) studio.say(`The film failed: ${error instanceof Error ? error.message : error}`, { kind: "error" });
     }
-    return this.#told(null);
+    return this.#progress(null);
   }
 
   stop() {
@@ -54,21 +48,21 @@ class Filming extends EventTarget {
   }
 
   /** @param {number | null} share */
-  #told(share) {
+  #progress(share) {
     this.share = share;
     this.dispatchEvent(new Event("change"));
   }
 }
 
 /**
- * Film the piece as it is now, whatever becomes of it meanwhile.
- * @param {any} studio @param {(share: number) => void} told @param {AbortSignal} signal
+ * Film the piece as it is now; later edits do not matter.
+ * @param {any} studio @param {(share: number) => void} progress @param {AbortSignal} signal
  * @returns {Promise<Blob>}
  */
-async function filmed({ api, viewer }, told, signal) {
+async function filmed({ api, viewer }, progress, signal) {
   const { piece, stage: seen, ghosts } = viewer;
-  if (!piece || !seen) throw new Error("the piece is not shown yet");
-  // As it is now: while the movement comes, another panel may turn the camera.
+  if (!piece || !seen) throw new Error("the piece has not loaded yet");
+  // Copy it now: while the movement loads, another panel may turn the camera.
   const [position, target] = [seen.camera.position.clone(), seen.controls.target.clone()];
   const { clientWidth, clientHeight } = seen.canvas;
   const canvas = document.createElement("canvas");
@@ -91,7 +85,7 @@ async function filmed({ api, viewer }, told, signal) {
     stage.controls.target.copy(target);
     stage.controls.update();
     stage.filming = true; // keeps it
-    return await film(stage, motion, ghosts, (/** @type {number} */ time) => told(time / Math.max(motion.end, 1e-9)), signal);
+    return await film(stage, motion, ghosts, (/** @type {number} */ time) => progress(time / Math.max(motion.end, 1e-9)), signal);
   } finally {
     stage?.controls.dispose();
     stage?.renderer.dispose();

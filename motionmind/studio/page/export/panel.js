@@ -1,14 +1,14 @@
-/** Flow 6, take it away: a film, a file for other programs, the project, or a page that plays by itself. */
+/** Export: a film, files for other programs, the project, or a page that plays by itself. */
 
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.js";
 import { useChange } from "../shell/hooks.js";
 import { filmingOf, offer } from "./filming.js";
 
 const FILES = [
-  { format: "html", testid: "export-html", name: "A page", words: "One file that plays in any browser, without the studio: to send to somebody." },
-  { format: "glb", testid: "export-glb", name: "GLB", words: "The body and its movement for Blender, and for the web." },
-  { format: "bvh", testid: "export-bvh", name: "BVH", words: "Movement for Blender (tick Update Scene FPS as you import it) and other programs that animate; lengths are in metres." },
-  { format: "json", testid: "export-json", name: "Motion", words: "All that MotionMind knows of the movement, to go on with in Python or a terminal." },
+  { format: "html", testid: "export-html", name: "Web page", words: "One file to send: it plays in any browser, without the studio." },
+  { format: "glb", testid: "export-glb", name: "GLB", words: "Body and movement, for Blender and the web." },
+  { format: "bvh", testid: "export-bvh", name: "BVH", words: "Movement in metres, for Blender (tick Update Scene FPS on import) and other animation programs." },
+  { format: "json", testid: "export-json", name: "Motion", words: "Everything MotionMind knows about the movement, for Python and the command line." },
 ];
 
 /** @param {{studio: any}} props */
@@ -17,25 +17,25 @@ export function Panel({ studio }) {
   const empty = useChange(store, () => !store.state?.piece?.blocks.length);
   const file = useChange(store, () => store.state?.file ?? "");
   return html`<div class="stack" data-testid="export">
-    <h2>Take it away</h2>
+    <h2>Export</h2>
     ${
       empty
-        ? html`<p class="empty">The piece is empty. Go from A to B, or put a clip onto the line of time; then take it away from here.</p>`
+        ? html`<p class="empty">The piece is empty. Go from A to B or add a clip to the time line, then export here.</p>`
         : html`${FILES.map(
-            ({ format, testid, name, words }) => html`<${Way} key=${format} name=${name} words=${words}>
+            ({ format, testid, name, words }) => html`<${Format} key=${format} name=${name} words=${words}>
               <${Save} studio=${studio} format=${format} testid=${testid} />
             <//>`,
           )}
           <${Film} studio=${studio} />
           <${Credits} studio=${studio} />`
     }
-    <${Way} name="The project" words="The piece with every edit, to open again with motionmind studio FILE. It is always saved: ${file}">
+    <${Format} name="Project" words="The piece with every edit; open it with motionmind studio FILE. It is always saved in ${file}">
       <${Save} studio=${studio} format="project" testid="export-project" />
     <//>
   </div>`;
 }
 
-/** Whose movement the piece is made of, and what stands against passing it on. @param {any} props */
+/** Whose movement the piece contains, and what limits sharing it. @param {any} props */
 function Credits({ studio }) {
   const revision = useChange(studio.store, () => studio.store.state);
   const [sections, setSections] = useState(/** @type {{heading: string, lines: string[]}[]} */ ([]));
@@ -55,7 +55,7 @@ function Credits({ studio }) {
 }
 
 /** @param {any} props */
-function Way({ name, words, children }) {
+function Format({ name, words, children }) {
   return html`<section class="card way">
     <div>
       <h3>${name}</h3>
@@ -65,7 +65,7 @@ function Way({ name, words, children }) {
   </section>`;
 }
 
-/** A button that fetches a file and saves it under the name that the server gives it. @param {any} props */
+/** A button that downloads a file. @param {any} props */
 function Save({ studio, format, testid }) {
   const [busy, setBusy] = useState(false);
   const save = async () => {
@@ -85,11 +85,11 @@ function nameOf(answer) {
   return encoded && decodeURIComponent(encoded);
 }
 
-/** A film goes on while another panel is open: the bar leads back here. @param {{studio: any}} props */
+/** A film continues while another panel is open; the bar leads back here. @param {{studio: any}} props */
 function Film({ studio }) {
   const filming = filmingOf(studio);
   const share = useChange(filming, () => filming.share);
-  return html`<${Way} name="Film" words="The piece as the viewer shows it now, from where the camera is (WebM).">
+  return html`<${Format} name="Film" words="The piece as the viewer shows it now, from the same camera (WebM).">
     ${
       share === null
         ? html`<button class="button" data-testid="export-film" onClick=${() => filming.make()}>Film</button>`

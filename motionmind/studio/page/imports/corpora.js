@@ -1,4 +1,4 @@
-/** The corpora that there are: looked through as sheets, used for the piece, deleted. */
+/** The list of corpora: browse, use for the piece, delete. */
 
 import { html, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { movement } from "../movements.js";
@@ -9,12 +9,12 @@ import { useChange } from "../shell/hooks.js";
 export function Corpora({ studio, imports }) {
   const used = useChange(studio.store, () => studio.store.state?.corpus);
   const [sheet, setSheet] = useState(/** @type {any} */ (null));
-  const [doomed, setDoomed] = useState("");
+  const [deleting, setDeleting] = useState("");
   const failed = (/** @type {Error} */ error) => studio.say(error.message, { kind: "error" });
   const look = (/** @type {string} */ name) => imports.sheet(name).then(setSheet, failed);
   const remove = (/** @type {string} */ name) => {
-    setDoomed("");
-    imports.delete(name).then(() => studio.say(`${name} is deleted`), failed);
+    setDeleting("");
+    imports.delete(name).then(() => studio.say(`Deleted ${name}.`), failed);
   };
   return html`<section class="stack corpora" aria-label="Corpora">
     <h3>Corpora</h3>
@@ -26,24 +26,24 @@ export function Corpora({ studio, imports }) {
           ${corpus.title && html`<p class="hint">${corpus.title}</p>`}
           ${corpus.error && html`<p class="said error">${corpus.error}</p>`}
           <div class="row">
-            <button class="button" data-testid="sheet-${corpus.name}" disabled=${Boolean(corpus.error)} onClick=${() => look(corpus.name)}>Look through</button>
+            <button class="button" data-testid="sheet-${corpus.name}" disabled=${Boolean(corpus.error)} onClick=${() => look(corpus.name)}>Browse</button>
             ${corpus.name !== used &&
             html`<button class="button quiet" data-testid="use-${corpus.name}" disabled=${Boolean(corpus.error)}
               onClick=${() => studio.api.edit({ edit: "corpus", name: corpus.name }).catch(failed)}>Use</button>`}
             ${corpus.own &&
             corpus.name !== used &&
-            html`<button class="button quiet" data-testid="delete-${corpus.name}" onClick=${() => setDoomed(corpus.name)}>Delete</button>`}
+            html`<button class="button quiet" data-testid="delete-${corpus.name}" onClick=${() => setDeleting(corpus.name)}>Delete</button>`}
           </div>
         </li>`,
       )}
     </ul>
     ${sheet && html`<${Sheet} studio=${studio} sheet=${sheet} onClose=${() => setSheet(null)} />`}
-    ${doomed &&
-    html`<${Modal} label="Delete ${doomed}" onClose=${() => setDoomed("")}>
-      <div class="stack"><h2>Delete ${doomed}?</h2>
-        <p>The corpus goes for good. The files that it was learned from stay where they are.</p>
-        <div class="row"><button class="button primary" data-testid="delete-sure" onClick=${() => remove(doomed)}>Delete</button>
-          <button class="button" data-testid="delete-not" onClick=${() => setDoomed("")}>Keep it</button></div></div>
+    ${deleting &&
+    html`<${Modal} label="Delete ${deleting}" onClose=${() => setDeleting("")}>
+      <div class="stack"><h2>Delete ${deleting}?</h2>
+        <p>This cannot be undone. The files that it was learned from stay.</p>
+        <div class="row"><button class="button primary" data-testid="delete-sure" onClick=${() => remove(deleting)}>Delete</button>
+          <button class="button" data-testid="delete-not" onClick=${() => setDeleting("")}>Keep it</button></div></div>
     </${Modal}>`}
   </section>`;
 }

@@ -1,4 +1,4 @@
-/** A file that somebody brought: what was understood, what it leaves open, and what can be done with it. */
+/** The card of an uploaded file: its facts, open questions, and actions. */
 
 import { html } from "../vendor/htm-preact-standalone.js";
 import { NumberField } from "../shell/fields.js";
@@ -15,7 +15,7 @@ const UNITS = /** @type {[string, string][]} */ ([
 ]);
 const WITH_UNIT = ["bvh", "glb", "vrm", "vrma"];
 const WITH_RATE = ["bvh", "amc", "npz"];
-const MOST = 40; // clips that are listed
+const MAX_LISTED = 40; // clips
 
 /**
  * @param {{imports: import("./imports.js").Imports, file: import("./imports.js").Upload,
@@ -33,19 +33,19 @@ export function FileCard({ imports, file, onLook, onPut, onFail }) {
         onClick=${() => imports.forget(file).catch(onFail)}>Remove</button>
     </header>
     ${error && html`<p class="said error" role="alert" data-testid="file-error">${error}</p>`}
-    ${kind === "asf" && html`<p class="hint">The body of .amc files: those are read with it.</p>`}
+    ${kind === "asf" && html`<p class="hint">The skeleton of .amc files, which are read with it.</p>`}
     ${facts &&
     html`<p data-testid="understood">${facts.clips.length === 1 ? `${lengthOf(facts.clips[0])}; ` : `${facts.clips.length} clips; `}${bodyOf(facts)}</p>
       ${doubtsOf(file).map(
         ([words, serious]) => html`<p class=${serious ? "said warning" : "hint"}>${serious ? "⚠ " : ""}${words}</p>`,
       )}
-      ${again && html`<p class="hint" aria-live="polite">is being read again …</p>`}
+      ${again && html`<p class="hint" aria-live="polite">Reading again…</p>`}
       <${Questions} file=${file} choose=${choose} />
-      <ul class="clips">${facts.clips.slice(0, MOST).map(
+      <ul class="clips">${facts.clips.slice(0, MAX_LISTED).map(
         (clip, number) => html`<li class="row" key=${number}>
           ${facts.clips.length > 1 && html`<span class="grow cut" title=${lengthOf(clip)}>${clip.name}</span>`}
-          <button class="button" data-testid="look" disabled=${again} onClick=${() => onLook(number)}>Look</button>
-          <button class="button" data-testid="put" disabled=${again} onClick=${() => onPut(number)}>Put on the time line</button>
+          <button class="button" data-testid="look" disabled=${again} onClick=${() => onLook(number)}>Watch</button>
+          <button class="button" data-testid="put" disabled=${again} onClick=${() => onPut(number)}>Add to the time line</button>
         </li>`,
       )}</ul>
       <label class="check"><input type="checkbox" data-testid="learn-from" checked=${!imports.left.has(file.id)}
@@ -53,7 +53,7 @@ export function FileCard({ imports, file, onLook, onPut, onFail }) {
   </li>`;
 }
 
-/** What the file leaves open. @param {{file: import("./imports.js").Upload, choose: (change: object) => void}} props */
+/** Questions that the file leaves open. @param {{file: import("./imports.js").Upload, choose: (change: object) => void}} props */
 function Questions({ file, choose }) {
   const { facts, choices, kind, skips } = file;
   if (!facts) return null;
@@ -63,7 +63,7 @@ function Questions({ file, choose }) {
   const fps = choices.fps ?? (clip.fps && Number(clip.fps.toFixed(2)));
   return html`<div class="questions">
     ${WITH_UNIT.includes(kind) &&
-    html`<label class="row"><span class="grow">Unit of length</span>
+    html`<label class="row"><span class="grow">Unit</span>
       <select data-testid="unit" value=${chosen} onChange=${(/** @type {any} */ event) => choose({ unit: event.target.value || null })}>
         <option value="">${facts.is_guessed ? `${nameOf(facts.unit)} (guessed)` : "as the file says"}</option>
         ${UNITS.map(([unit, words]) => html`<option value=${unit}>${words}</option>`)}
@@ -81,7 +81,7 @@ function Questions({ file, choose }) {
     ${(posed || (skips?.[0] ?? 0) > 0) &&
     html`<label class="check"><input type="checkbox" data-testid="skip" checked=${(skips?.[0] ?? 0) > 0}
       onChange=${(/** @type {any} */ event) => choose({ skip: event.target.checked ? null : 0 })} />
-      Leave out the first frame: it looks like a pose that was put before the movement</label>`}
+      Skip the first frame: it looks like an added pose</label>`}
   </div>`;
 }
 

@@ -1,13 +1,13 @@
-/** Files that somebody brings and the corpora that there are, as the page knows them. It draws nothing. */
+/** Uploaded files and the corpora, as the page knows them. It draws nothing. */
 
-const AT_ONCE = 2; // files that are sent
-const LARGEST = 64 * 2 ** 20; // bytes; the server has the same limit
+const PARALLEL_UPLOADS = 2;
+const MAX_BYTES = 64 * 2 ** 20; // of a file, as on the server
 const READABLE = [".bvh", ".glb", ".vrm", ".vrma", ".amc", ".asf", ".npz", ".json", ".score"];
 /** @type {Record<string, string>} */
-const REFUSED = {
-  ".fbx": "FBX is not read: open it in Blender (File, Import, FBX) and export glTF (.glb), or BVH",
-  ".c3d": "C3D holds markers on the skin, not joints: solve a skeleton from them, and export that as BVH",
-  ".gltf": "a .gltf takes in other files: export it as one .glb",
+const REFUSALS = {
+  ".fbx": "FBX is not supported: import it into Blender (File, Import, FBX) and export glTF (.glb) or BVH",
+  ".c3d": "C3D contains skin markers, not joints: solve a skeleton and export it as BVH",
+  ".gltf": "a .gltf refers to other files: export a single .glb",
 };
 const NAME = /^[\p{L}\p{N}_][\p{L}\p{N}_.-]{0,63}$/u;
 
@@ -25,7 +25,7 @@ export const ACCEPT = READABLE.join(",");
  * @typedef {{name: string, title: string, own: boolean, error: string, clips?: number, rate?: number | null}} Corpus
  */
 
-/** Fires "change" whenever something of it has changed. */
+/** Fires "change" on any change. */
 export class Imports extends EventTarget {
   /** @param {import("../api.js").Api} api */
   constructor(api) {
@@ -33,35 +33,35 @@ export class Imports extends EventTarget {
     this.api = api;
     /** @type {Upload[]} */
     this.files = [];
-    /** @type {Coming[]} files on their way, and those that were refused */
+    /** @type {Coming[]} files being uploaded, and refused ones */
     this.coming = [];
     /** @type {Corpus[]} */
     this.corpora = [];
-    /** @type {Set<string>} ids of files that are not to be learned from */
+    /** @type {Set<string>} ids of files to leave out of learning */
     this.left = new Set();
-    /** @type {Set<string>} ids of files that are read again */
+    /** @type {Set<string>} ids of files being read again */
     this.reading = new Set();
     this.version = 0;
     this.count = 0;
     /** @type {Promise<void>[]} */
-    this.lanes = Array.from({ length: AT_ONCE }, () => Promise.resolve());
+    this.lanes = Array.from({ length: PARALLEL_UPLOADS }, () => Promise.resolve());
   }
 
-  /** See what is there. */
+  /** Fetch the uploads and the corpora. */
   async refresh() {
     [this.files, this.corpora] = await Promise.all([this.api.get("/api/imports"), this.api.get("/api/corpora")]);
     this.#changed();
   }
 
-  /** Bring files; skeletons go first, for other files need them. @param {Iterable<File>} files */
-  bring(files) {
+  /** Upload files; skeletons go first, because other files need them. @param {Iterable<File>} files */
+  add(files) {
     const sorted = [...files].sort((one, other) => Number(suffix(other.name) === ".asf") - Number(suffix(one.name) === ".asf"));
     const jobs = [];
     for (const file of sorted) {
       const coming = { number: ++this.count, name: file.name, error: refused(file) };
       this.coming = [...this.coming, coming];
       if (coming.error) continue;
-      const lane = suffix(file.name) === ".asf" || suffix(file.name) === ".amc" ? 0 : this.count % AT_ONCE;
+      const lane = suffix(file.name) === ".asf" || suffix(file.name) === ".amc" ? 0 : this.count % PARALLEL_UPLOADS;
       this.lanes[lane] = this.lanes[lane].then(() => this.#send(file, coming));
       jobs.push(this.lanes[lane]);
     }
@@ -75,25 +75,25 @@ export class Imports extends EventTarget {
       const upload = await this.api.upload("/api/imports", file, file.name);
       this.files = [...this.files, upload];
       this.coming = this.coming.filter((other) => other !== coming);
-      if (upload.kind === "asf") await this.#dress(upload.id);
-      if (upload.kind === "score") await this.#complete(upload);
+      if (upload.kind === "asf") await this.#readWithSkeleton(upload.id);
+      if (upload.kind === "score") await this.#readWithScore(upload);
     } catch (error) {
       this.coming = this.coming.map((other) => (other === coming ? { ...coming, error: /** @type {Error} */ (error).message } : other));
     }
     this.#changed();
   }
 
-  /** Read the files again that lacked a skeleton. @param {string} asf */
-  async #dress(asf) {
+  /** Read again the files that lacked a skeleton. @param {string} asf */
+  async #readWithSkeleton(asf) {
     for (const file of this.files) if (file.kind === "amc" && !file.facts) await this.choose(file, { asf });
   }
 
-  /** Read the scores again that another one lacked. @param {Upload} score */
-  async #complete(score) {
-    for (const file of this.files) if (file.error.includes(`takes in ${score.name}:`)) await this.choose(file, {});
+  /** Read again the scores that lacked an included score. @param {Upload} score */
+  async #readWithScore(score) {
+    for (const file of this.files) if (file.error.includes(`includes ${score.name}:`)) await this.choose(file, {});
   }
 
-  /** Read a file again with other answers to what it leaves open. @param {Upload} file @param {Partial<Choices>} change */
+  /** Read a file again with other choices. @param {Upload} file @param {Partial<Choices>} change */
   async choose(file, change) {
     this.reading.add(file.id);
     this.#changed();
@@ -112,30 +112,30 @@ export class Imports extends EventTarget {
     this.#changed();
   }
 
-  /** No longer show a file that was refused. @param {Coming} coming */
+  /** Remove a refused file from the list. @param {Coming} coming */
   dismiss(coming) {
     this.coming = this.coming.filter((other) => other !== coming);
     this.#changed();
   }
 
-  /** Keep a clip of a file in the project. @param {Upload} file @param {number} clip @returns {Promise<{key: string, frames: number}>} */
+  /** Store a clip of a file in the project. @param {Upload} file @param {number} clip @returns {Promise<{key: string, frames: number}>} */
   keep(file, clip) {
     return this.api.post(`/api/imports/${file.id}/${clip}/keep`);
   }
 
-  /** What the player shows of a clip. @param {Upload} file @param {number} clip */
+  /** Fetch a clip for the player. @param {Upload} file @param {number} clip */
   movement(file, clip) {
     return this.api.get(`/api/imports/${file.id}/${clip}/movement`);
   }
 
-  /** Learn from a file or not. @param {string} id @param {boolean} wanted */
+  /** Choose whether to learn from a file. @param {string} id @param {boolean} wanted */
   want(id, wanted) {
     if (wanted) this.left.delete(id);
     else this.left.add(id);
     this.#changed();
   }
 
-  /** The clips that are to be learned from. */
+  /** The clips to learn from. */
   get parts() {
     return this.files
       .filter((file) => file.facts && !this.left.has(file.id))
@@ -150,12 +150,12 @@ export class Imports extends EventTarget {
     return (await this.api.post("/api/corpora", { ...wish, parts: this.parts })).job;
   }
 
-  /** Why a corpus cannot have a name; "" if it can. @param {string} name */
+  /** Why a name is invalid for a corpus; "" if it is valid. @param {string} name */
   refusal(name) {
-    if (!NAME.test(name)) return "a name is of letters, digits, -, _ and ., without spaces, 64 at most";
+    if (!NAME.test(name)) return "a name has up to 64 letters, digits, -, _ and ., without spaces";
     const other = this.corpora.find((corpus) => corpus.name === name);
     if (!other) return "";
-    return `there is a corpus ${name} already: choose another name${other.own ? ", or delete that one first" : ""}`;
+    return `corpus ${name} already exists: choose another name${other.own ? " or delete it first" : ""}`;
   }
 
   /** @param {string} name */
@@ -186,11 +186,11 @@ function suffix(name) {
   return name.includes(".") ? name.slice(name.lastIndexOf(".")).toLowerCase() : "";
 }
 
-/** Why a file is not worth sending; "" if it is. @param {File} file */
+/** Why a file cannot be uploaded; "" if it can. @param {File} file */
 function refused(file) {
   const end = suffix(file.name);
-  if (REFUSED[end]) return `${file.name}: ${REFUSED[end]}`;
-  if (!READABLE.includes(end)) return `${file.name}: files that can be read end in ${READABLE.join(", ")}`;
-  if (file.size > LARGEST) return `${file.name}: is larger than ${LARGEST / 2 ** 20} MB; bring a part of it`;
+  if (REFUSALS[end]) return `${file.name}: ${REFUSALS[end]}`;
+  if (!READABLE.includes(end)) return `${file.name}: supported formats are ${READABLE.join(", ")}`;
+  if (file.size > MAX_BYTES) return `${file.name}: larger than ${MAX_BYTES / 2 ** 20} MB; upload a part of it`;
   return "";
 }

@@ -1,4 +1,4 @@
-/** Learning a corpus of the files that were brought and of other corpora, with progress. */
+/** Learn a corpus from uploaded files and other corpora, with progress. */
 
 import { html, useState } from "../vendor/htm-preact-standalone.js";
 import { useChange } from "../shell/hooks.js";
@@ -44,12 +44,12 @@ export function Learn({ studio, imports }) {
     }}
   >
     <h3>Learn a corpus</h3>
-    <p class="hint">${count ? `From ${count} clip${count > 1 ? "s" : ""} above` : "Bring files, or mix corpora that there are"}${
+    <p class="hint">${count ? `From ${count} clip${count > 1 ? "s" : ""} above` : "Add files above, or mix corpora"}${
       mixed.length ? `, and ${mixed.map((one) => one.name).join(", ")}` : ""
     }.</p>
     <label class="row"><span>Name</span><input class="field grow" data-testid="corpus-name" value=${name} required maxlength="64"
-      autocomplete="off" spellcheck="false" placeholder="such as mine" onInput=${(/** @type {any} */ event) => setName(event.target.value)} /></label>
-    <label class="row"><span>What it is</span><input class="field grow" data-testid="corpus-title" value=${title} maxlength="200"
+      autocomplete="off" spellcheck="false" placeholder="for example, mine" onInput=${(/** @type {any} */ event) => setName(event.target.value)} /></label>
+    <label class="row"><span>Description</span><input class="field grow" data-testid="corpus-title" value=${title} maxlength="200"
       onInput=${(/** @type {any} */ event) => setTitle(event.target.value)} /></label>
     <details>
       <summary>Mix with other corpora${mixed.length ? ` (${mixed.length})` : ""}</summary>
@@ -63,7 +63,7 @@ export function Learn({ studio, imports }) {
       )}
     </details>
     <label class="check"><input type="checkbox" data-testid="mirror" checked=${mirror}
-      onChange=${(/** @type {any} */ event) => setMirror(event.target.checked)} />With left and right exchanged, too</label>
+      onChange=${(/** @type {any} */ event) => setMirror(event.target.checked)} />Also learn the mirror image</label>
     ${error && html`<p class="said error" role="alert" data-testid="learn-error">${error}</p>`}
     ${!busy && html`<button class="button primary" data-testid="learn" disabled=${!ready}>Learn</button>`}
     ${job && html`<${Progress} studio=${studio} job=${job} busy=${busy} />`}
@@ -76,20 +76,20 @@ function Progress({ studio, job, busy }) {
   if (busy) {
     return html`<div class="stack" data-testid="learning">
       <progress value=${of ? done : null} max=${of || 1} aria-label="Learning"></progress>
-      <div class="row"><span class="grow hint" aria-live="polite">${state === "waiting" ? "waits for its turn" : words || "begins"}</span>
+      <div class="row"><span class="grow hint" aria-live="polite">${state === "waiting" ? "waiting" : words || "starting"}</span>
         <button type="button" class="button" data-testid="cancel-learning"
           onClick=${() => studio.act(() => studio.api.delete(`/api/jobs/${job.id}`))}>Cancel</button></div>
     </div>`;
   }
   if (state === "done" && result) {
     return html`<div class="stack" role="status" data-testid="learned">
-      <p>${result.name} is learned: ${result.clips} clips, ${result.postures} postures.</p>
+      <p>Learned ${result.name}: ${result.clips} clips, ${result.postures} postures.</p>
       ${result.notes.map((/** @type {string} */ note) => html`<p class="said warning">⚠ ${note}</p>`)}
       <button type="button" class="button" data-testid="use-learned"
         onClick=${() => studio.act(() => studio.api.edit({ edit: "corpus", name: result.name }))}>Use it for this piece</button>
     </div>`;
   }
   return html`<p class=${state === "failed" ? "said error" : "hint"} role="status" data-testid="learn-ended">${
-    state === "failed" ? words : "Nothing was learned: it was cancelled."
+    state === "failed" ? words : "Cancelled: nothing was learned."
   }</p>`;
 }

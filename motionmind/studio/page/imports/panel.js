@@ -1,23 +1,15 @@
-/** One's own movement: files are dropped, looked at, put on the time line and learned from; corpora are looked through. */
+/** The user's own movement: upload files, watch them, put them on the time line, learn from them; browse corpora. */
 
 import { html, useEffect, useMemo, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { playable } from "../movements.js";
-import { useChange } from "../shell/hooks.js";
-import { newId } from "../timeline/items.js";
+import { perStudio, useChange } from "../shell/hooks.js";
+import { insert, newId } from "../timeline/items.js";
 import { Corpora } from "./corpora.js";
 import { FileCard } from "./file.js";
 import { ACCEPT, Imports } from "./imports.js";
 import { Learn } from "./learn.js";
 
-/** @type {WeakMap<object, Imports>} */
-const kept = new WeakMap(); // so that another panel can be opened meanwhile
-
-/** @param {any} studio */
-function importsOf(studio) {
-  const known = kept.get(studio) ?? new Imports(studio.api);
-  kept.set(studio, known);
-  return known;
-}
+const importsOf = perStudio((studio) => new Imports(studio.api));
 
 /** @param {{studio: any}} props */
 export function Panel({ studio }) {
@@ -29,7 +21,7 @@ export function Panel({ studio }) {
   const learning = useChange(studio.store, () => [...studio.store.jobs.values()].filter((job) => job.kind === "learn" && job.state === "done").length);
   useEffect(() => {
     imports.refresh().catch(failed);
-    if (learning) studio.store.load().catch(failed); // what the piece lacked may be there now
+    if (learning) studio.store.load().catch(failed); // the piece may have needed this corpus
   }, [learning]);
   useEffect(() => () => studio.viewer.back(), []);
   const look = async (/** @type {any} */ file, /** @type {number} */ clip) => {
@@ -38,15 +30,14 @@ export function Panel({ studio }) {
   };
   const put = async (/** @type {any} */ file, /** @type {number} */ clip) => {
     const { key, frames } = await imports.keep(file, clip);
-    const id = newId(studio.window);
-    await studio.api.edit({ edit: "insert", id, source: key, first: 0, last: frames - 1, mirrored: false, before: null });
+    await studio.api.edit(insert(newId(studio.window), { key, frame: 0, last: frames - 1 }));
     studio.viewer.back();
-    studio.say(`${file.facts.clips[clip].name} is on the time line`);
+    studio.say(`${file.facts.clips[clip].name} is on the time line.`);
   };
   const drop = (/** @type {DragEvent} */ event) => {
     event.preventDefault();
     setOver(false);
-    if (event.dataTransfer?.files.length) imports.bring(event.dataTransfer.files);
+    if (event.dataTransfer?.files.length) imports.add(event.dataTransfer.files);
   };
   return html`<section
     class="stack imports ${over ? "over" : ""}"
@@ -62,18 +53,18 @@ export function Panel({ studio }) {
     <div class="empty drop">
       <input ref=${chooser} type="file" hidden data-testid="choose-files" aria-label="Files" multiple accept=${ACCEPT}
         onChange=${(/** @type {any} */ event) => {
-          imports.bring(event.target.files);
+          imports.add(event.target.files);
           event.target.value = "";
         }} />
       <button class="button" data-testid="choose" onClick=${() => chooser.current?.click()}>Choose files</button>
-      <span>or drop them here: BVH, GLB, AMC with its ASF, npz, or a score</span>
+      <span>or drop them here: BVH, GLB, AMC with ASF, npz, or scores</span>
     </div>
     <ul class="stack files" aria-label="Files">
       ${imports.coming.map(
         (coming) => html`<li class="card file" key=${coming.number} data-testid="coming">
           <div class="row"><strong class="grow cut">${coming.name}</strong>
             ${coming.error && html`<button class="button quiet" aria-label="Close" onClick=${() => imports.dismiss(coming)}>Close</button>`}</div>
-          ${coming.error ? html`<p class="said error" role="alert" data-testid="file-error">${coming.error}</p>` : html`<p class="hint" aria-live="polite">is being read …</p>`}
+          ${coming.error ? html`<p class="said error" role="alert" data-testid="file-error">${coming.error}</p>` : html`<p class="hint" aria-live="polite">Reading…</p>`}
         </li>`,
       )}
       ${imports.files.map(

@@ -1,16 +1,16 @@
-/** The handles over the picture: a button on each joint and heel that can be dragged, a mark on every other joint. */
+/** The handles over the view: a button on each joint or heel to drag, a mark on every other joint. */
 
 import { Vector3 } from "three";
 
-const STEP = 0.01; // metres that a key moves a handle, of a body as large as a person; with Shift five times as far
-const PAUSE = 400; // milliseconds without a key after which a step is done
+const KEY_STEP_M = 0.01; // for a body of human size; with Shift five times as far
+const KEY_PAUSE_MS = 400; // without a key, which ends a step
 const WORDS = { seen: "seen", near: "nearly seen", unseen: "never seen" };
-const WAYS = /** @type {Record<string, number[]>} */ ({
+const DIRECTIONS = /** @type {Record<string, number[]>} */ ({
   ArrowLeft: [-1, 0, 0],
   ArrowRight: [1, 0, 0],
   ArrowUp: [0, 1, 0],
   ArrowDown: [0, -1, 0],
-  PageUp: [0, 0, -1], // away from whoever looks
+  PageUp: [0, 0, -1], // away from the viewer
   PageDown: [0, 0, 1],
 });
 
@@ -23,12 +23,12 @@ export class Handles {
     this.element.setAttribute("role", "group");
     this.element.setAttribute("aria-label", "Handles of the body");
     this.viewer.overlay.append(this.element);
-    /** @type {{element: HTMLElement, point: import("./session.js").Handle}[]} one a joint, then those of heels */
+    /** @type {{element: HTMLElement, point: import("./session.js").Handle}[]} one for each joint, then the heels */
     this.marks = [];
     this.point = new Vector3();
     /** @type {{joint: string, plane: Vector3, away: Vector3, moved: boolean} | null} */
     this.held = null;
-    /** @type {{joint: string, place: number[]} | null} where keys have moved a handle to */
+    /** @type {{joint: string, place: number[]} | null} target of a handle that keys move */
     this.goal = null;
     this.pause = 0;
     this.listening = new AbortController();
@@ -36,7 +36,7 @@ export class Handles {
     this.viewer.addEventListener("draw", () => this.#follow(), { signal });
     this.viewer.addEventListener("show", () => this.#appear(), { signal });
     editor.addEventListener("open", () => this.#make(), { signal });
-    editor.addEventListener("change", () => this.#tell(), { signal });
+    editor.addEventListener("change", () => this.#label(), { signal });
     this.#make();
   }
 
@@ -52,10 +52,10 @@ export class Handles {
     const joints = editor.joints.map(({ joint }) => handles.get(joint) ?? bare(joint));
     const heels = editor.handles.filter(({ joint, on }) => joint !== on);
     this.marks = [...joints, ...heels].map((point) => ({ point, element: point.words ? this.#handle(point) : mark() }));
-    // The Tab key goes from handle to handle as they are listed.
+    // The Tab key follows this order.
     this.element.replaceChildren(...this.marks.map(({ element }) => element));
     this.#appear();
-    this.#tell();
+    this.#label();
   }
 
   #appear() {
@@ -80,8 +80,8 @@ export class Handles {
     return handle;
   }
 
-  /** Show how well each joint is known. */
-  #tell() {
+  /** Label each joint with how well the corpus knows it. */
+  #label() {
     const { known, selected, joints, busy } = this.editor;
     this.element.ariaBusy = String(busy);
     const at = new Map(joints.map(({ joint }, i) => [joint, i]));
@@ -95,7 +95,7 @@ export class Handles {
     }
   }
 
-  /** Put the handles where their joints are seen. */
+  /** Move the handles to their joints in the view. */
   #follow() {
     const { editor, viewer } = this;
     if (!editor.shown || !viewer.stage) return;
@@ -135,7 +135,7 @@ export class Handles {
     if (held?.moved) this.editor.end();
   }
 
-  /** The place under the pointer in the plane through `place` that faces the camera. @param {PointerEvent} event @param {Vector3} place */
+  /** The position under the pointer in the plane through `place` that faces the camera. @param {PointerEvent} event @param {Vector3} place */
   #under(event, place) {
     const { camera } = this.viewer.stage;
     const { left, top, width, height } = this.element.getBoundingClientRect();
@@ -151,23 +151,23 @@ export class Handles {
   /** @param {KeyboardEvent} event @param {import("./session.js").Handle} point */
   #press(event, point) {
     const { joint, words } = point;
-    const way = WAYS[event.key];
-    if (!way || event.ctrlKey || event.metaKey || event.altKey) return;
+    const direction = DIRECTIONS[event.key];
+    if (!direction || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     event.stopPropagation();
     const { editor } = this;
-    const far = STEP * editor.motion.body.size * (event.shiftKey ? 5 : 1);
-    const towards = new Vector3(...way).applyQuaternion(this.viewer.stage.camera.quaternion).multiplyScalar(far);
-    // Keys in quick succession move on from where the last one leads to, and are one step.
+    const distance = KEY_STEP_M * editor.motion.body.size * (event.shiftKey ? 5 : 1);
+    const towards = new Vector3(...direction).applyQuaternion(this.viewer.stage.camera.quaternion).multiplyScalar(distance);
+    // Keys in quick succession continue from the last target, and make one step.
     const from = editor.began && this.goal?.joint === joint ? this.goal.place : editor.place(point);
     this.goal = { joint, place: new Vector3(...from).add(towards).toArray() };
     editor.drag(joint, this.goal.place, words);
     clearTimeout(this.pause);
-    this.pause = setTimeout(() => editor.end(), PAUSE);
+    this.pause = setTimeout(() => editor.end(), KEY_PAUSE_MS);
   }
 }
 
-/** A joint that is no handle. @param {string} joint @returns {import("./session.js").Handle} */
+/** A joint without a handle. @param {string} joint @returns {import("./session.js").Handle} */
 function bare(joint) {
   return { joint, words: "", on: joint, at: [0, 0, 0] };
 }

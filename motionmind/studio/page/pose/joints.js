@@ -1,4 +1,4 @@
-/** The joints one by one: angles in words, each with its limits. */
+/** Sliders for the angles of one joint, within their limits. */
 
 import { html } from "../vendor/htm-preact-standalone.js";
 

@@ -1,7 +1,8 @@
-/** What becomes of a posture: a name, an end of a movement, a place on the line of time, lines of a score. */
+/** Use a posture: save it by name, use it as A or B, add it to the time line, or copy it for a score. */
 
 import { html, useState } from "../vendor/htm-preact-standalone.js";
 import { deskOf } from "../between/desk.js";
+import { insert, newId } from "../timeline/items.js";
 
 /** @param {{studio: any, editor: import("./session.js").Editor}} props */
 export function Keep({ studio, editor }) {
@@ -12,7 +13,7 @@ export function Keep({ studio, editor }) {
     const key = await editor.keep(called);
     const replaced = studio.store.state?.postures?.some((/** @type {{name: string}} */ one) => one.name === called);
     await studio.api.edit({ edit: "posture", name: called, posture: key });
-    studio.say(replaced ? `${called} is replaced: undo brings the one before back.` : `Saved as ${called}.`);
+    studio.say(replaced ? `Replaced ${called}. Undo restores the old one.` : `Saved as ${called}.`);
     return `own/${called}`;
   };
   const end = (/** @type {"a" | "b"} */ which) => async () => {
@@ -22,21 +23,20 @@ export function Keep({ studio, editor }) {
   };
   const place = async () => {
     const key = await editor.keep(called);
-    const id = `${studio.window}-p${Date.now().toString(36)}`;
-    await studio.api.edit({ edit: "insert", id, source: key, first: 0, last: 0, mirrored: false, before: null });
-    studio.say("On the time line.");
+    await studio.api.edit(insert(newId(studio.window), { key, frame: 0 }));
+    studio.say("Added to the time line.");
   };
   const copy = async () => {
     const text = await editor.lines(called);
     setLines(text);
     await navigator.clipboard?.writeText(text).then(
-      () => studio.say("Copied as lines of a score."),
+      () => studio.say("Copied for a score."),
       () => {},
     );
   };
   const doing = (/** @type {string} */ what, /** @type {() => Promise<any>} */ act) => () => studio.once(`${what} a posture`, act);
-  return html`<section class="stack" aria-label="Keep the posture">
-    <h3>Keep it</h3>
+  return html`<section class="stack" aria-label="Use the posture">
+    <h3>Use it</h3>
     <form
       class="row"
       onSubmit=${(/** @type {Event} */ event) => {
@@ -58,7 +58,7 @@ export function Keep({ studio, editor }) {
     <div class="row wide">
       <button class="button" data-testid="use-a" onClick=${doing("begin with", end("a"))}>Use as A</button>
       <button class="button" data-testid="use-b" onClick=${doing("end with", end("b"))}>Use as B</button>
-      <button class="button" data-testid="posture-to-timeline" onClick=${doing("insert", place)}>Onto the time line</button>
+      <button class="button" data-testid="posture-to-timeline" onClick=${doing("insert", place)}>Add to the time line</button>
       <button class="button" data-testid="copy-score" onClick=${doing("copy", copy)}>Copy for a score</button>
     </div>
     ${lines && html`<textarea readonly aria-label="Lines of a score" data-testid="score-lines" value=${lines}></textarea>`}

@@ -1,10 +1,10 @@
-/** Requests of which the latest counts: while one is under way, of those that come only the last waits. */
+/** A queue of one: while a request is under way, only the latest new one waits. */
 
 export class Latest {
   /**
    * @param {(answer: any) => void} taken called with each answer
    * @param {(error: unknown) => void} failed
-   * @param {() => void} rests called when nothing is under way any more
+   * @param {() => void} rests called when no request is left
    */
   constructor(taken, failed, rests) {
     this.taken = taken;
@@ -23,7 +23,7 @@ export class Latest {
     if (!this.busy) this.#run();
   }
 
-  /** Wait until nothing is under way. @returns {Promise<void>} */
+  /** Wait until no request is left. @returns {Promise<void>} */
   settled() {
     return this.busy ? new Promise((resolve) => this.waiting.push(resolve)) : Promise.resolve();
   }

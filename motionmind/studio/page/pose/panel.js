@@ -1,6 +1,7 @@
-/** Flow 4, postures: what is posed, what the corpus knows of it, its joints one by one, and what becomes of it. */
+/** The pose panel: where to start, how well the corpus knows the posture, its joints, and how to use it. */
 
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.js";
+import { dropped } from "../between/desk.js";
 import { stable } from "../places.js";
 import { useChange, useKeys } from "../shell/hooks.js";
 import { Handles } from "./handles.js";
@@ -19,7 +20,7 @@ const KNOWN = /** @type {[import("./session.js").Known, string][]} */ ([
 export function Panel({ studio }) {
   const editor = editorOf(studio);
   useChange(editor, () => editor.version);
-  useChange(studio.viewer, () => studio.viewer.motion, "show"); // whether the posture is what it shows
+  useChange(studio.viewer, () => studio.viewer.motion, "show"); // whether it shows the posture
   useEffect(() => {
     if (editor.motion) editor.show();
     else studio.act(() => start(studio));
@@ -30,12 +31,12 @@ export function Panel({ studio }) {
     };
   }, []);
   useKeys(studio, [
-    { keys: ["Ctrl+z"], does: "take the last change of the posture back", group: GROUP, act: (event) => isOfPosture(event, editor, editor.began ?? editor.past[0]) && editor.undo() },
-    { keys: ["Ctrl+Shift+z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "do it again", group: GROUP, act: (event) => isOfPosture(event, editor, editor.future[0]) && editor.redo() },
-    { keys: ["k"], does: "bring it to what is known", group: GROUP, act: () => toKnown(editor) },
-    { keys: ["f"], does: "feet on the floor", group: GROUP, act: () => toFloor(editor) },
-    { shown: ["Tab"], does: "from handle to handle", group: GROUP },
-    { shown: ["arrows", "Page up", "Page down"], does: "move a handle in the picture, away, towards; with Shift further", group: GROUP },
+    { keys: ["Ctrl+z"], does: "undo the last change of the posture", group: GROUP, act: (event) => isOfPosture(event, editor, editor.began ?? editor.past[0]) && editor.undo() },
+    { keys: ["Ctrl+Shift+z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "redo it", group: GROUP, act: (event) => isOfPosture(event, editor, editor.future[0]) && editor.redo() },
+    { keys: ["k"], does: "match the corpus", group: GROUP, act: () => toKnown(editor) },
+    { keys: ["f"], does: "put the feet on the floor", group: GROUP, act: () => toFloor(editor) },
+    { shown: ["Tab"], does: "go from handle to handle", group: GROUP },
+    { shown: ["arrows", "Page up", "Page down"], does: "move a handle across the view, away, towards (with Shift farther)", group: GROUP },
   ]);
   return html`<div class="pose stack" data-testid="editor">
     <${Start} studio=${studio} />
@@ -44,30 +45,28 @@ export function Panel({ studio }) {
         ? html`<${Known} editor=${editor} /><${Whole} editor=${editor} />
             <${Keep} studio=${studio} editor=${editor} />
             <${Joints} editor=${editor} />`
-        : html`<p class="empty">Let the viewer show a moment, then pose it.</p>`
+        : html`<p class="empty">Show a movement in the viewer, then pose a frame of it.</p>`
     }
   </div>`;
 }
 
 /**
- * Whether a key is for a posture's change, if there is one: not at the line of time, nor where the posture is not shown.
+ * Whether a key undoes or redoes a change of the posture: only if the viewer shows it, and not on the time line.
  * @param {Event} event @param {import("./session.js").Editor} editor @param {unknown} change
  */
 function isOfPosture({ target }, editor, change) {
   return Boolean(change) && editor.shown && !(target instanceof Element && target.closest(".timeline"));
 }
 
-/** Where posing starts. @param {{studio: any}} props */
+/** The choice of a posture to start from. @param {{studio: any}} props */
 function Start({ studio }) {
   const editor = editorOf(studio);
   const postures = useGallery(studio);
   const open = (/** @type {string} */ key, frame = 0, title = "") => studio.act(() => editor.open(key, frame, title));
   const drop = (/** @type {DragEvent} */ event) => {
     event.preventDefault();
-    const given = event.dataTransfer?.getData("application/x-motionmind-posture");
-    if (!given) return;
-    const { key, frame, title } = JSON.parse(given);
-    open(key, frame, title);
+    const place = dropped(event);
+    if (place) open(place.key, place.frame, place.title);
   };
   const moment = editor.shown ? null : studio.viewer.moment;
   return html`<div onDragOver=${(/** @type {Event} */ event) => event.preventDefault()} onDrop=${drop}>
@@ -88,20 +87,20 @@ function Start({ studio }) {
     ${
       moment &&
       html`<button class="button" data-testid="pose-moment" onClick=${() => open(moment.key, moment.frame, momentName(studio))}>
-        Pose the moment that is shown
+        Pose this moment
       </button>`
     }
-    ${editor.motion && !editor.shown && html`<button class="button" onClick=${() => editor.show()}>Go on with the posture</button>`}
+    ${editor.motion && !editor.shown && html`<button class="button" onClick=${() => editor.show()}>Back to the posture</button>`}
   </div>`;
 }
 
-/** How much of the body the corpus knows. @param {{editor: import("./session.js").Editor}} props */
+/** How well the corpus knows the posture. @param {{editor: import("./session.js").Editor}} props */
 function Known({ editor }) {
   const { known, corpus, joints, words } = editor;
-  if (!known.length) return html`<p class="hint">${corpus} is of another body, and knows nothing of this one's joints.</p>`;
+  if (!known.length) return html`<p class="hint">${corpus} has a different body: it does not know these joints.</p>`;
   const strangers = joints.filter((_, i) => known[i] === "unseen").map((joint) => joint.words);
-  return html`<section aria-label="What the corpus knows">
-    <h3>Joints as ${corpus} has them</h3>
+  return html`<section aria-label="Joints in the corpus">
+    <h3>Joints seen in ${corpus}</h3>
     <div class="known" data-testid="known">
       ${KNOWN.map(
         ([how, label]) =>
@@ -109,12 +108,12 @@ function Known({ editor }) {
       )}
     </div>
     <p class="hint strangers" aria-live="polite" data-testid="strangers">
-      ${words || (strangers.length ? `Never seen so: ${strangers.slice(0, 4).join(", ")}${strangers.length > 4 ? " …" : ""}` : "")}
+      ${words || (strangers.length ? `Never seen: ${strangers.slice(0, 4).join(", ")}${strangers.length > 4 ? " …" : ""}` : "")}
     </p>
   </section>`;
 }
 
-/** What changes the whole posture. @param {{editor: import("./session.js").Editor}} props */
+/** Buttons that change the whole posture. @param {{editor: import("./session.js").Editor}} props */
 function Whole({ editor }) {
   const { past, future, known, standing, released, joints, mirrors } = editor;
   const strange = known.includes("unseen");
@@ -122,7 +121,7 @@ function Whole({ editor }) {
   return html`<section class="stack" aria-label="The whole posture">
     <div class="row wide">
       <button class="button ${strange ? "primary" : ""}" data-testid="to-known" disabled=${known.every((one) => one === "seen")} onClick=${() => toKnown(editor)}>
-        Bring to what is known
+        Match the corpus
       </button>
       <button class="button" data-testid="to-whole" disabled=${!known.length} onClick=${() => editor.change("whole", "take the nearest posture")}>
         Nearest posture
@@ -132,10 +131,10 @@ function Whole({ editor }) {
         Mirror
       </button>
       <button class="button" data-testid="pose-undo" disabled=${!past.length} title=${past.at(-1)?.words ?? ""} onClick=${() => editor.undo()}>
-        Back a step
+        Undo
       </button>
       <button class="button" data-testid="pose-redo" disabled=${!future.length} title=${future.at(-1)?.words ?? ""} onClick=${() => editor.redo()}>
-        Step again
+        Redo
       </button>
     </div>
     ${standing.map(
@@ -146,7 +145,7 @@ function Whole({ editor }) {
             checked=${!released.has(foot)}
             onChange=${(/** @type {any} */ event) => editor.hold(foot, event.target.checked)}
           />
-          The ${wordsOf(foot)} stays where it stands
+          Keep the ${wordsOf(foot)} in place
         </label>`,
     )}
   </section>`;
@@ -154,27 +153,27 @@ function Whole({ editor }) {
 
 /** @param {import("./session.js").Editor} editor */
 function toKnown(editor) {
-  return editor.change("known", "bring it to what is known");
+  return editor.change("known", "match the corpus");
 }
 
 /** @param {import("./session.js").Editor} editor */
 function toFloor(editor) {
-  return editor.change("floor", "put it on the floor");
+  return editor.change("floor", "put the feet on the floor");
 }
 
-/** Start from what is shown, or else from the first posture there is. @param {any} studio */
+/** Start from the moment in view, or else from the first posture of the gallery. @param {any} studio */
 async function start(studio) {
   const { moment } = studio.viewer;
   const from = moment ?? listed(await studio.api.get("/api/gallery"))[0]?.of[0];
   if (from) await editorOf(studio).open(from.key, from.frame ?? 0, moment ? momentName(studio) : "");
 }
 
-/** What the moment that is shown is called where it is the piece's; "" leaves it to its movement's title. @param {any} studio */
+/** The name of the moment in view if it is the piece's; "" for its movement's title. @param {any} studio */
 function momentName({ viewer, store }) {
   return viewer.isHome ? `${store.state.title || "the piece"} at ${viewer.player.time.toFixed(1)} s` : "";
 }
 
-/** The postures that there are, in groups. @param {any} studio */
+/** The gallery's postures, in groups. @param {any} studio */
 function useGallery(studio) {
   const [found, setFound] = useState(/** @type {ReturnType<typeof listed>} */ ([]));
   const saved = useChange(studio.store, () => JSON.stringify(studio.store.state?.postures ?? null));
@@ -189,7 +188,7 @@ function useGallery(studio) {
  * @returns {{group: string, of: {key: string, title: string, frame?: number}[]}[]}
  */
 function listed({ corpora, own }) {
-  const fixed = own.map(({ key, title }) => ({ key: stable(key), title })); // which stays, though it is called something else
+  const fixed = own.map(({ key, title }) => ({ key: stable(key), title })); // unchanged when the posture is renamed
   const groups = [{ group: "Your own", of: fixed }, ...corpora.map(({ name, postures }) => ({ group: name, of: postures }))];
   return groups.filter(({ of }) => of.length > 0);
 }

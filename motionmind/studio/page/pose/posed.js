@@ -1,4 +1,4 @@
-/** A posture that is being made, with the interface of the player's `Motion`: one frame, which changes. */
+/** The posture in the editor as a `Motion` of the player: one frame, which changes. */
 
 import { Motion } from "motionmind/motion";
 

@@ -1,11 +1,12 @@
-/** The pose editor: the posture that is being made, the steps that led to it, and what the corpus knows of it. */
+/** The pose editor: the posture, the steps that led to it, and how well the corpus knows it. */
 
 import { movement } from "../movements.js";
+import { perStudio } from "../shell/hooks.js";
 import { Latest } from "./latest.js";
 import { Posed } from "./posed.js";
 
-const ROOM = 1.25; // how much farther away than the whole body needs: limbs go further
-const STEPS = 200; // that can be taken back
+const CAMERA_DISTANCE_RATIO = 1.25; // leaves room for limbs that reach out
+const MAX_UNDO_STEPS = 200;
 
 /**
  * @typedef {{rotations: number[], root: number[]}} Posture
@@ -14,21 +15,14 @@ const STEPS = 200; // that can be taken back
  * @typedef {{joint: string, words: string, angle: string, label: string, least: number, most: number, degrees: number}} Turn
  * @typedef {"seen" | "near" | "unseen"} Known
  * @typedef {{motion: any, key: string, title: string, joints: Joint[], handles: Handle[], turns: Turn[], mirrors: boolean,
- *   released: Set<string>}} Opened what is posed: the movement that the posture was opened of, and its body
+ *   released: Set<string>}} Opened the movement that the posture comes from, and its body
  * @typedef {{posture: Posture, opened: Opened, words: string}} Step
  */
 
-/** @type {WeakMap<object, Editor>} */
-const editors = new WeakMap();
+/** The pose editor of a studio. */
+export const editorOf = perStudio((studio) => new Editor(studio));
 
-/** The editor of a page. @param {any} studio @returns {Editor} */
-export function editorOf(studio) {
-  const known = editors.get(studio) ?? new Editor(studio);
-  editors.set(studio, known);
-  return known;
-}
-
-/** Fires "change" whenever something has changed, and "open" when another posture was opened. */
+/** Fires "change" on any change, and "open" when another posture is opened. */
 export class Editor extends EventTarget {
   /** @param {any} studio */
   constructor(studio) {
@@ -45,15 +39,15 @@ export class Editor extends EventTarget {
     this.handles = [];
     /** @type {Turn[]} */
     this.turns = [];
-    /** @type {Known[]} how well each joint is known; empty where the corpus is of another body */
+    /** @type {Known[]} how well the corpus knows each joint; empty if it has another body */
     this.known = [];
-    /** @type {string[]} the feet that stand, by their last joints */
+    /** @type {string[]} the standing feet, by their last joints */
     this.standing = [];
-    /** @type {Set<string>} feet that may leave their places */
+    /** @type {Set<string>} standing feet that may leave their places */
     this.released = new Set();
     this.mirrors = false;
     this.selected = "";
-    this.dragged = ""; // the joint or heel that was dragged last
+    this.dragged = ""; // the joint or heel dragged last
     this.words = "";
     /** @type {Posture} */
     this.posture = { rotations: [], root: [] };
@@ -61,50 +55,50 @@ export class Editor extends EventTarget {
     this.past = [];
     /** @type {Step[]} */
     this.future = [];
-    /** @type {{posture: Posture, standing: string[], words: string} | null} where a drag or a turn began, and what it is */
+    /** @type {{posture: Posture, standing: string[], words: string} | null} the drag or turn under way: where it began, and its description */
     this.began = null;
     this.version = 0; // counts changes, for views
     this.requests = new Latest(
-      (told) => this.#take(told),
+      (answer) => this.#take(answer),
       (error) => studio.say(error instanceof Error ? error.message : String(error), { kind: "error" }),
       () => this.#changed(),
     );
   }
 
   /**
-   * Open a frame of a movement. If a posture is being made, that is a step of it, which can be taken back.
+   * Open a frame of a movement. After earlier steps this is a step too, which undo takes back.
    * @param {string} key @param {number} frame @param {string} name the movement's title if ""
    */
   async open(key, frame = 0, name = "") {
-    const [told, source] = await Promise.all([
+    const [answer, source] = await Promise.all([
       this.studio.api.post("/api/pose/open", { key, frame }),
       movement(this.studio.api, key),
     ]);
     await this.end();
-    const { joints, handles, mirrors } = told;
-    const title = name || told.title;
-    const shown = told.rotations.length ? { rotations: told.rotations, root: told.root } : this.posture;
+    const { joints, handles, mirrors } = answer;
+    const title = name || answer.title;
+    const shown = answer.rotations.length ? { rotations: answer.rotations, root: answer.root } : this.posture;
     if (this.past.length) this.#step(this.posture, `start from ${title}`);
     else this.future = [];
     this.#put({ motion: new Posed(source, shown), key, title, joints, handles, turns: [], mirrors, released: new Set() });
-    this.#take(told);
+    this.#take(answer);
     this.show();
     this.dispatchEvent(new Event("open"));
   }
 
-  /** Have the viewer show it. */
+  /** Show the posture in the viewer. */
   show() {
     if (!this.motion) return;
     const { viewer } = this.studio;
-    viewer.show(this.motion, { time: 0, title: `${this.title}, being changed` });
+    viewer.show(this.motion, { time: 0, title: `${this.title}, being edited` });
     if (!viewer.stage) return;
     const { camera, controls } = viewer.stage;
-    viewer.stage.view = undefined; // else it would come back where that is when the picture's size changes
-    camera.position.sub(controls.target).multiplyScalar(ROOM).add(controls.target);
+    viewer.stage.view = undefined; // otherwise a resize would reset the camera
+    camera.position.sub(controls.target).multiplyScalar(CAMERA_DISTANCE_RATIO).add(controls.target);
     controls.update();
   }
 
-  /** Have the viewer show the piece again, if there is one. */
+  /** Show the piece again, if there is one. */
   leave() {
     const { viewer } = this.studio;
     if (!this.shown) return;
@@ -112,17 +106,17 @@ export class Editor extends EventTarget {
     else viewer.show(this.motion, { time: 0, title: this.title, look: false });
   }
 
-  /** Whether it is being changed. */
+  /** Whether a change is under way. */
   get busy() {
     return this.began !== null || this.requests.busy;
   }
 
-  /** Whether the viewer shows it. */
+  /** Whether the viewer shows the posture. */
   get shown() {
     return this.motion !== null && this.studio.viewer.motion === this.motion;
   }
 
-  /** The place of a handle, metres. @param {Handle} handle @returns {number[]} */
+  /** The position of a handle, metres. @param {Handle} handle @returns {number[]} */
   place({ on, at }) {
     const { body, joints } = this.motion;
     body.pose(this.posture.rotations, this.posture.root);
@@ -136,7 +130,7 @@ export class Editor extends EventTarget {
     this.#changed();
   }
 
-  /** Let a foot leave its place, or hold it there. @param {string} foot @param {boolean} stays */
+  /** Hold a foot in its place, or release it. @param {string} foot @param {boolean} stays */
   hold(foot, stays) {
     this.released = new Set(this.released);
     if (stays) this.released.delete(foot);
@@ -144,7 +138,7 @@ export class Editor extends EventTarget {
     this.#changed();
   }
 
-  /** Drag a joint or a heel to a place, until `end`. @param {string} joint @param {number[]} place @param {string} words */
+  /** Drag a joint or a heel to a position, until `end`. @param {string} joint @param {number[]} place @param {string} words */
   drag(joint, place, words) {
     this.#begin(`drag the ${words}`);
     this.dragged = joint;
@@ -168,7 +162,7 @@ export class Editor extends EventTarget {
     this.requests.send(() => this.studio.api.post("/api/pose/turn", { pose: this.#pose(this.posture), joint, angle, degrees }));
   }
 
-  /** What was dragged or turned until now is one step. */
+  /** End a drag or a turn, which becomes one step. */
   async end() {
     await this.requests.settled();
     const { began } = this;
@@ -177,7 +171,7 @@ export class Editor extends EventTarget {
     else this.#changed();
   }
 
-  /** Make another posture of it. @param {"mirror" | "floor" | "known" | "whole"} to @param {string} words */
+  /** Change the whole posture. @param {"mirror" | "floor" | "known" | "whole"} to @param {string} words */
   async change(to, words) {
     await this.end();
     if (!this.shown) this.show();
@@ -200,13 +194,13 @@ export class Editor extends EventTarget {
     this.#travel(this.future, this.past);
   }
 
-  /** Keep it in the project: its key. @param {string} name @returns {Promise<string>} */
+  /** Store the posture in the project; return its key. @param {string} name @returns {Promise<string>} */
   async keep(name) {
     await this.end();
     return (await this.studio.api.post("/api/pose/keep", { pose: this.#pose(this.posture), name })).key;
   }
 
-  /** It as lines of a score. @param {string} name @returns {Promise<string>} */
+  /** Return the posture as lines of a score. @param {string} name @returns {Promise<string>} */
   async lines(name) {
     return (await this.studio.api.post("/api/pose/score", { pose: this.#pose(this.posture), name })).lines;
   }
@@ -220,7 +214,7 @@ export class Editor extends EventTarget {
 
   /** @param {Posture} before @param {string} words */
   #step(before, words) {
-    this.past = [...this.past, { posture: before, opened: this.#opened, words }].slice(-STEPS);
+    this.past = [...this.past, { posture: before, opened: this.#opened, words }].slice(-MAX_UNDO_STEPS);
     this.future = [];
     this.#changed();
   }
@@ -231,7 +225,7 @@ export class Editor extends EventTarget {
     return { motion, key, title, joints, handles, turns, mirrors, released };
   }
 
-  /** Pose another. @param {Opened} opened */
+  /** Switch to another posture. @param {Opened} opened */
   #put(opened) {
     Object.assign(this, opened, { selected: opened.handles[0]?.on ?? "", dragged: "", words: "" });
   }
@@ -254,12 +248,13 @@ export class Editor extends EventTarget {
     this.#changed();
   }
 
-  /** @param {any} told */
-  #take(told) {
-    this.posture = { rotations: told.rotations, root: told.root };
+  /** @param {any} answer */
+  #take(answer) {
+    const { rotations, root, known, corpus, standing, words = "" } = answer;
+    this.posture = { rotations, root };
     this.motion.take(this.posture);
-    Object.assign(this, { known: told.known, corpus: told.corpus, standing: told.standing, words: told.words ?? "" });
-    this.turns = told.turns ?? this.turns.map((turn, i) => ({ ...turn, degrees: told.degrees[i] }));
+    Object.assign(this, { known, corpus, standing, words });
+    this.turns = answer.turns ?? this.turns.map((turn, i) => ({ ...turn, degrees: answer.degrees[i] }));
     this.#changed();
   }
 
@@ -275,7 +270,7 @@ export class Editor extends EventTarget {
   }
 }
 
-/** Whether one can see that postures differ. @param {Posture} a @param {Posture} b */
+/** Whether postures differ visibly. @param {Posture} a @param {Posture} b */
 function differ(a, b) {
   const far = (/** @type {number[]} */ one, /** @type {number[]} */ other) => one.some((x, i) => Math.abs(x - other[i]) > 1e-5);
   return far(a.rotations, b.rotations) || far(a.root, b.root);

@@ -1,4 +1,4 @@
-/** The bar above everything: the piece's title, undo and redo, paper, keys, and whether the studio is there. */
+/** The top bar: the piece's title, undo and redo, theme, keys, and the connection's state. */
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { filmingOf } from "../export/filming.js";
@@ -15,16 +15,16 @@ export function Bar({ studio }) {
   const connected = useChange(store, () => store.connected !== false);
   const dark = useChange(viewer.theme, () => viewer.theme.dark);
   const [sheet, setSheet] = useState(false);
-  // Keys are pressed though there is nothing to take back, and before what was asked for last is answered.
+  // A key may be pressed with nothing to undo, and before the last edit is answered.
   const undo = () => studio.act(() => studio.api.changed.then(() => store.state?.undo && studio.api.undo()));
   const redo = () => studio.act(() => studio.api.changed.then(() => store.state?.redo && studio.api.redo()));
   useKeys(studio, [
     { keys: ["Ctrl+z"], does: "undo", act: undo },
     { keys: ["Ctrl+Shift+z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "redo", act: redo },
-    { keys: ["d"], does: "dark paper, or light", act: () => viewer.theme.toggle() },
-    { keys: ["p"], does: "to the panels", act: () => focus(".rail [aria-selected=true]") },
-    { keys: ["t"], does: "to the time line", act: () => focus(".timeline .stretches [tabindex='0']") },
-    { keys: ["?"], does: "these keys", act: () => setSheet(true) },
+    { keys: ["d"], does: "dark or light", act: () => viewer.theme.toggle() },
+    { keys: ["p"], does: "go to the panels", act: () => focus(".rail [aria-selected=true]") },
+    { keys: ["t"], does: "go to the time line", act: () => focus(".timeline .stretches [tabindex='0']") },
+    { keys: ["?"], does: "show the keys", act: () => setSheet(true) },
   ]);
   return html`<header class="bar">
     <h1 class="brand">${icon("brand")}<span>MotionMind</span></h1>
@@ -33,14 +33,14 @@ export function Bar({ studio }) {
     <span class="space"></span>
     <${Readiness} store=${store} />
     <${Film} studio=${studio} />
-    ${!connected && html`<span class="offline" role="alert" data-testid="offline">Not connected: nothing is saved${refusal && `; ${refusal}`}</span>`}
+    ${!connected && html`<span class="offline" role="alert" data-testid="offline">Not connected: edits are not saved${refusal && `; ${refusal}`}</span>`}
     ${button("undo", "Undo", state?.undo, undo)} ${button("redo", "Redo", state?.redo, redo)}
     <button
       class="button quiet icon"
       data-testid="dark"
-      aria-label="Dark paper"
+      aria-label="Dark"
       aria-pressed=${String(dark)}
-      title="Dark paper, or light (D)"
+      title="Dark or light (D)"
       onClick=${() => viewer.theme.toggle()}
     >
       ${icon("dark")}
@@ -52,12 +52,12 @@ export function Bar({ studio }) {
   </header>`;
 }
 
-/** Let what is found first have the keys. @param {string} selector */
+/** Focus the first match. @param {string} selector */
 function focus(selector) {
   /** @type {HTMLElement | null} */ (document.querySelector(selector))?.focus();
 }
 
-/** How far the studio is that gets ready for its first search. @param {{store: any}} props */
+/** Progress of the preparation for the first search. @param {{store: any}} props */
 function Readiness({ store }) {
   const job = useChange(store, () => preparing(store));
   return (
@@ -68,13 +68,13 @@ function Readiness({ store }) {
   );
 }
 
-/** How far a film is that is made; leads to where it can be stopped. @param {{studio: any}} props */
+/** Progress of a film in the making; a click opens the panel that can stop it. @param {{studio: any}} props */
 function Film({ studio }) {
   const filming = filmingOf(studio);
   const share = useChange(filming, () => filming.share);
   return (
     share !== null &&
-    html`<button class="button quiet numbers" data-testid="filming" title="A film is being made: go to where it can be stopped"
+    html`<button class="button quiet numbers" data-testid="filming" title="Making a film: open the panel to stop it"
       onClick=${() => studio.open("take")}>
       Film ${Math.round(100 * share)} %
     </button>`
@@ -101,9 +101,9 @@ function Title({ studio, title: known }) {
   const title = known ?? "";
   const [written, write] = useState(title);
   const field = useRef(/** @type {any} */ (null));
-  const before = useRef(""); // what it held when somebody came to it: another window may call the piece something else meanwhile
+  const before = useRef(""); // the title on focus: another window may rename the piece meanwhile
   useEffect(() => {
-    if (document.activeElement !== field.current) write(title); // nobody's words are taken from under their fingers
+    if (document.activeElement !== field.current) write(title); // never overwrite what the user is typing
     document.title = title ? `${title} · MotionMind studio` : "MotionMind studio";
   }, [title]);
   const save = () => {

@@ -3,8 +3,8 @@
 import { html, useState } from "../vendor/htm-preact-standalone.js";
 
 /**
- * A field for a number. What is being written stays in it, however often its view is drawn anew meanwhile; then `use`
- * returns the number that is in use, or null for none, and the field shows that.
+ * A field for a number. It keeps what the user is typing while its view is rendered again; then `use` returns the number in
+ * use, or null for none, and the field shows it.
  * @param {{value: number | string, use: (given: number) => number | string | null, rest?: unknown}} props
  */
 export function NumberField({ value, use, ...rest }) {

@@ -1,12 +1,12 @@
-/** Hooks for views: what is told by events. */
+/** Hooks that connect views to events and keys. */
 
 import { useEffect, useLayoutEffect, useReducer, useRef } from "../vendor/htm-preact-standalone.js";
 
 /**
- * What `pick` takes from a target; the view is made again when that changes.
+ * Return what `pick` takes from a target; render again when it changes.
  * @template T
  * @param {EventTarget} target
- * @param {() => T} pick returns something that is the same as long as nothing has changed
+ * @param {() => T} pick must return an identical value as long as nothing has changed
  * @param {string} event
  * @returns {T}
  */
@@ -21,14 +21,30 @@ export function useChange(target, pick, event = "change") {
       if (!Object.is(picking.current(), shown.current)) again(0);
     };
     target.addEventListener(event, changed);
-    changed(); // while the page was being drawn
+    changed(); // it may have changed during rendering
     return () => target.removeEventListener(event, changed);
   }, [target, event]);
   return shown.current;
 }
 
 /**
- * Let keys act as long as a view is there.
+ * Return a function that makes one object for a studio, which outlives the panels that use it.
+ * @template T
+ * @param {(studio: any) => T} make
+ * @returns {(studio: any) => T}
+ */
+export function perStudio(make) {
+  /** @type {WeakMap<object, T>} */
+  const made = new WeakMap();
+  return (studio) => {
+    const known = made.get(studio) ?? make(studio);
+    made.set(studio, known);
+    return known;
+  };
+}
+
+/**
+ * Register keys while a view is mounted.
  * @param {{keys: import("./keys.js").Keys}} studio
  * @param {import("./keys.js").Row[]} rows
  */

@@ -1,4 +1,4 @@
-/** Pictures on buttons, drawn for the studio: lines on a field of 20 by 20. */
+/** Icons, drawn for the studio: lines on a 20 by 20 grid. */
 
 import { html } from "../vendor/htm-preact-standalone.js";
 
@@ -26,7 +26,7 @@ const PATHS = /** @type {Record<string, string>} */ ({
 const FULL = /** @type {Record<string, string>} */ ({ play: "M6 3.500v13l10-6.500z", pause: "M5 4h3.500v12H5zM11.500 4H15v12h-3.500z" });
 
 /**
- * A picture; words beside it, or the button's label, say the same.
+ * An icon; text beside it, or the button's label, names it.
  * @param {string} name
  */
 export function icon(name) {

@@ -1,21 +1,21 @@
-/** Keys of the whole page: one table, by which they act and which the sheet shows. */
+/** The page's keys: one table for their actions and for the sheet of keys. */
 
 import { orbit } from "motionmind/keys";
 
 /**
  * @typedef {object} Row
  * @property {string[]} [keys] what `event.key` is; with "Ctrl+" and "Shift+" before
- * @property {string[]} [shown] how they are shown; as `keys` where left out
- * @property {string} does what they do
- * @property {string} [group] the heading that they stand under
- * @property {(event: KeyboardEvent) => unknown} [act] does it; false leaves the key to others
+ * @property {string[]} [shown] labels; by default those of `keys`
+ * @property {string} does description
+ * @property {string} [group] heading in the sheet
+ * @property {(event: KeyboardEvent) => unknown} [act] the action; false leaves the key to other rows
  */
 
 const SHOWN = /** @type {Record<string, string>} */ ({ " ": "Space", ArrowLeft: "←", ArrowRight: "→", ArrowUp: "↑", ArrowDown: "↓" });
-// What holds the keys that it needs for itself.
+// Elements that need some keys for themselves.
 const WRITING = "input:not([type=range]):not([type=checkbox]):not([type=radio]), textarea, select, [contenteditable]";
 const PRESSING = "button, summary, a[href], [role=button], [role=tab], [role=option], input";
-const RANGING = /^(arrow\w+|home|end|page(up|down))$/; // keys of a dial or a list
+const RANGE_KEYS = /^(arrow\w+|home|end|page(up|down))$/; // of a slider or a list
 
 const EVERYWHERE = "Everywhere";
 
@@ -24,13 +24,13 @@ export class Keys extends EventTarget {
     super();
     /** @type {Row[]} */
     this.rows = [];
-    /** @type {() => any} what turns the camera, or undefined */
+    /** @type {() => any} the camera's controls, or undefined */
     this.controls = () => undefined;
     document.addEventListener("keydown", (event) => this.#press(event));
   }
 
   /**
-   * Add rows; the returned function takes them away again.
+   * Add rows; the returned function removes them.
    * @param {Row[]} rows
    */
   add(rows) {
@@ -59,10 +59,10 @@ export class Keys extends EventTarget {
     const name = named(event).toLowerCase();
     if (event.target.closest(WRITING) && !(name.startsWith("ctrl+") && event.target.matches("select"))) return;
     if ((name === " " || name === "enter") && event.target.closest(PRESSING)) return;
-    if (RANGING.test(name) && event.target.closest("input, [role=slider], [role=listbox], [role=tablist]")) return;
+    if (RANGE_KEYS.test(name) && event.target.closest("input, [role=slider], [role=listbox], [role=tablist]")) return;
     const controls = this.controls();
     if (controls && orbit(event, controls)) return;
-    // What came last is on top.
+    // Later rows take precedence.
     for (const row of [...this.rows].reverse()) {
       if (row.act && row.keys?.some((key) => key.toLowerCase() === name) && row.act(event) !== false) {
         event.preventDefault();
@@ -80,7 +80,7 @@ function named(event) {
 }
 
 /**
- * How a row's keys are shown.
+ * Return the labels of a row's keys.
  * @param {Row} row
  */
 export function shownKeys(row) {

@@ -1,10 +1,10 @@
-/** What is asked for once, though a button is clicked twice or a key is pressed twice. */
+/** Guard against double clicks and repeated keys. */
 
-const DOUBLE = 300; // milliseconds in which a second click or key is of the same wish
+const DOUBLE_CLICK_MS = 300;
 
 /**
- * A function that does something unless the same, by its name, is still being done or was begun a moment ago.
- * @param {(doing: () => Promise<any>) => Promise<any>} act does something, and says why it failed
+ * Return a function that runs an action, unless one with the same name still runs or began a moment ago.
+ * @param {(doing: () => Promise<any>) => Promise<any>} act runs an action, and shows its error
  * @returns {(name: string, doing: () => Promise<any>) => Promise<any>}
  */
 export function oncer(act) {
@@ -13,7 +13,7 @@ export function oncer(act) {
   return async (name, doing) => {
     if (begun.has(name)) return undefined;
     begun.add(name);
-    const settled = new Promise((done) => setTimeout(done, DOUBLE));
+    const settled = new Promise((done) => setTimeout(done, DOUBLE_CLICK_MS));
     const found = await act(doing);
     settled.then(() => begun.delete(name));
     return found;

@@ -1,4 +1,4 @@
-/** The middle of the page: the viewer, what is shown in it, and what plays it. */
+/** The middle of the page: the viewer, its caption and views, and the transport. */
 
 import { html, useEffect, useLayoutEffect, useRef } from "../vendor/htm-preact-standalone.js";
 import { useChange, useKeys } from "./hooks.js";
@@ -8,7 +8,7 @@ const VIEWS = [
   ["front", "Front", "From the audience (1)"],
   ["side", "Side", "From stage right (2)"],
   ["top", "Top", "From above (3)"],
-  ["quarter", "Quarter", "Half from the side, a little from above (4)"],
+  ["quarter", "Quarter", "Three-quarter view (4)"],
 ];
 const SPEEDS = [0.1, 0.25, 0.5, 0.75, 1, 1.5, 2];
 const GROUP = "Viewer";
@@ -25,18 +25,18 @@ export function View({ studio }) {
   useKeys(studio, [
     { keys: [" "], does: "play or pause", group: GROUP, act: () => player.toggle() },
     { keys: ["ArrowLeft"], does: "one frame back", group: GROUP, act: () => player.step(-1) },
-    { keys: ["ArrowRight"], does: "one frame on", group: GROUP, act: () => player.step(1) },
-    { keys: ["Home"], does: "the start", group: GROUP, act: () => player.seek(player.motion.start) },
-    { keys: ["End"], does: "the end", group: GROUP, act: () => player.seek(player.motion.end) },
-    { keys: ["l"], does: "loop: from the end to the start", group: GROUP, act: () => (player.loop = !player.loop) },
+    { keys: ["ArrowRight"], does: "one frame forward", group: GROUP, act: () => player.step(1) },
+    { keys: ["Home"], does: "go to the start", group: GROUP, act: () => player.seek(player.motion.start) },
+    { keys: ["End"], does: "go to the end", group: GROUP, act: () => player.seek(player.motion.end) },
+    { keys: ["l"], does: "loop", group: GROUP, act: () => (player.loop = !player.loop) },
     ...VIEWS.map(([view, , words], i) => ({
       keys: [String(i + 1)],
       does: words.replace(/ \(.*/, "").toLowerCase(),
       group: GROUP,
       act: () => viewer.look(view),
     })),
-    { shown: ["Shift", "arrows"], does: "turn the picture, as dragging does", group: GROUP },
-    { shown: ["+", "-"], does: "nearer, farther, as scrolling does", group: GROUP },
+    { shown: ["Shift", "arrows"], does: "rotate the view (or drag)", group: GROUP },
+    { shown: ["+", "-"], does: "zoom (or scroll)", group: GROUP },
     { keys: ["Escape"], does: "back to the piece", group: GROUP, act: () => (viewer.isHome ? false : viewer.back()) },
   ]);
   useEffect(() => {
@@ -60,8 +60,8 @@ export function View({ studio }) {
     <${Transport} viewer=${viewer} />`;
 }
 
-/** What plays the movement in the viewer. @param {{viewer: any}} props */
-export function Transport({ viewer }) {
+/** The controls that play the movement. @param {{viewer: any}} props */
+function Transport({ viewer }) {
   const { player } = viewer;
   const playing = useChange(player, () => player.playing);
   const loop = useChange(player, () => player.loop);
@@ -83,7 +83,7 @@ export function Transport({ viewer }) {
       class="button quiet icon wide"
       aria-label="Loop"
       aria-pressed=${String(loop)}
-      title="From the end to the start (L)"
+      title="Loop (L)"
       onClick=${() => (player.loop = !player.loop)}
     >
       ${icon("loop")}
@@ -95,7 +95,7 @@ export function Transport({ viewer }) {
   </div>`;
 }
 
-/** The time as a line that is dragged; written without a view, for it changes with every picture. @param {any} props */
+/** The time slider; it updates outside of the view, because it changes with every picture. @param {any} props */
 function Scrub({ viewer, moving }) {
   const { player } = viewer;
   const line = useRef(/** @type {any} */ (null));
@@ -121,11 +121,11 @@ function Scrub({ viewer, moving }) {
   }, []);
   const seek = (/** @type {any} */ event) => {
     const { start, end } = player.motion;
-    const share = Number(event.target.value); // before pausing, which puts the line back to where the player is
+    const share = Number(event.target.value); // before pausing, which resets the slider
     if (player.playing) player.pause();
     player.seek(start + share * (end - start));
   };
   return html`<input ref=${line} type="range" min="0" max="1" step="any" aria-label="Time" data-testid="scrub" disabled=${!moving} onInput=${seek} />
-    <span ref=${made} class="made" title="The engine made this moment: it is not as recorded" data-testid="made" hidden>inserted</span>
+    <span ref=${made} class="made" title="The engine made this moment; it was not recorded" data-testid="made" hidden>inserted</span>
     <span ref=${clock} class="hint numbers clock"></span>`;
 }

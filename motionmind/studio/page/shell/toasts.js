@@ -1,11 +1,11 @@
-/** One line for what went wrong, or right, at the edge of the page. */
+/** Messages at the edge of the page, one line each. */
 
 import { html } from "../vendor/htm-preact-standalone.js";
 import { useChange } from "./hooks.js";
 import { icon } from "./icons.js";
 
-const LASTS = 8000; // milliseconds that a note stays; an error stays until it is closed, or three more have come
-const MOST = 3;
+const NOTE_MS = 8000; // an error stays until the user closes it or three more arrive
+const MAX_SHOWN = 3;
 
 /** @typedef {{words: string, kind: "error" | "note", number: number}} Toast */
 
@@ -18,14 +18,14 @@ export class Toasts extends EventTarget {
   }
 
   /**
-   * Show a line; the same again is not shown twice.
+   * Show a line; a repeat replaces it.
    * @param {string} words
    * @param {{kind?: "error" | "note"}} how
    */
   say(words, { kind = "note" } = {}) {
     const toast = { words, kind, number: ++this.count };
-    this.#set([...this.shown.filter((other) => other.words !== words), toast].slice(-MOST));
-    if (kind === "note") setTimeout(() => this.close(toast), LASTS);
+    this.#set([...this.shown.filter((other) => other.words !== words), toast].slice(-MAX_SHOWN));
+    if (kind === "note") setTimeout(() => this.close(toast), NOTE_MS);
   }
 
   /** @param {Toast} toast */

@@ -1,4 +1,4 @@
-/** What one can do on the line of time, each action once: buttons, keys and gestures call the same. */
+/** The time line's actions, which buttons, keys and gestures share. */
 
 import { bounded, fitting } from "./scale.js";
 import {
@@ -6,6 +6,7 @@ import {
   duplicate,
   EMPTY,
   flip,
+  insert,
   lasting,
   lengthOf,
   lock,
@@ -21,8 +22,8 @@ import {
   wish,
 } from "./items.js";
 
-const LONGER = 0.1; // seconds by which a key makes an insertion longer
-const ZOOM = 1.4;
+const DURATION_STEP_S = 0.1; // of an insertion, for each key press
+const ZOOM_RATIO = 1.4;
 
 export class Actions {
   /**
@@ -34,15 +35,15 @@ export class Actions {
     this.studio = studio;
     this.movements = movements;
     this.show = show;
-    /** What is in sight: pixels a second, pixels to the left of it, and its width. */
+    /** The visible range: pixels a second, pixels scrolled past, and width in pixels. */
     this.sight = { scale: 60, left: 0, width: 800, fits: true };
-    /** @type {Promise<any>} over when the edits that were asked for are answered */
+    /** @type {Promise<any>} settles when all edits so far are answered */
     this.turn = Promise.resolve();
-    /** @type {{name: string, by: number, done: Promise<any>} | null} steps whose turn is still to come: more join them */
+    /** @type {{name: string, by: number, done: Promise<any>} | null} steps that wait for their turn: further ones join them */
     this.steps = null;
-    /** Whether the keys' focus is on the tracks. */
+    /** Whether the tracks have the focus. */
     this.focused = false;
-    /** The moment of the piece that is shown, or was last, seconds. */
+    /** The piece's current time, seconds. */
     this.time = 0;
     this.listeners = new Set();
     const follow = () => {
@@ -53,7 +54,7 @@ export class Actions {
     studio.viewer.player.addEventListener("change", follow);
   }
 
-  /** Call a function with each moment that is shown, and now; returns what stops that. */
+  /** Call a function with the current time, now and on changes; return a function that stops this. */
   onTime(listener) {
     this.listeners.add(listener);
     listener(this.time);
@@ -79,20 +80,20 @@ export class Actions {
   }
 
   /**
-   * Send an edit, or what a function makes of the piece as all that was done before has left it; null does nothing.
-   * What the server refuses is said in a line.
+   * Send an edit, or the result of a function that runs after all earlier edits; null does nothing.
+   * Show the server's errors.
    */
   edit(edit) {
     return this.#inTurn(() => this.#send(typeof edit === "function" ? edit() : edit));
   }
 
-  /** Edit what is selected now, as it is when it is its turn. @param {(item: import("./items.js").Item) => any} make */
+  /** Edit the current selection, in its state after all earlier edits. @param {(item: import("./items.js").Item) => any} make */
   #editSelected(make) {
     const { selection } = this.studio.store;
     return this.edit(() => make(selected(this.piece, selection) ?? {}));
   }
 
-  /** Do something once all that was done before is answered: keys are pressed faster than that. */
+  /** Run an action after all earlier ones: keys come faster than answers. */
   #inTurn(doing) {
     this.steps = null;
     const done = this.turn.then(() => this.studio.api.changed).then(doing);
@@ -100,7 +101,7 @@ export class Actions {
     return done;
   }
 
-  /** Whether an edit was sent, and done. */
+  /** Send an edit; return whether it succeeded. */
   async #send(edit) {
     if (!edit) return false;
     this.look();
@@ -117,7 +118,7 @@ export class Actions {
     }
   }
 
-  /** Show the piece, if something else is looked at. */
+  /** Return the viewer to the piece. */
   look() {
     if (!this.studio.viewer.isHome) this.studio.viewer.back();
   }
@@ -126,13 +127,13 @@ export class Actions {
     this.studio.store.set({ selection: item ? selectionOf(item) : null });
   }
 
-  /** Select the item `by` places on. */
+  /** Select the item `by` steps on. */
   go(by) {
     const item = neighbour(this.piece, this.studio.store.selection, by);
     if (item) this.select(item);
   }
 
-  /** Show the moment that an item begins with. */
+  /** Show the piece at a time. */
   seek(time) {
     this.look();
     const { player } = this.studio.viewer;
@@ -146,7 +147,7 @@ export class Actions {
     );
   }
 
-  /** Let a stretch begin or end `by` frames later, or an insertion last longer. Steps that wait are taken as one. */
+  /** Trim a stretch by some frames, or change an insertion's duration by as many steps. Waiting steps become one edit. */
   trimBy(side, by) {
     const { selection } = this.studio.store;
     const name = `${side} ${nameOf(selection)}`;
@@ -159,13 +160,13 @@ export class Actions {
       if (this.steps === steps) this.steps = null;
       const { block, seam } = selected(this.piece, selection) ?? {};
       if (block) return trim(block, side, block[side] + steps.by);
-      return seam?.stands ? lasting(seam, lengthOf(seam) + steps.by * LONGER) : null;
+      return seam?.stands ? lasting(seam, lengthOf(seam) + steps.by * DURATION_STEP_S) : null;
     });
     this.steps = steps;
     return steps.done;
   }
 
-  /** Let an insertion last some seconds. */
+  /** Set the duration of an insertion. */
   last(seam, seconds) {
     return this.edit(lasting(seam, seconds));
   }
@@ -175,7 +176,7 @@ export class Actions {
     return this.#editSelected(({ block }) => {
       if (!block) return null;
       const edit = split(block, time, this.times(block), newId(this.studio.window));
-      if (!edit) this.studio.say("put the playhead inside the stretch to split it there", { kind: "note" });
+      if (!edit) this.studio.say("Put the playhead inside the stretch to split it there.", { kind: "note" });
       return edit;
     });
   }
@@ -190,7 +191,7 @@ export class Actions {
     return this.#editSelected(({ block }) => block && { edit: "mirror", block: block.id });
   }
 
-  /** Delete the stretch, or discard the insertion or restore it. */
+  /** Delete the stretch, or discard or restore the insertion. */
   remove() {
     const { selection } = this.studio.store;
     return this.#inTurn(async () => {
@@ -204,7 +205,7 @@ export class Actions {
     });
   }
 
-  /** Show an insertion's alternative `by` places on: at the playhead if it is in it, or else in its middle. */
+  /** Choose an insertion's alternative `by` steps on; move the playhead into the insertion. */
   flip(by) {
     return this.#editSelected(({ seam }) => {
       const change = seam && flip(seam, by);
@@ -220,9 +221,9 @@ export class Actions {
   }
 
   /**
-   * Wish for something else at a seam.
+   * Change the wishes at a seam.
    * @param {import("./items.js").Seam} seam
-   * @param {(ask: import("./items.js").Ask) => object} change returns what is different from what is wished when it is its turn
+   * @param {(ask: import("./items.js").Ask) => object} change returns the changes, given the wishes after all earlier edits
    */
   wish({ left, right }, change) {
     return this.edit(() => {
@@ -235,24 +236,22 @@ export class Actions {
     return this.edit(pass(seam, posture, share));
   }
 
-  /** Put a posture, or a stretch from `frame` to `last`, into the piece, before a place among the stretches. */
-  insert({ key, frame, last = frame }, place) {
-    const before = this.piece.blocks[place]?.id ?? null;
-    const id = newId(this.studio.window);
-    return this.edit({ edit: "insert", id, source: key, first: frame, last, mirrored: false, before });
+  /** Insert a posture, or a stretch from `frame` to `last`, before the stretch at an index. */
+  insert(place, index) {
+    return this.edit(insert(newId(this.studio.window), place, this.piece.blocks[index]?.id ?? null));
   }
 
-  /** Times of a stretch's movement, if it has come. */
+  /** Times of a stretch's movement, if it has loaded. */
   times(block) {
     return this.movements.at(block.key)?.times;
   }
 
-  /** Stop smoothing in the background, or let it go on. */
+  /** Pause or resume smoothing in the background. */
   smooth(on) {
     return this.#sent(() => (on ? this.studio.api.post("/api/seams", {}) : this.studio.api.delete("/api/seams")));
   }
 
-  /** Zoom by a factor, so that the time at `x` pixels from the left edge stays where it is. */
+  /** Zoom by a factor; the time at `x` pixels from the left edge stays in place. */
   zoom(factor, x = this.sight.width / 2) {
     const { scale, left, width } = this.sight;
     const { seconds, blocks } = this.piece;
@@ -261,11 +260,11 @@ export class Actions {
   }
 
   zoomIn() {
-    this.zoom(ZOOM, this.#middle());
+    this.zoom(ZOOM_RATIO, this.#middle());
   }
 
   zoomOut() {
-    this.zoom(1 / ZOOM, this.#middle());
+    this.zoom(1 / ZOOM_RATIO, this.#middle());
   }
 
   fit() {
@@ -273,23 +272,18 @@ export class Actions {
     this.show({ scale: fitting(seconds, this.sight.width, blocks.length), left: 0, fits: true });
   }
 
-  /** The playhead if it is in sight, or else the middle, in pixels from the left edge. */
+  /** The playhead if it is visible, or else the middle, in pixels from the left edge. */
   #middle() {
     const x = this.time * this.sight.scale - this.sight.left;
     return x >= 0 && x <= this.sight.width ? x : this.sight.width / 2;
   }
 
-  /** Scroll so far that a stretch of time is in sight. */
+  /** Scroll a stretch of time into view. */
   reveal(at, seconds) {
     const { scale, left, width } = this.sight;
     const [from, to] = [at * scale, (at + seconds) * scale];
     const room = Math.min(48, width / 4);
     if (from < left + room) this.show({ left: Math.max(from - room, 0) });
     else if (to > left + width - room) this.show({ left: Math.max(Math.min(to - width + room, from - room), 0) });
-  }
-
-  /** Whether a selection names this item. */
-  isSelected(item) {
-    return nameOf(this.studio.store.selection) === nameOf(selectionOf(item));
   }
 }

@@ -1,31 +1,31 @@
-/** Stretches on their track, and the marks of seams on theirs: what is in sight of them. */
+/** The visible stretches, seams and wishes, each on its track. */
 
 import { html } from "../vendor/htm-preact-standalone.js";
 import { trimmed } from "./gestures.js";
 import { inSight, nameOf, selectionOf, shown } from "./items.js";
 import { clock } from "./scale.js";
 
-const LEAST = 28; // pixels of a held posture, which takes no time
-const APART = 100; // pixels from one picture of a stretch to the next, at least
-const NAMED = 52; // pixels before a stretch's name
-const PICTURES = 16; // of a stretch, at most
-const CLEAR = 48; // pixels from the piece's beginning to the middle of what is wished there
-const ROOM = 300; // pixels beside what is in sight that are there already
+const POSTURE_WIDTH_PX = 28; // of a held posture, which has no duration
+const MIN_PICTURE_DISTANCE_PX = 100;
+const NAME_OFFSET_PX = 52;
+const MAX_PICTURES = 16; // of a stretch
+const MIN_WISH_OFFSET_PX = 48; // from the piece's start
+const OVERSCAN_PX = 300; // rendered beyond the visible range
 
-/** A word and a sign for each state of a seam; its pattern is in timeline.css. */
+/** Sign and words for each state of a seam; timeline.css has its pattern. */
 const STATES = {
-  smooth: ["~", "goes over smoothly"],
+  smooth: ["~", "smooth"],
   abrupt: ["!", "abrupt, being smoothed"],
-  waiting: ["…", "not looked at yet"],
+  waiting: ["…", "not checked yet"],
   inserted: ["", "insertion"],
-  discarded: ["×", "insertion left out"],
-  "none found": ["?", "abrupt, and nothing found"],
+  discarded: ["×", "insertion discarded"],
+  "none found": ["?", "abrupt, no insertion found"],
 };
 
 /** The stretches. @param {{does: any, piece: any, sight: any, draft: any, selection: any, thumbnail: any}} props */
 export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
   const { blocks } = piece;
-  const [first, stop] = seen(blocks, sight);
+  const [first, stop] = visible(blocks, sight);
   const chosen = nameOf(selection);
   const there = blocks.slice(first, stop);
   const stops = there.some(({ id }) => chosen === `block ${id}`) ? chosen : `block ${there[0]?.id}`;
@@ -35,9 +35,9 @@ export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
       const mine = draft?.id === block.id ? draft : null;
       const change = mine?.kind === "trim" ? trimmed(block, mine, does.times(block)) : null;
       const held = block.first === block.last;
-      const width = held ? LEAST : (change?.seconds ?? block.seconds) * sight.scale;
+      const width = held ? POSTURE_WIDTH_PX : (change?.seconds ?? block.seconds) * sight.scale;
       const strip = held || block.missing ? [] : pictures(block, sight.scale);
-      const left = (block.at + (change?.later ?? 0)) * sight.scale - (held ? LEAST / 2 : 0);
+      const left = (block.at + (change?.later ?? 0)) * sight.scale - (held ? POSTURE_WIDTH_PX / 2 : 0);
       const classes = ["stretch", held && "held", block.mirrored && "mirrored", block.missing && "missing", mine?.kind === "move" && "moving"];
       return html`<div
         key=${block.id}
@@ -48,8 +48,8 @@ export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
         aria-selected=${chosen === name}
         aria-posinset=${first + i + 1}
         aria-setsize=${blocks.length}
-        aria-label=${labelOf(block)}
-        title=${labelOf(block)}
+        aria-label=${blockLabel(block)}
+        title=${blockLabel(block)}
         tabindex=${stops === name ? 0 : -1}
         style=${{
           left: `${left}px`,
@@ -59,7 +59,7 @@ export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
       >
         ${width > 18 && !block.missing && html`<img alt="" loading="lazy" draggable=${false} src=${thumbnail(block.key, block.first)} />`}
         ${strip.map(({ x, frame }) => html`<img key=${frame} class="later" alt="" loading="lazy" draggable=${false} src=${thumbnail(block.key, frame)} style=${{ left: `${x}px` }} />`)}
-        ${width > 70 && html`<span class="name cut" style=${{ maxWidth: strip.length ? `${strip[0].x - NAMED}px` : "" }}>${block.missing ? "? " : ""}${block.mirrored ? "⇋ " : ""}${block.title}</span>`}
+        ${width > 70 && html`<span class="name cut" style=${{ maxWidth: strip.length ? `${strip[0].x - NAME_OFFSET_PX}px` : "" }}>${block.missing ? "? " : ""}${block.mirrored ? "⇋ " : ""}${block.title}</span>`}
         ${!held && html`<i class="edge first" data-edge="first"></i><i class="edge last" data-edge="last"></i>`}
       </div>`;
     })}
@@ -68,9 +68,9 @@ export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
   </div>`;
 }
 
-/** The seams: insertions as long as they last, and a mark where there is none. */
+/** The seams: insertions with their durations, marks elsewhere. */
 export function Seams({ piece, sight, draft, selection, over }) {
-  const [first, stop] = seen(piece.seams, sight);
+  const [first, stop] = visible(piece.seams, sight);
   const chosen = nameOf(selection);
   const there = piece.seams.slice(first, stop).filter(shown);
   const names = there.map((seam) => nameOf(selectionOf({ seam })));
@@ -81,9 +81,9 @@ export function Seams({ piece, sight, draft, selection, over }) {
       const mine = draft?.kind === "last" && draft.left === seam.left && draft.right === seam.right ? draft : null;
       const [sign, word] = STATES[seam.state];
       const inserted = seam.state === "inserted";
-      const { stands } = seam; // what is inserted, or was until another is found
-      const width = stands ? (mine?.seconds ?? seam.seconds) * sight.scale : LEAST;
-      const left = stands ? seam.at * sight.scale : (seam.at + seam.seconds / 2) * sight.scale - LEAST / 2;
+      const { stands } = seam; // an insertion, perhaps an earlier one until the search ends
+      const width = stands ? (mine?.seconds ?? seam.seconds) * sight.scale : POSTURE_WIDTH_PX;
+      const left = stands ? seam.at * sight.scale : (seam.at + seam.seconds / 2) * sight.scale - POSTURE_WIDTH_PX / 2;
       const locked = seam.decision === "locked";
       return html`<div
         key=${name}
@@ -96,8 +96,8 @@ export function Seams({ piece, sight, draft, selection, over }) {
         aria-selected=${chosen === name}
         aria-posinset=${seam.number}
         aria-setsize=${piece.seams.length}
-        aria-label=${sayOf(seam, word)}
-        title=${sayOf(seam, word)}
+        aria-label=${seamLabel(seam, word)}
+        title=${seamLabel(seam, word)}
         tabindex=${stops === name ? 0 : -1}
         style=${{ left: `${left}px`, width: `${Math.max(width, 8)}px` }}
       >
@@ -111,9 +111,9 @@ export function Seams({ piece, sight, draft, selection, over }) {
   </div>`;
 }
 
-/** What is wished of insertions: postures to pass, hands and feet that stay. */
+/** Wishes for insertions: postures to pass, hands and feet to hold. */
 export function Wishes({ piece, sight, thumbnail }) {
-  const [first, stop] = seen(piece.seams, sight);
+  const [first, stop] = visible(piece.seams, sight);
   const wished = piece.seams.slice(first, stop).filter(({ ask }) => ask.passing.length + ask.pins.length > 0);
   return html`<div class="track wishes" aria-hidden="true">
     ${wished.map((seam) => {
@@ -125,42 +125,42 @@ export function Wishes({ piece, sight, thumbnail }) {
           class="stay"
           style=${{ left: `${(seam.at + begins * seam.seconds) * sight.scale}px`, width: `${(ends - begins) * seam.seconds * sight.scale}px` }}
         ></i>`,
-      )}<div key=${`${seam.left} ${seam.right}`} class="wish" style=${{ left: `${Math.max(middle * sight.scale, CLEAR)}px` }}>
+      )}<div key=${`${seam.left} ${seam.right}`} class="wish" style=${{ left: `${Math.max(middle * sight.scale, MIN_WISH_OFFSET_PX)}px` }}>
         ${passing.map(({ posture, frame }) => html`<img alt="" class="passing" src=${thumbnail(posture, frame)} />`)}
-        ${pins.map(({ joint }) => html`<span class="pin" title=${plain(joint)}>
-          <svg viewBox="0 0 16 16"><path d="M8 9v5M5 2h6l-1 4 2 3H4l2-3z" /></svg>${plain(joint)}
+        ${pins.map(({ joint }) => html`<span class="pin" title=${limbName(joint)}>
+          <svg viewBox="0 0 16 16"><path d="M8 9v5M5 2h6l-1 4 2 3H4l2-3z" /></svg>${limbName(joint)}
         </span>`)}
       </div>`;
     })}
   </div>`;
 }
 
-/** Where else than at its beginning a stretch is pictured; twice as often when it is twice as wide, so that all others stay. */
+/** Further pictures of a stretch; their number doubles with its width, so that the others stay in place. */
 function pictures({ first, last, seconds }, scale) {
   const wide = seconds * scale;
-  const count = Math.min(2 ** Math.floor(Math.log2(wide / APART)), PICTURES, last - first);
+  const count = Math.min(2 ** Math.floor(Math.log2(wide / MIN_PICTURE_DISTANCE_PX)), MAX_PICTURES, last - first);
   const later = Array.from({ length: Math.max(Math.ceil(count) - 1, 0) }, (_, i) => (i + 1) / count);
   return later.map((share) => ({ x: share * wide, frame: first + Math.round(share * (last - first)) }));
 }
 
-/** The numbers of those items that are in sight, or nearly. */
-function seen(items, { scale, left, width }) {
-  return inSight(items, (left - ROOM) / scale, (left + width + ROOM) / scale);
+/** The range of items to render. */
+function visible(items, { scale, left, width }) {
+  return inSight(items, (left - OVERSCAN_PX) / scale, (left + width + OVERSCAN_PX) / scale);
 }
 
-/** When a stretch that is dragged will begin, about. */
+/** The approximate start of a dragged stretch. */
 function landing({ blocks, seconds }, { id, place }) {
   const rest = blocks.filter((block) => block.id !== id);
   if (place < rest.length) return rest[place].at;
   return seconds;
 }
 
-function labelOf({ title, missing, mirrored, at, seconds, first, last }) {
+function blockLabel({ title, missing, mirrored, at, seconds, first, last }) {
   const long = first === last ? "a posture" : `${clock(seconds)} seconds`;
   return `${title}${missing ? ", missing" : ""}, ${long}${mirrored ? ", mirrored" : ""}, from ${clock(at)}`;
 }
 
-function sayOf(seam, word) {
+function seamLabel(seam, word) {
   const chosen = seam.alternatives[seam.chosen - 1];
   const said = [`Seam ${seam.number}: ${word}`];
   if (seam.state === "inserted") {
@@ -171,7 +171,7 @@ function sayOf(seam, word) {
   return said.join(", ");
 }
 
-/** What a joint's name stands for, in words: a hand hangs from the wrist, a foot from the ankle. */
-export function plain(joint) {
+/** A joint in words: the hand for the wrist, the foot for the ankle. */
+export function limbName(joint) {
   return joint.replace(/wrist$/, "hand").replace(/ankle$/, "foot").replaceAll("_", " ");
 }

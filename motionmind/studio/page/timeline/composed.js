@@ -1,4 +1,4 @@
-/** A piece as a motion: made of parts that the server placed, of movements that are loaded when they are first needed. */
+/** A piece as a motion: parts that the server placed, of movements that load on demand. */
 
 import { MOMENT, slerp } from "motionmind/motion";
 
@@ -7,7 +7,7 @@ import { MOMENT, slerp } from "motionmind/motion";
  *   turn: number, inserted: boolean}} Part
  */
 
-/** Movements by key, at hand once they have come. */
+/** A cache of loaded movements by key. */
 export class Movements {
   /** @param {(key: string) => Promise<any>} fetch a movement: the player's Motion, with its `body` and `colours` */
   constructor(fetch) {
@@ -16,7 +16,7 @@ export class Movements {
     this.here = new Map();
   }
 
-  /** The movement, if it has come. @param {string} key */
+  /** The movement, if it has loaded. @param {string} key */
   at(key) {
     return this.here.get(key);
   }
@@ -30,17 +30,17 @@ export class Movements {
     return motion;
   }
 
-  /** Forget all but the movements that some parts show. @param {Iterable<string>} keys */
+  /** Forget all movements but these. @param {Iterable<string>} keys */
   keep(keys) {
     const wanted = new Set(keys);
     for (const key of this.here.keys()) if (!wanted.has(key)) this.here.delete(key);
   }
 }
 
-/** Has the interface of the player's Motion. Where a movement has not come yet, the body waits as the one before ends. */
+/** A piece with the interface of the player's Motion. Until a movement has loaded, the body holds the posture before it. */
 export class Composed {
   /**
-   * @param {Part[]} parts in order, at least one; the movement of the first has come
+   * @param {Part[]} parts in order, at least one; the movement of the first has loaded
    * @param {Movements} movements
    * @param {string} name
    */
@@ -54,13 +54,13 @@ export class Composed {
     /** @type {string[]} */
     this.joints = joints;
     this.times = new Float64Array();
-    /** @type {number[]} when each part begins */
+    /** @type {number[]} start time of each part */
     this.starts = [];
     /** @type {{times: number[], bridged: {joint: number, move: number}[]}[]} */
     this.insertions = [];
     /** @type {number[]} */
     this.farthest = [];
-    this.#count();
+    this.#updateTimes();
     const size = joints.length * 4;
     const both = new Float64Array(2 * size);
     this.beside = { both, from: both.subarray(0, size), to: both.subarray(size) };
@@ -78,17 +78,17 @@ export class Composed {
     return this.times[this.length - 1];
   }
 
-  /** Load the movements of all parts; those that are played first come first. */
+  /** Load the movements of all parts in order. */
   async load() {
     const keys = [...new Set(this.parts.map(({ key }) => key))];
     for (let i = 0; i < keys.length; i += 8) {
       await Promise.allSettled(keys.slice(i, i + 8).map((key) => this.movements.load(key)));
     }
-    this.#count();
+    this.#updateTimes();
   }
 
-  /** Number the frames, and place the insertions' marks; frames that have not come are taken as even. */
-  #count() {
+  /** Compute the times of frames and insertions; frames of missing movements are evenly spaced. */
+  #updateTimes() {
     const times = [];
     this.starts = this.parts.map(({ at }) => at);
     this.insertions = [];
@@ -117,17 +117,17 @@ export class Composed {
     return lastBefore(this.times, time);
   }
 
-  /** Put the posture at `time` into `rotations` [J * 4] and `root` [3]. */
+  /** Write the posture at `time` into `rotations` [J * 4] and `root` [3]. */
   sample(time, rotations, root) {
     const index = this.partAt(time);
-    const part = this.#hereBy(index);
+    const part = this.#loadedAt(index);
     const next = this.parts[index + 1];
     const over = time - part.at - part.seconds;
     if (over <= MOMENT || !next || !this.movements.at(next.key)) {
       this.#sampleWithin(part, time, rotations, root);
       return;
     }
-    // Between two parts nothing is inserted: straight from one posture to the other.
+    // Between two parts without an insertion: interpolate.
     const { both, from, to } = this.beside;
     this.#sampleWithin(part, part.at + part.seconds, from, root);
     const [x, y, z] = root;
@@ -137,8 +137,8 @@ export class Composed {
     for (let i = 0; i < from.length; i += 4) slerp(rotations, i, both, i, from.length + i, share);
   }
 
-  /** The part at `index`, or the nearest before it whose movement has come; that of the first has. @param {number} index */
-  #hereBy(index) {
+  /** The part at `index`, or the nearest earlier one whose movement has loaded. @param {number} index */
+  #loadedAt(index) {
     while (index > 0 && !this.movements.at(this.parts[index].key)) index--;
     return this.parts[index];
   }
@@ -151,7 +151,7 @@ export class Composed {
     place(part, rotations, root);
   }
 
-  /** The movement and the frame that are nearest to `time`. */
+  /** The movement and the frame nearest to `time`. */
   placeAt(time) {
     const { key, first, last, at } = this.parts[this.partAt(time)];
     const times = this.movements.at(key)?.times;
@@ -162,14 +162,14 @@ export class Composed {
     return { key, frame: Math.min(nearer, last) };
   }
 
-  /** The insertion from whose A to whose B `time` is, or undefined. */
+  /** The insertion at `time`, from A to B, or undefined. */
   insertionAt(time) {
     const index = lastBefore(this.insertions, time, ({ times }) => times[0]);
     const mark = this.insertions[index];
     return mark && mark.times[0] - MOMENT <= time && time <= lastOf(mark.times) + MOMENT ? mark : undefined;
   }
 
-  /** When those of an insertion's A and B are that the piece holds. */
+  /** The times of an insertion's A and B. */
   ends({ times }) {
     return [times[0], times.at(-1)];
   }
@@ -180,7 +180,7 @@ export class Composed {
     return times !== undefined && times[0] + MOMENT < time && time < lastOf(times) - MOMENT;
   }
 
-  /** The joints that are, at `time`, amid a move that no corpus attests. */
+  /** The joints in a bridged move at `time`. */
   bridgedAt(time) {
     const mark = this.insertedAt(time) && this.insertionAt(time);
     if (!mark) return [];
@@ -208,7 +208,7 @@ function lastOf(times) {
   return times[times.length - 1];
 }
 
-/** The index of the last of ordered `values` that is no more than `time`; 0 if none is. */
+/** The index of the last of ordered `values` not after `time`; 0 if there is none. */
 export function lastBefore(values, time, of = (value) => value) {
   let low = 0;
   let high = values.length;

@@ -1,11 +1,11 @@
-/** Dragging on the tracks: what the pointer took hold of, what it means so far, and the edit that it is in the end. */
+/** Drags on the tracks: the draft that they show, and the edit that they end in. */
 
 import { frameAt, move, placeAt, trim } from "./items.js";
 
-const STILL = 4; // pixels that a click may slip
+const CLICK_SLACK_PX = 4;
 
 /**
- * A drag, from the pointer's going down to its going up.
+ * A drag, from pointer down to pointer up.
  * `draft` is what the tracks show meanwhile: {kind: "move", id, by, place}, {kind: "trim", id, side, frame} or
  * {kind: "last", left, right, seconds}.
  */
@@ -24,11 +24,11 @@ export class Drag {
     this.draft = null;
   }
 
-  /** Take the pointer further; returns the draft. @param {PointerEvent} event @param {number} edge of the tracks */
+  /** Follow the pointer; return the draft. @param {PointerEvent} event @param {number} edge of the tracks */
   take(event, edge) {
     const { does, held } = this;
     const by = event.clientX + does.sight.left - this.from;
-    if (!this.moved && Math.abs(by) < STILL) return null;
+    if (!this.moved && Math.abs(by) < CLICK_SLACK_PX) return null;
     this.moved = true;
     const time = (event.clientX - edge + does.sight.left) / does.sight.scale;
     const { block, seam, side } = held;
@@ -44,7 +44,7 @@ export class Drag {
     return this.draft;
   }
 
-  /** Do what the drag means. */
+  /** Send the drag's edit. */
   async end() {
     const { does, held, draft } = this;
     if (!draft) return;
@@ -54,7 +54,7 @@ export class Drag {
   }
 }
 
-/** How long a block is while it is trimmed, seconds, and how much later it begins. */
+/** The duration of a block while it is trimmed, and how much later it begins, seconds. */
 export function trimmed(block, { side, frame }, times) {
   const at = (which) =>
     times ? times[which] : (which * block.seconds) / Math.max(block.last - block.first, 1);

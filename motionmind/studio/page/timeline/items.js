@@ -1,4 +1,4 @@
-/** What lies on the line: stretches and seams in the order in which they come, and the edits that gestures mean. */
+/** The time line's items, stretches and seams in order, and the edits for gestures on them. */
 
 import { lastBefore } from "./composed.js";
 
@@ -15,9 +15,9 @@ import { lastBefore } from "./composed.js";
  * @typedef {{blocks: Block[], seams: Seam[], parts: object[], seconds: number}} Piece
  */
 
-/** A piece of nothing. @type {Piece} */
+/** An empty piece. @type {Piece} */
 export const EMPTY = { seconds: 0, parts: [], blocks: [], seams: [] };
-export const [SHORTEST, LONGEST] = [0.1, 60]; // seconds of an insertion that can be wished for
+export const [SHORTEST, LONGEST] = [0.1, 60]; // seconds of an insertion, as a wish
 
 /** The item that a selection names, or undefined. @param {Piece} piece */
 export function selected(piece, selection) {
@@ -38,15 +38,15 @@ export function selectionOf({ block, seam }) {
   return seam ? { seam: [seam.left, seam.right] } : { block: block?.id };
 }
 
-/** A text that names a selection; the same for the same. */
+/** A unique text for a selection. */
 export function nameOf(selection) {
   if (selection?.block) return `block ${selection.block}`;
   return selection?.seam ? `seam ${selection.seam.join(" ")}` : "";
 }
 
-/** Whether a seam is worth a stop: what goes on as recorded is not. @param {Seam} seam */
+/** Whether to show a seam: not one that continues as recorded. @param {Seam} seam */
 export function shown(seam) {
-  return seam.words !== "goes on as recorded";
+  return seam.words !== "continues as recorded";
 }
 
 /** The item `by` places on from the selected one. @param {Piece} piece */
@@ -63,17 +63,26 @@ export function neighbour(piece, selection, by) {
   return items[Math.min(Math.max(at + by, 0), items.length - 1)];
 }
 
-/** Those of ordered items that touch the time from `from` to `to`: [index of the first, index after the last]. */
+/** The range of ordered items that overlap the time from `from` to `to`: [first, stop]. */
 export function inSight(items, from, to) {
   if (items.length === 0) return [0, 0];
   const start = (item) => item.at;
   let first = lastBefore(items, from, start);
-  // An item begins no later than the one before it ends, but a held posture is drawn wider than it is.
+  // Items follow each other in time, but a held posture is drawn wider than its duration.
   while (first > 0 && items[first].at + items[first].seconds >= from) first--;
   return [first, Math.min(lastBefore(items, to, start) + 1, items.length)];
 }
 
 let made = 0;
+
+/**
+ * Insert a posture, or the frames of a movement up to `last`, before a block or at the end.
+ * @param {string} id the new block's
+ * @param {{key: string, frame: number, last?: number}} place
+ */
+export function insert(id, { key, frame, last = frame }, /** @type {string | null} */ before = null) {
+  return { edit: "insert", id, source: key, first: frame, last, mirrored: false, before };
+}
 
 /** An id that no block has. @param {string} window this window's name */
 export function newId(window) {
@@ -81,14 +90,14 @@ export function newId(window) {
   return `${window}.${Date.now().toString(36)}.${made}`.slice(-40);
 }
 
-/** Put a copy of a block after it. @param {Piece} piece @param {Block} block */
+/** Insert a copy of a block after it. @param {Piece} piece @param {Block} block */
 export function duplicate(piece, block, id) {
   const { source, first, last, mirrored } = block;
   const after = piece.blocks[piece.blocks.findIndex((one) => one.id === block.id) + 1];
   return { edit: "insert", id, source, first, last, mirrored, before: after?.id ?? null };
 }
 
-/** Move a block so that it comes to the place `to` of the others; null if it stands there. @param {Piece} piece */
+/** Move a block to index `to`; null if it is there. @param {Piece} piece */
 export function move(piece, block, to) {
   const rest = piece.blocks.filter((one) => one.id !== block.id);
   const at = piece.blocks.findIndex((one) => one.id === block.id);
@@ -97,12 +106,12 @@ export function move(piece, block, to) {
   return { edit: "move", block: block.id, before: rest[place]?.id ?? null };
 }
 
-/** The place among the others where a block that is dropped at `time` comes. @param {Piece} piece */
+/** The index, without block `without`, for a drop at `time`. @param {Piece} piece */
 export function placeAt(piece, time, without = "") {
   return piece.blocks.filter(({ id, at, seconds }) => id !== without && at + seconds / 2 < time).length;
 }
 
-/** The frame of a block that shows at `time`. @param {Block} block @param {Float64Array|undefined} times its movement's */
+/** The frame of a block at `time`. @param {Block} block @param {Float64Array|undefined} times its movement's */
 export function frameAt(block, time, times) {
   if (times) {
     const own = lastBefore(times, times[block.first] + time - block.at);
@@ -114,7 +123,7 @@ export function frameAt(block, time, times) {
   return Math.min(Math.max(Math.round(block.first + (time - block.at) * rate), 0), block.frames - 1);
 }
 
-/** Let a block begin or end with another frame; null if it does. @param {Block} block */
+/** Change the first or last frame of a block; null if it is the same. @param {Block} block */
 export function trim(block, side, frame) {
   const { id, first, last, frames } = block;
   const to = side === "first" ? Math.min(Math.max(frame, 0), last) : Math.min(Math.max(frame, first), frames - 1);
@@ -122,36 +131,36 @@ export function trim(block, side, frame) {
   return { edit: "trim", block: id, first, last, [side]: to };
 }
 
-/** Cut a block at a time; null if the time is not within it. @param {Block} block */
+/** Split a block at a time; null if the time is outside of it. @param {Block} block */
 export function split(block, time, times, id) {
   const within = time > block.at && time < block.at + block.seconds;
   const at = Math.min(Math.max(frameAt(block, time, times), block.first + 1), block.last);
   return within ? { edit: "split", block: block.id, at, id } : null;
 }
 
-/** Ask for something else at a seam. @param {Seam} seam @param {Partial<Ask>} change */
+/** Change the wishes at a seam. @param {Seam} seam @param {Partial<Ask>} change */
 export function wish({ left, right, ask }, change) {
   return { edit: "ask", left, right, ...ask, ...change };
 }
 
-/** Let a seam's insertion last some seconds. @param {Seam} seam */
+/** Set the duration of a seam's insertion. @param {Seam} seam */
 export function lasting(seam, seconds) {
   return wish(seam, { seconds: Math.round(Math.min(Math.max(seconds, SHORTEST), LONGEST) * 100) / 100 });
 }
 
-/** How long an insertion is, or will be once what is wished is found. @param {Seam} seam */
+/** The duration of an insertion, or the wished one until it is found. @param {Seam} seam */
 export function lengthOf({ state, seconds, ask }) {
   return (state === "inserted" ? null : ask.seconds) ?? seconds;
 }
 
-/** Let a seam's insertion pass through a posture too, at a share of its way. @param {Seam} seam */
+/** Add a posture for a seam's insertion to pass, at a share of its duration. @param {Seam} seam */
 export function pass(seam, posture, share = 1) {
   const passing = [...seam.ask.passing];
   passing.splice(Math.round(share * passing.length), 0, posture);
   return wish(seam, { passing });
 }
 
-/** Show the alternative `by` places on; null if there is no other. @param {Seam} seam */
+/** Choose the alternative `by` steps on; null if there is only one. @param {Seam} seam */
 export function flip({ left, right, chosen, alternatives }, by) {
   const count = alternatives.length;
   if (count < 2) return null;

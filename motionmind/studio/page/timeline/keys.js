@@ -1,33 +1,33 @@
-/** The keys of the line of time; the `?` sheet lists the same table. */
+/** The time line's keys; the `?` sheet lists the same table. */
 
-/** Each row: the key as `event.key`, with what is held; how it is shown; what it does; the action. */
+/** Each row: `event.key`, modifiers, label, description, action. */
 export const KEYS = [
-  ["ArrowLeft", "", "←", "the stretch or insertion before", (does) => does.go(-1)],
-  ["ArrowRight", "", "→", "the next stretch or insertion", (does) => does.go(1)],
+  ["ArrowLeft", "", "←", "previous stretch or insertion", (does) => does.go(-1)],
+  ["ArrowRight", "", "→", "next stretch or insertion", (does) => does.go(1)],
   ["ArrowLeft", "alt", "Alt ←", "move the stretch earlier", (does) => does.moveBy(-1)],
   ["ArrowRight", "alt", "Alt →", "move the stretch later", (does) => does.moveBy(1)],
-  ["ArrowLeft", "shift", "Shift ←", "end a frame sooner; a shorter insertion", (does) => does.trimBy("last", -1)],
-  ["ArrowRight", "shift", "Shift →", "end a frame later; a longer insertion", (does) => does.trimBy("last", 1)],
-  ["ArrowLeft", "alt shift", "Alt Shift ←", "begin a frame sooner", (does) => does.trimBy("first", -1)],
+  ["ArrowLeft", "shift", "Shift ←", "end a frame earlier; shorten the insertion", (does) => does.trimBy("last", -1)],
+  ["ArrowRight", "shift", "Shift →", "end a frame later; lengthen the insertion", (does) => does.trimBy("last", 1)],
+  ["ArrowLeft", "alt shift", "Alt Shift ←", "begin a frame earlier", (does) => does.trimBy("first", -1)],
   ["ArrowRight", "alt shift", "Alt Shift →", "begin a frame later", (does) => does.trimBy("first", 1)],
-  ["ArrowUp", "", "↑", "the insertion's previous alternative", (does) => does.flip(-1)],
-  ["ArrowDown", "", "↓", "the insertion's next alternative", (does) => does.flip(1)],
-  ["Enter", "", "Enter", "go to where it begins", (does) => does.seek((does.item?.block ?? does.item?.seam)?.at ?? 0)],
+  ["ArrowUp", "", "↑", "previous alternative", (does) => does.flip(-1)],
+  ["ArrowDown", "", "↓", "next alternative", (does) => does.flip(1)],
+  ["Enter", "", "Enter", "go to its start", (does) => does.seek((does.item?.block ?? does.item?.seam)?.at ?? 0)],
   ["s", "", "S", "split the stretch at the playhead", (does) => does.split()],
   ["d", "", "D", "duplicate the stretch", (does) => does.duplicate()],
   ["m", "", "M", "mirror the stretch", (does) => does.mirror()],
   ["Delete", "", "Delete", "delete the stretch; discard or restore the insertion", (does) => does.remove()],
   ["Backspace", "", "", "", (does) => does.remove()],
   ["l", "", "L", "lock or unlock the insertion", (does) => does.lock()],
-  ["w", "", "W", "what the insertion is to be: length, postures, hands and feet", (does) => does.item?.seam && does.show({ sheet: true })],
+  ["w", "", "W", "wishes for the insertion: duration, postures, hands and feet", (does) => does.item?.seam && does.show({ sheet: true })],
   ["Escape", "", "", "", (does) => does.show({ sheet: false })],
   ["+", "", "+ −", "zoom", (does) => does.zoomIn()],
   ["=", "", "", "", (does) => does.zoomIn()],
   ["-", "", "", "", (does) => does.zoomOut()],
-  ["0", "", "0", "the whole piece", (does) => does.fit()],
+  ["0", "", "0", "show the whole piece", (does) => does.fit()],
 ];
 
-/** Do what a key is for; tells whether it was for anything. */
+/** Run a key's action; return whether it has one. */
 export function act(event, table, does) {
   const held = [
     event.altKey && "alt",

@@ -1,4 +1,4 @@
-/** The line of time below the viewer: the piece's stretches, what lies at its seams, and what is wished there. */
+/** The time line below the viewer: stretches, seams, and wishes. */
 
 import { html, useEffect, useMemo, useReducer, useState } from "../vendor/htm-preact-standalone.js";
 import { movement } from "../movements.js";
@@ -13,9 +13,9 @@ import { Toolbar } from "./toolbar.js";
 import { Tracks } from "./tracks.js";
 import { WishSheet } from "./wishes.js";
 
-const TEMPO = "motionmind-tempo"; // where this browser keeps it
-const HEIGHT = 48; // pixels of a thumbnail
-/** The rows of the sheet of keys; the tracks hear the keys themselves, where they have the focus. */
+const TEMPO = "motionmind-tempo"; // key in the browser's storage
+const THUMBNAIL_HEIGHT_PX = 48;
+/** Rows for the sheet of keys, without actions: the focused tracks handle these keys. */
 const ROWS = KEYS.filter(([, , shown]) => shown).map(([, , shown, does]) => ({ shown: [shown], does, group: "Time line" }));
 const LIMBS = /(wrist|hand|ankle|foot)$/;
 
@@ -78,19 +78,19 @@ export function Panel({ studio }) {
   </section>`;
 }
 
-/** Whether a key is for what has the focus. */
+/** Whether the focused element needs a key for itself. */
 function kept({ key, target }) {
   return target.closest("input, select, [role=slider], [role=dialog]") || (key === "Enter" && target.closest("button"));
 }
 
-/** What is in sight with a change; the same object if nothing is different. */
+/** Apply a change to the visible range; return the same object if nothing changes. */
 function same(old, change) {
   return Object.entries(change).every(([name, value]) => old[name] === value) ? old : { ...old, ...change };
 }
 
 /**
- * Show the piece in the viewer: as soon as the movement that it begins with is there, and again when all are.
- * Returns the names of its joints, none before they are known.
+ * Show the piece in the viewer as soon as its first movement has loaded, and again when all have.
+ * Return the names of its joints; none until they are known.
  */
 function usePlayed(studio, movements, { parts }) {
   const told = JSON.stringify(parts);
@@ -122,5 +122,5 @@ function usePlayed(studio, movements, { parts }) {
 
 /** A posture's picture. @param {string} key @param {number} frame */
 function picture(key, frame) {
-  return thumbnail(key, frame, HEIGHT);
+  return thumbnail(key, frame, THUMBNAIL_HEIGHT_PX);
 }

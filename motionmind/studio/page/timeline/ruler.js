@@ -3,7 +3,7 @@
 import { html, useEffect, useRef } from "../vendor/htm-preact-standalone.js";
 import { clock, countAt, countTicks, secondTicks } from "./scale.js";
 
-const STEP = 0.1; // seconds that an arrow key moves the playhead by
+const KEY_STEP_S = 0.1; // of the playhead, for an arrow key
 
 /** @param {{does: any, sight: any, seconds: number, tempo: number}} props */
 export function Ruler({ does, sight, seconds, tempo }) {
@@ -28,7 +28,7 @@ export function Ruler({ does, sight, seconds, tempo }) {
   const key = (event) => {
     if (event.altKey || event.ctrlKey || event.metaKey) return;
     const beat = 60 / tempo;
-    const by = { ArrowLeft: -STEP, ArrowRight: STEP, ArrowDown: -STEP, ArrowUp: STEP, PageUp: beat, PageDown: -beat };
+    const by = { ArrowLeft: -KEY_STEP_S, ArrowRight: KEY_STEP_S, ArrowDown: -KEY_STEP_S, ArrowUp: KEY_STEP_S, PageUp: beat, PageDown: -beat };
     const to_ = { Home: 0, End: seconds }[event.key] ?? (event.key in by ? does.time + by[event.key] : null);
     if (to_ === null) return;
     event.preventDefault();
@@ -64,7 +64,7 @@ export function Ruler({ does, sight, seconds, tempo }) {
   </div>`;
 }
 
-/** Moves itself: the tracks are not drawn again while time goes on. */
+/** The playhead, which moves itself: the tracks need no rendering while the piece plays. */
 export function Playhead({ does, scale }) {
   const element = useRef(null);
   useEffect(() => does.onTime((time) => {

@@ -1,4 +1,4 @@
-/** The bar above the tracks: what can be done with what is selected, how smoothing goes, tempo and zoom. */
+/** The bar above the tracks: actions on the selection, progress of smoothing, tempo and zoom. */
 
 import { html } from "../vendor/htm-preact-standalone.js";
 import { NumberField } from "../shell/fields.js";
@@ -18,7 +18,7 @@ const ICONS = {
   fit: "M1 3v10M15 3v10M4 8h8M4 8l2-2M4 8l2 2M12 8l-2-2M12 8l-2 2",
 };
 
-export function Icon({ name }) {
+function Icon({ name }) {
   return html`<svg viewBox="0 0 16 16" aria-hidden="true"><path d=${ICONS[name]} /></svg>`;
 }
 
@@ -32,7 +32,7 @@ export function Toolbar({ does, piece, selection, tempo, onTempo, stopped, onSto
     ${item?.seam && html`<${OfSeam} does=${does} seam=${item.seam} sheet=${sheet} />`}
     ${!item && html`<p class="hint grow cut">${hintFor(piece)}</p>`}
     <${Smoothing} piece=${piece} stopped=${stopped} onStop=${onStop} />
-    <label class="tempo" title="beats a minute: the ruler's counts">
+    <label class="tempo" title="Beats a minute, for the ruler's counts">
       <span class="pale">♩=</span>
       <${NumberField}
         min="20"
@@ -50,7 +50,7 @@ export function Toolbar({ does, piece, selection, tempo, onTempo, stopped, onSto
     </label>
     <div class="zoom row">
       <${Button} icon="out" words="Zoom out (−)" does=${() => does.zoomOut()} test="zoom-out" />
-      <${Button} icon="fit" words="The whole piece (0)" does=${() => does.fit()} test="zoom-fit" />
+      <${Button} icon="fit" words="Show the whole piece (0)" does=${() => does.fit()} test="zoom-fit" />
       <${Button} icon="in" words="Zoom in (+)" does=${() => does.zoomIn()} test="zoom-in" />
     </div>
   </div>`;
@@ -73,8 +73,8 @@ function OfSeam({ does, seam, sheet }) {
   const any = alternatives.length > 0;
   const locked = decision === "locked";
   return html`<p class="grow cut" data-testid="selected">
-      <b>${seam.stands ? `Insertion, ${clock(seam.seconds)} s` : any ? "Insertion, left out" : "Seam"}</b>${" "}
-      <span class="pale">${state === "inserted" ? besideLength(alternatives[chosen - 1].words) : seam.stands ? "another is being sought" : words}</span>
+      <b>${seam.stands ? `Insertion, ${clock(seam.seconds)} s` : any ? "Insertion, discarded" : "Seam"}</b>${" "}
+      <span class="pale">${state === "inserted" ? withoutDuration(alternatives[chosen - 1].words) : seam.stands ? "searching for another" : words}</span>
     </p>
     ${any &&
     html`<div class="row flip">
@@ -112,22 +112,22 @@ function OfSeam({ does, seam, sheet }) {
       </button>`}
     <${Button}
       icon="wishes"
-      words="Wishes: length, postures, hands and feet (W)"
+      words="Wishes: duration, postures, hands and feet (W)"
       pressed=${sheet}
       does=${() => does.show({ sheet: !sheet })}
       test="wishes"
     />`;
 }
 
-/** How far smoothing in the background is. */
+/** Progress of smoothing in the background. */
 function Smoothing({ piece, stopped, onStop }) {
   const open = piece.seams.filter(({ state }) => state === "waiting" || state === "abrupt").length;
   if (open === 0) return html`<span class="smoothing" role="status"></span>`;
   const all = piece.seams.length;
   return html`<div class="smoothing row" data-testid="smoothing">
-    <span role="status" class="numbers pale">${stopped ? "not smoothed" : "smoothing"}: ${open} of ${all} seams</span>
-    <progress max=${all} value=${all - open} aria-label="Seams that are smooth"></progress>
-    <button class="button" data-testid="smoothing-stop" onClick=${() => onStop(!stopped)}>${stopped ? "Go on" : "Stop"}</button>
+    <span role="status" class="numbers pale">${stopped ? "paused" : "smoothing"}: ${open} of ${all} seams</span>
+    <progress max=${all} value=${all - open} aria-label="Finished seams"></progress>
+    <button class="button" data-testid="smoothing-stop" onClick=${() => onStop(!stopped)}>${stopped ? "Resume" : "Pause"}</button>
   </div>`;
 }
 
@@ -144,12 +144,12 @@ function Button({ icon, words, does, test, pressed }) {
   </button>`;
 }
 
-/** What there is to know of an insertion beside its length. */
-function besideLength(words) {
+/** An insertion's description without its duration. */
+function withoutDuration(words) {
   return words.split("; ").filter((one) => !/^[\d.]+ s$/.test(one)).join("; ");
 }
 
 function hintFor({ blocks, seconds }) {
-  if (blocks.length === 0) return "Nothing yet: accept an alternative, or drag a posture here.";
-  return `${blocks.length} stretch${blocks.length === 1 ? "" : "es"}, ${clock(seconds)} s. Select one, or press Tab and the arrow keys.`;
+  if (blocks.length === 0) return "Empty: accept an alternative, or drag a posture here.";
+  return `${blocks.length} stretch${blocks.length === 1 ? "" : "es"}, ${clock(seconds)} s. Select one, or use Tab and the arrow keys.`;
 }

@@ -1,15 +1,15 @@
-/** The tracks under the ruler, which scroll together; what pointers and keys do on them. */
+/** The tracks under the ruler, which scroll together, and their pointer and key events. */
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { dropped, POSTURE_TYPE } from "../between/desk.js";
 import { Seams, Stretches, Wishes } from "./blocks.js";
 import { Drag } from "./gestures.js";
 import { placeAt, selected } from "./items.js";
 import { act, KEYS } from "./keys.js";
 import { Playhead, Ruler } from "./ruler.js";
 
-const POSTURE = "application/x-motionmind-posture";
-const LEAD = 16; // pixels before the piece, as in timeline.css: a posture that it begins with is drawn on both sides of 0
-const END = 160; // pixels after the piece, where a posture may be dropped
+const LEAD_PX = 16; // before the piece, as in timeline.css: a posture at its start extends to both sides of 0
+const END_PX = 160; // after the piece, to drop postures
 
 export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
   const scroller = useRef(null);
@@ -22,8 +22,8 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
     const measure = () => does.show({ width: current.clientWidth });
     const observer = new ResizeObserver(measure);
     observer.observe(current);
-    measure(); // a browser that draws nothing, behind another window, does not observe
-    // Preact listens passively to wheels, and the page would zoom with them.
+    measure(); // a hidden window's observer does not run
+    // Preact's wheel listeners are passive: the page would zoom too.
     const wheel = (event) => {
       if (!event.ctrlKey && !event.metaKey) return;
       event.preventDefault();
@@ -40,7 +40,7 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
     if (Math.abs(scroller.current.scrollLeft - sight.left) > 1) scroller.current.scrollLeft = sight.left;
   }, [sight.left, sight.scale]);
 
-  // Whoever came by keys goes on by keys, though the tracks are drawn anew.
+  // Keep the keyboard focus when the tracks are rendered again.
   useEffect(() => {
     const item = selected(piece, selection);
     if (!item) return;
@@ -84,20 +84,19 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
     else if (event.target.closest("[role=option]")) act(event, KEYS, does);
   };
   const dragOver = (event) => {
-    if (!event.dataTransfer.types.includes(POSTURE)) return;
+    if (!event.dataTransfer.types.includes(POSTURE_TYPE)) return;
     event.preventDefault();
     event.dataTransfer.dropEffect = "copy";
     setOver(event.target.closest("[data-left]")?.dataset.left ?? "track");
   };
   const drop = (event) => {
     setOver("");
-    const data = event.dataTransfer.getData(POSTURE);
-    if (!data) return;
+    const posture = dropped(event);
+    if (!posture) return;
     event.preventDefault();
-    const posture = JSON.parse(data);
     const onto = heldBy(event, piece)?.seam;
-    if (onto && posture.last > posture.frame) {
-      does.studio.say("An insertion passes a posture: open the clip, and drag a moment of it here", { kind: "note" });
+    if (onto && (posture.last ?? 0) > posture.frame) {
+      does.studio.say("An insertion passes single postures: open the clip and drag a frame here.", { kind: "note" });
     } else if (onto) {
       const { left, width } = event.target.closest("[data-left]").getBoundingClientRect();
       does.pass(onto, { posture: posture.key, frame: posture.frame }, (event.clientX - left) / width);
@@ -114,7 +113,7 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
     onDragLeave=${() => setOver("")}
     onDrop=${drop}
   >
-    <div class="inner" style=${{ width: `${Math.max(piece.seconds * sight.scale + END, sight.width)}px` }}>
+    <div class="inner" style=${{ width: `${Math.max(piece.seconds * sight.scale + END_PX, sight.width)}px` }}>
       <${Ruler} does=${does} sight=${sight} seconds=${piece.seconds} tempo=${tempo} />
       <div
         onPointerDown=${down}
@@ -124,7 +123,7 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
         onKeyDown=${key}
         onfocusin=${(event) => focusIn(event, does, piece)}
         onfocusout=${({ relatedTarget }) => {
-          // What is taken away while it has the focus leaves it to nobody.
+          // An element that is removed with the focus has no relatedTarget.
           if (relatedTarget && !relatedTarget.closest("[role=option]")) does.focused = false;
         }}
         onDblClick=${(event) => openAt(event, does, piece)}
@@ -145,12 +144,12 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
   </div>`;
 }
 
-/** Where time begins when nothing is scrolled, in pixels from the window's left edge. */
+/** The window's x of time 0 without scrolling, pixels. */
 function edgeOf(scroller) {
-  return scroller.getBoundingClientRect().left + LEAD;
+  return scroller.getBoundingClientRect().left + LEAD_PX;
 }
 
-/** What a pointer takes hold of: a stretch, its edge, or an insertion; null for nothing. */
+/** The stretch, edge or insertion under the pointer; null if there is none. */
 function heldBy(event, piece) {
   const element = event.target.closest("[role=option]");
   if (!element) return null;
@@ -165,7 +164,7 @@ function heldBy(event, piece) {
   return seam && { kind: edge ? "last" : "select", seam, chosen };
 }
 
-/** The focus selects: arrow keys go from one to the next, and the tab key comes to the selected one. */
+/** Select the focused item. */
 function focusIn(event, does, piece) {
   does.focused = true;
   const held = heldBy(event, piece);

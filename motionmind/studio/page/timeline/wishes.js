@@ -1,17 +1,17 @@
-/** What is wished of an insertion: its length, postures that it passes, hands and feet that stay. */
+/** Wishes for an insertion: its duration, postures to pass, hands and feet to hold. */
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { NumberField } from "../shell/fields.js";
-import { plain } from "./blocks.js";
+import { limbName } from "./blocks.js";
 import { lasting, LONGEST, SHORTEST } from "./items.js";
 
 const HOLDS = {
-  start: "stays as at the start",
-  end: "is at once as at the end",
-  throughout: "stays all the way",
-  place: "stays in its place",
+  start: "keeps its start",
+  end: "takes its end at once",
+  throughout: "never moves",
+  place: "stays in place",
 };
-const LEAST = 0.1; // seconds that something stays in its place at least
+const MIN_STAY_S = 0.1;
 
 /** @param {{does: any, studio: any, seam: any, joints: string[], thumbnail: any, onClose: () => void}} props */
 export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
@@ -22,7 +22,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
   const [joint, setJoint] = useState("");
   const [hold, setHold] = useState("start");
   const [stay, setStay] = useState(() => stayFrom(seam, does.time));
-  // At once: a key that comes before would act on the tracks, and close the sheet again.
+  // Before the next key, which would act on the tracks and close the sheet.
   useLayoutEffect(() => element.current.querySelector("input").focus(), []);
   const locked = seam.decision === "locked";
   const escape = (event) => {
@@ -52,14 +52,14 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
       <h3 class="grow">Wishes for this insertion</h3>
       <button class="button quiet" onClick=${onClose} data-testid="wishes-close">Close</button>
     </div>
-    ${locked && html`<p class="said warning">It is locked: unlock it to ask for something else.</p>`}
+    ${locked && html`<p class="said warning">This insertion is locked: unlock it to change the wishes.</p>`}
     <label class="row">
       <span class="grow">Seconds</span>
       <${NumberField}
         min=${SHORTEST}
         max=${LONGEST}
         step="0.1"
-        placeholder="as usual"
+        placeholder="auto"
         data-testid="wish-seconds"
         disabled=${locked}
         value=${ask.seconds ?? ""}
@@ -71,7 +71,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
       />
     </label>
     <div class="stack">
-      <h3>Passes these postures</h3>
+      <h3>Postures to pass</h3>
       <${Wished}
         rows=${ask.passing.map((one, i) => ({
           key: one.posture,
@@ -95,18 +95,18 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
           <option value="">a posture…</option>
           ${postures.map(({ key, name }) => html`<option key=${key} value=${key}>${name}</option>`)}
         </select>
-        <button class="button" data-testid="wish-posture-add" disabled=${locked} onClick=${addPosture}>Pass</button>
+        <button class="button" data-testid="wish-posture-add" disabled=${locked} onClick=${addPosture}>Add</button>
       </div>
     </div>
     <div class="stack">
-      <h3>Hands and feet that stay</h3>
+      <h3>Hands and feet to hold</h3>
       <${Wished}
         rows=${ask.pins.map((pin) => ({
           key: pin.joint,
-          words: `${plain(pin.joint)} ${HOLDS[pin.hold]}${pin.hold === "place" ? fromTo(pin, seam) : ""}`,
-          label: `Let go of the ${plain(pin.joint)}`,
+          words: `${limbName(pin.joint)} ${HOLDS[pin.hold]}${pin.hold === "place" ? fromTo(pin, seam) : ""}`,
+          label: `Release the ${limbName(pin.joint)}`,
         }))}
-        action="Let go"
+        action="Release"
         locked=${locked}
         onAction=${(index) => does.wish(seam, () => ({ pins: without(ask.pins, index) }))}
       />
@@ -120,7 +120,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
           onChange=${(event) => setJoint(event.target.value)}
         >
           <option value="">a hand or foot…</option>
-          ${joints.map((name) => html`<option key=${name} value=${name}>${plain(name)}</option>`)}
+          ${joints.map((name) => html`<option key=${name} value=${name}>${limbName(name)}</option>`)}
         </select>
         <select
           class="grow"
@@ -132,14 +132,14 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
         >
           ${Object.entries(HOLDS).map(([value, words]) => html`<option key=${value} value=${value}>${words}</option>`)}
         </select>
-        <button class="button" data-testid="wish-pin-add" disabled=${locked} onClick=${addPin}>Pin</button>
+        <button class="button" data-testid="wish-pin-add" disabled=${locked} onClick=${addPin}>Hold</button>
       </div>
       ${hold === "place" && html`<${Stay} seam=${seam} stay=${stay} locked=${locked} onStay=${setStay} />`}
     </div>
   </section>`;
 }
 
-/** From when to when a hand or foot stays in its place. */
+/** The times between which a hand or foot stays in place. */
 function Stay({ seam, stay, locked, onStay }) {
   const field = (name, words, least, most) => html`<label class="row">
     ${words}
@@ -158,25 +158,25 @@ function Stay({ seam, stay, locked, onStay }) {
       }}
     />
   </label>`;
-  const gap = Math.min(LEAST / seam.seconds, 0.5);
+  const gap = Math.min(MIN_STAY_S / seam.seconds, 0.5);
   return html`<div class="row" role="group" aria-label="How long it stays">
     ${field("begins", "from", 0, stay.ends - gap)} ${field("ends", "to", stay.begins + gap, 1)}
     <span class="hint">of ${seam.seconds.toFixed(1)} s</span>
   </div>`;
 }
 
-/** All of an insertion, or from the moment in it that is shown. @param {import("./items.js").Seam} seam */
+/** The whole insertion, or from the current time in it. @param {import("./items.js").Seam} seam */
 function stayFrom({ at, seconds }, time) {
   const share = (time - at) / seconds;
   return { begins: share > 0 && share < 0.9 ? share : 0, ends: 1 };
 }
 
-/** From when to when something stays, in words. @param {import("./items.js").Pin} pin @param {import("./items.js").Seam} seam */
+/** The times between which it stays, in words. @param {import("./items.js").Pin} pin @param {import("./items.js").Seam} seam */
 function fromTo({ begins, ends }, { seconds }) {
   return begins === 0 && ends === 1 ? "" : `, ${(begins * seconds).toFixed(1)} to ${(ends * seconds).toFixed(1)} s`;
 }
 
-/** A list of what is wished, each with a button that takes it back. */
+/** A list of wishes, each with a button that removes it. */
 function Wished({ rows, action, locked, onAction }) {
   return html`<ul class="wishes-list">
     ${rows.map(
@@ -189,7 +189,7 @@ function Wished({ rows, action, locked, onAction }) {
   </ul>`;
 }
 
-/** Named postures of the corpus, and saved ones: [{key, name}]. */
+/** Saved postures, and named ones of the corpora: [{key, name}]. */
 function usePostures(studio) {
   const [postures, setPostures] = useState([]);
   useEffect(() => {

@@ -1,20 +1,20 @@
-/** The attractor as a map in numbers: points to pixels and back, and what is drawn. Nothing here listens. */
+/** Draw the attractor's map, and convert points to pixels and back. Nothing here handles events. */
 
-const MARGIN = 14; // pixels around the attractor
+const MARGIN_PX = 14; // around the attractor
 const CROSS = [
   [1, 0],
   [-1, 0],
   [0, 1],
   [0, -1],
 ];
-const SITES_APART = 5; // pixels between the piece's postures, at least, or they are not dots
+const MIN_DOT_DISTANCE_PX = 5; // closer postures have no dots
 
-/** Points that the server wrote: float32 [N][3] in base64. @param {string} text */
+/** Decode points: float32 [N][3] in base64. @param {string} text */
 export function points(text) {
   return new Float32Array(Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer);
 }
 
-/** Where points of an attractor are in a picture so wide and so high. */
+/** The projection of an attractor's points to pixels. */
 export class Chart {
   /** @param {Float32Array} all points of the attractor [N * 3] @param {number[]} axes to the right, up, towards */
   constructor(all, [across, up]) {
@@ -37,7 +37,7 @@ export class Chart {
   /** @param {number} width @param {number} height */
   resize(width, height) {
     const [[left, right], [low, high]] = this.bounds;
-    this.scale = Math.min((width - 2 * MARGIN) / (right - left), (height - 2 * MARGIN) / (high - low));
+    this.scale = Math.min((width - 2 * MARGIN_PX) / (right - left), (height - 2 * MARGIN_PX) / (high - low));
     this.x0 = width / 2 - (this.scale * (left + right)) / 2;
     this.y0 = height / 2 + (this.scale * (low + high)) / 2;
     this.width = width;
@@ -49,7 +49,7 @@ export class Chart {
     return [this.x0 + this.scale * some[i * 3 + this.across], this.y0 - this.scale * some[i * 3 + this.up]];
   }
 
-  /** The number of the attractor's point that is nearest to a pixel. @param {number} x @param {number} y */
+  /** The index of the attractor's point nearest to a pixel. @param {number} x @param {number} y */
   nearest(x, y) {
     let [best, least] = [0, Infinity];
     for (let i = 0; i * 3 < this.all.length; i++) {
@@ -60,7 +60,7 @@ export class Chart {
     return best;
   }
 
-  /** The attractor's point of a number, all around. @param {number} i @returns {[number, number, number]} */
+  /** The attractor's point at an index, modulo their number. @param {number} i @returns {[number, number, number]} */
   point(i) {
     const count = this.all.length / 3;
     const at = (((i % count) + count) % count) * 3;
@@ -74,7 +74,7 @@ export class Chart {
  */
 
 /**
- * Draw the map, all but where the movement is.
+ * Draw the map without the moving head.
  * @param {CanvasRenderingContext2D} pen @param {Chart} chart @param {Inks} inks @param {Shown} shown
  */
 export function draw(pen, chart, inks, { trail, other, every, jumps }) {
@@ -100,7 +100,7 @@ export function draw(pen, chart, inks, { trail, other, every, jumps }) {
 }
 
 /**
- * Draw where the variation is, among its postures.
+ * Draw the head: where the variation is, among its postures.
  * @param {CanvasRenderingContext2D} pen @param {Chart} chart @param {Inks} inks @param {Shown} shown @param {number} place
  */
 export function drawHead(pen, chart, inks, { other, every }, place) {
@@ -122,13 +122,13 @@ function line(pen, chart, some, ink, width) {
   pen.stroke();
 }
 
-/** The piece's postures, as far as there is room. */
+/** Draw the piece's postures, where there is room. */
 function dots(pen, chart, trail, every, inks) {
   pen.fillStyle = inks.piece;
   let [lastX, lastY] = [-Infinity, -Infinity];
   for (let i = 0; i * 3 < trail.length; i += every) {
     const [x, y] = chart.at(trail, i);
-    if (Math.hypot(x - lastX, y - lastY) < SITES_APART) continue;
+    if (Math.hypot(x - lastX, y - lastY) < MIN_DOT_DISTANCE_PX) continue;
     [lastX, lastY] = [x, y];
     disc(pen, x, y, 2.4);
   }
@@ -140,7 +140,7 @@ function disc(pen, x, y, radius) {
   pen.fill();
 }
 
-/** Where the variation leaves the order: a diamond, so that it is told from the dots without colour. */
+/** Mark where the variation leaves the order: a diamond, which differs from the dots even without colour. */
 function diamond(pen, [x, y], radius) {
   pen.beginPath();
   pen.moveTo(x, y - radius);
@@ -153,7 +153,7 @@ function diamond(pen, [x, y], radius) {
   pen.stroke();
 }
 
-/** The handle of the start: a ring with a cross. */
+/** Draw the handle of the start: a ring with a cross. */
 function start(pen, [x, y], inks) {
   pen.lineWidth = 4;
   pen.strokeStyle = inks.paper;

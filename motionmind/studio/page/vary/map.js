@@ -1,4 +1,4 @@
-/** The map of the attractor: the piece along it, the variation over it, and the start, which a hand drags. */
+/** The map of the attractor: the piece, the variation, and the start, which the user drags. */
 
 import { html, useEffect, useMemo, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { useChange, useKeys } from "../shell/hooks.js";
@@ -7,9 +7,9 @@ import { placeAt } from "./varying.js";
 
 const STEPS = /** @type {Record<string, number>} */ ({ ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 40, PageDown: -40 });
 const SHEET = [
-  { shown: ["←", "→"], does: "on the map: the start, along the attractor; with Shift farther", group: "Variations" },
-  { shown: ["PgUp", "PgDn"], does: "on the map: the start, far along", group: "Variations" },
-  { shown: ["Home"], does: "on the map: the usual start", group: "Variations" },
+  { shown: ["←", "→"], does: "on the map: move the start (with Shift farther)", group: "Variations" },
+  { shown: ["PgUp", "PgDn"], does: "on the map: move the start far", group: "Variations" },
+  { shown: ["Home"], does: "on the map: reset the start", group: "Variations" },
 ];
 const NOTHING = new Float32Array(0);
 /** @type {Map<string, Promise<{chart: Chart, about: string}>>} */
@@ -26,8 +26,8 @@ function chartOf(api, flow) {
 }
 
 /**
- * @param {{studio: any, varying: import("./varying.js").Varying, piece: any, playing: boolean}} props `playing`: the viewer
- *   shows the variation, which is `piece` with all that was inserted
+ * @param {{studio: any, varying: import("./varying.js").Varying, piece: any, playing: boolean}} props `playing`: the
+ *   viewer shows the variation, which is `piece` with its insertions
  */
 export function AttractorMap({ studio, varying, piece, playing }) {
   const { viewer } = studio;
@@ -35,7 +35,7 @@ export function AttractorMap({ studio, varying, piece, playing }) {
   const canvas = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   const [chart, setChart] = useState(/** @type {Chart | null} */ (null));
   const [held, setHeld] = useState(false);
-  const along = useRef(0); // number of the attractor's point where the start is
+  const along = useRef(0); // index of the attractor's point at the start
   const { flow } = varying.wish;
   const { proposal } = varying;
   const dark = useChange(viewer.theme, () => viewer.theme.dark);
@@ -63,7 +63,7 @@ export function AttractorMap({ studio, varying, piece, playing }) {
     if (!element || !chart) return undefined;
     let waiting = 0;
     const inks = colours(element);
-    const below = document.createElement("canvas"); // what does not move while the movement plays
+    const below = document.createElement("canvas"); // the static layer
     const pen = /** @type {CanvasRenderingContext2D} */ (element.getContext("2d"));
     const paint = () => {
       waiting = 0;
@@ -127,11 +127,11 @@ export function AttractorMap({ studio, varying, piece, playing }) {
       class=${held ? "held" : ""}
       tabindex="0"
       role="slider"
-      aria-label="Where the piece begins on the attractor"
+      aria-label="Start of the piece on the attractor"
       aria-valuemin="0"
       aria-valuemax=${chart ? chart.all.length / 3 - 1 : 1}
       aria-valuenow=${along.current}
-      aria-valuetext=${varying.wish.start ? varying.wish.start.map((x) => x.toFixed(1)).join(", ") : "its usual start"}
+      aria-valuetext=${varying.wish.start ? varying.wish.start.map((x) => x.toFixed(1)).join(", ") : "default"}
       aria-describedby="map-hint"
       onPointerDown=${(/** @type {PointerEvent} */ event) => {
         if (event.button !== 0) return;
@@ -146,14 +146,14 @@ export function AttractorMap({ studio, varying, piece, playing }) {
     ></canvas>
     <figcaption class="hint" id="map-hint">
       <span class="sign piece">● the piece</span> <span class="sign other">— variation</span>
-      <span class="sign other">◇ leaps</span> <span>⊕ the start: drag it, or use the arrow keys</span>
+      <span class="sign other">◇ leaps</span> <span>⊕ start: drag it or use the arrow keys</span>
     </figcaption>
   </figure>`;
 }
 
 const INKS = { sheets: "--edge", piece: "--emerald", other: "--violet", paper: "--paper", ink: "--ink" };
 
-/** The page's colours as a canvas understands them: without `light-dark`. @param {HTMLElement} element */
+/** Resolve the page's colours for a canvas, which does not support `light-dark`. @param {HTMLElement} element */
 function colours(element) {
   const probe = document.createElement("i");
   element.after(probe);

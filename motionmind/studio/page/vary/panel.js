@@ -1,38 +1,30 @@
-/** Variations: how far to depart, from where, what is kept; the new order at once, and both beside each other. */
+/** Variations: how far to depart, where to start, what to keep; the new order, and both side by side. */
 
 import { html, useEffect, useMemo, useState } from "../vendor/htm-preact-standalone.js";
-import { AnotherError } from "../api.js";
+import { StaleError } from "../api.js";
 import { movement } from "../movements.js";
-import { useChange } from "../shell/hooks.js";
+import { perStudio, useChange } from "../shell/hooks.js";
 import { Composed, Movements } from "../timeline/composed.js";
 import { AttractorMap } from "./map.js";
 import { Tiles } from "./tiles.js";
 import { alike, departure, insertedShare, Varying } from "./varying.js";
 
-const FARTHEST = 0.4; // share of the steps: no attractor departs farther
-const OFF = 0.06; // of a share that is wished: a variation that departs less departs as far as it can
+const MAX_DEPARTURE = 0.4; // share of the steps: no attractor departs farther
+const DEPARTURE_SLACK = 0.06; // a variation that departs less than the wish by this cannot depart farther
 const STRETCHES = [1, 2, 4, 8]; // postures
-const AFTER = 150; // milliseconds after an edit of the piece
-const AGAIN = 5; // times that a variation is sought anew because another window has edited the piece
+const EDIT_DELAY_MS = 150; // from an edit of the piece to its new variation
+const MAX_RETRIES = 5; // if another window edits the piece meanwhile
 const INSERTED = [
-  [0.5, "half of the time"],
-  [0.33, "a third of it"],
-  [0.2, "a fifth of it"],
-  [0.1, "a tenth of it"],
+  [0.5, "half the time"],
+  [0.33, "a third"],
+  [0.2, "a fifth"],
+  [0.1, "a tenth"],
 ];
 const FLOWS = [
   ["lorenz", "Lorenz"],
   ["rossler", "Rössler"],
 ];
-/** @type {WeakMap<object, Varying>} */
-const kept = new WeakMap(); // so that another panel can be opened meanwhile
-
-/** @param {any} studio */
-function varyingOf(studio) {
-  const known = kept.get(studio) ?? new Varying(studio.api);
-  kept.set(studio, known);
-  return known;
-}
+const varyingOf = perStudio((studio) => new Varying(studio.api));
 
 /** @param {{studio: any}} props */
 export function Panel({ studio }) {
@@ -44,18 +36,18 @@ export function Panel({ studio }) {
   const isLong = frames > 2;
   useEffect(() => {
     if (!isLong) return undefined;
-    // The piece is another: its variation is, too; but first the edit is seen.
-    const asking = setTimeout(() => varying.ask(), varying.proposal ? AFTER : 0);
+    // A changed piece needs a new variation; but show the edit first.
+    const asking = setTimeout(() => varying.ask(), varying.proposal ? EDIT_DELAY_MS : 0);
     return () => clearTimeout(asking);
   }, [piece]);
   if (!isLong) {
     return html`<section class="stack vary">
       <h2>Variations</h2>
-      <p class="empty">A variation reads the piece's stretches in another order. There are too few postures for it yet: put a clip onto
-      the time line, whole or in part.</p>
+      <p class="empty">A variation puts the piece's stretches in another order. The piece is too short: add a clip to the time line,
+      whole or in part.</p>
       <div class="row">
         <button class="button" onClick=${() => studio.open("between")}>Choose a clip</button>
-        <button class="button" onClick=${() => studio.open("movement")}>Bring one of your own</button>
+        <button class="button" onClick=${() => studio.open("movement")}>Use your own</button>
       </div>
     </section>`;
   }
@@ -63,10 +55,10 @@ export function Panel({ studio }) {
   const isPiece = Boolean(proposal) && alike(proposal.piece.blocks, piece.blocks);
   const shown = isPiece ? piece : proposal?.piece;
   const departs = proposal ? departure(proposal.departs) : "";
-  const isFarthest = Boolean(proposal) && !varying.asking && wish.nudge === null && wish.depart > proposal.departs + OFF;
-  const told = isFarthest ? `${departs} at most` : departs;
+  const isFarthest = Boolean(proposal) && !varying.asking && wish.nudge === null && wish.depart > proposal.departs + DEPARTURE_SLACK;
+  const label = isFarthest ? `${departs} at most` : departs;
   const make = async () => {
-    // An edit may still be on its way, and others come while the variation is made: it is of the piece after them.
+    // Wait for edits under way, and for those that come meanwhile: the variation must include them.
     for (let changed; changed !== studio.api.changed; ) {
       ({ changed } = studio.api);
       await changed;
@@ -74,13 +66,13 @@ export function Panel({ studio }) {
     }
     if (varying.proposal && !varying.error) await studio.api.arrange(varying.edit, varying.proposal.basis);
   };
-  const makeOfLatest = async (again = AGAIN) => {
+  const makeOfLatest = async (retries = MAX_RETRIES) => {
     try {
       await make();
-      if (again < AGAIN) studio.say("The piece was edited in another window meanwhile: this is the variation of what it became.");
+      if (retries < MAX_RETRIES) studio.say("Another window edited the piece: this is a variation of the edited piece.");
     } catch (wrong) {
-      if (!(wrong instanceof AnotherError) || !again) throw wrong;
-      await makeOfLatest(again - 1); // another window was quicker
+      if (!(wrong instanceof StaleError) || !retries) throw wrong;
+      await makeOfLatest(retries - 1); // another window was quicker
     }
   };
   const vary = () => studio.once("vary", makeOfLatest);
@@ -89,25 +81,25 @@ export function Panel({ studio }) {
     <${AttractorMap} studio=${studio} varying=${varying} piece=${shown} playing=${view.playing} />
     <label class="dial">
       <span class="row"><span class="grow">How far to depart</span>
-      <output data-testid="departs" class="pale">${told}</output></span>
-      <input type="range" data-testid="depart" min="0" max=${FARTHEST * 100} step="1" value=${Math.round(wish.depart * 100)}
-        aria-valuetext=${told}
+      <output data-testid="departs" class="pale">${label}</output></span>
+      <input type="range" data-testid="depart" min="0" max=${MAX_DEPARTURE * 100} step="1" value=${Math.round(wish.depart * 100)}
+        aria-valuetext=${label}
         onInput=${(/** @type {any} */ event) => varying.want({ depart: Number(event.target.value) / 100 })} />
     </label>
     <label class="row"><span class="grow">Insertions take at most</span>
-      <select data-testid="inserted" value=${wish.inserted ?? ""} title="As the engine expects before it has found them"
+      <select data-testid="inserted" value=${wish.inserted ?? ""} title="The engine's estimate, before the search"
         onChange=${(/** @type {any} */ event) => varying.want({ inserted: Number(event.target.value) || null })}>
-        <option value="">what it takes</option>
+        <option value="">no limit</option>
         ${INSERTED.map(([share, words]) => html`<option value=${share}>${words}</option>`)}
       </select>
     </label>
     <div class="row">
       <button class="button primary" data-testid="vary" disabled=${!proposal || isPiece} title="Make this order the piece" onClick=${vary}>Vary</button>
-      <button class="button" data-testid="another" disabled=${!proposal} title="Begin elsewhere on the attractor" onClick=${() => varying.another()}>Another</button>
-      <button class="button" data-testid="beside" aria-pressed=${view.beside} title="Show the original and the variation beside each other"
-        onClick=${view.toggle}>Beside</button>
+      <button class="button" data-testid="another" disabled=${!proposal} title="Start elsewhere on the attractor" onClick=${() => varying.another()}>Another</button>
+      <button class="button" data-testid="beside" aria-pressed=${view.beside} title="Show the original and the variation side by side"
+        onClick=${view.toggle}>Compare</button>
     </div>
-    ${!proposal && !error && html`<p class="hint" role="status">The piece is being laid out on the attractor…</p>`}
+    ${!proposal && !error && html`<p class="hint" role="status">Laying out the piece on the attractor…</p>`}
     ${error && html`<p class="said error" role="alert" data-testid="vary-error">${error}</p>`}
     ${shown && html`<${Order} studio=${studio} varying=${varying} shown=${shown} isPiece=${isPiece} view=${view} />`}
     <${Details} varying=${varying} />
@@ -127,14 +119,14 @@ function Order({ studio, varying, shown, isPiece, view }) {
         isPiece && waiting ? ` · ${waiting} seam${waiting > 1 ? "s" : ""} to smooth` : ""
       }${isPiece && !waiting ? ` · ${Math.round(100 * insertedShare(shown))} % inserted` : ""}${isPiece ? " · this is the piece" : ""}</h3>
       ${wish.kept.length + wish.stay.length > 0 &&
-      html`<button class="button quiet" data-testid="let-go" onClick=${() => varying.letGo()}>Let all go</button>`}
+      html`<button class="button quiet" data-testid="let-go" onClick=${() => varying.letGo()}>Release all</button>`}
     </div>
     ${selected &&
     !varying.keeps(selected) &&
-    html`<button class="button" data-testid="keep-selected" title="Keep the stretch that is selected on the time line where it is" onClick=${() => varying.stay(selected)}>Keep the selected stretch</button>`}
+    html`<button class="button" data-testid="keep-selected" title="Keep the stretch selected on the time line in its place" onClick=${() => varying.stay(selected)}>Keep the selected stretch</button>`}
     <${Tiles} piece=${shown} kept=${proposal?.kept ?? []} locked=${locked}
       onKeep=${(/** @type {string} */ id) => varying.keep(id)} onPlay=${(/** @type {any} */ block) => view.look(block.at)} />
-    <p class="hint">Keep what pleases: it stays where it is, and the rest is varied anew.</p>
+    <p class="hint">Keep what you like: it stays in place, and the rest varies.</p>
   </div>`;
 }
 
@@ -157,20 +149,20 @@ function Details({ varying }) {
         </select>
       </label>
       <div class="row"><span class="grow">Start</span>
-        <span class="pale numbers">${wish.start ? wish.start.map((x) => x.toFixed(2)).join(", ") : "the usual one"}</span>
-        ${wish.start && html`<button class="button quiet" data-testid="usual-start" onClick=${() => varying.want({ start: null })}>Back to it</button>`}
+        <span class="pale numbers">${wish.start ? wish.start.map((x) => x.toFixed(2)).join(", ") : "default"}</span>
+        ${wish.start && html`<button class="button quiet" data-testid="usual-start" onClick=${() => varying.want({ start: null })}>Reset</button>`}
       </div>
       ${proposal &&
       html`<div class="row"><span class="grow">Nudge</span><span class="pale numbers">${proposal.nudge.toPrecision(3)}</span></div>
         <div class="row"><span class="grow">Steps that depart</span><span class="pale numbers">${(100 * proposal.departs).toFixed(1)} %</span></div>`}
-      <p class="hint">The piece is laid out along the attractor. A second path, begun a nudge beside it, passes its postures in
-      another order; because the attractor is chaotic, the two part sooner or later.</p>
+      <p class="hint">The piece lies along the attractor. A second path, started a nudge beside it, passes the postures in another
+      order: on a chaotic attractor the two part sooner or later.</p>
     </div>
   </details>`;
 }
 
 /**
- * What the viewer shows of a variation: it, or both beside each other.
+ * The viewer's part: show the variation, or the original and the variation side by side.
  * @param {any} studio @param {Varying} varying @param {any} piece
  */
 function useView(studio, varying, piece) {
@@ -190,7 +182,7 @@ function useView(studio, varying, piece) {
         return composed;
       }),
     );
-    if (varying.proposal !== proposal) return; // another was asked for meanwhile
+    if (varying.proposal !== proposal) return; // a newer one has arrived
     const { viewer } = studio;
     const [before, now] = isPiece ? ["Before", "The piece"] : ["The piece", "The variation"];
     const how = both ? { beside: own, title: before, besideTitle: now } : { title: now };
@@ -201,7 +193,7 @@ function useView(studio, varying, piece) {
     if (looking) show(undefined, beside).catch(failed);
   }, [proposal, piece, beside, looking]);
   useEffect(() => {
-    studio.viewer.back(); // whatever another panel left there is not what is varied
+    studio.viewer.back(); // another panel may have left its movement there
     return () => studio.viewer.back();
   }, []);
   return {

@@ -1,19 +1,19 @@
-/** The new order as a strip of pictures; each stretch can be looked at, and kept. */
+/** The new order as a strip of pictures; play or keep each stretch. */
 
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.js";
 import { thumbnail } from "../places.js";
 
-const MOST = 400; // stretches with pictures
-const QUIET = 120; // milliseconds after which an order is taken to stay: before that no pictures are asked for
+const MAX_TILES = 400;
+const SETTLE_MS = 120; // load pictures only of an order that lasts this long
 /** @type {Set<string>} */
-const loaded = new Set(); // addresses of pictures that have come
+const loaded = new Set(); // URLs of loaded pictures
 const SEAMS = /** @type {Record<string, [string, string]>} */ ({
-  smooth: ["–", "follows as it is"],
-  abrupt: ["!", "is abrupt, and will be smoothed"],
-  waiting: ["…", "is not judged yet"],
-  inserted: ["+", "has movement inserted"],
-  discarded: ["×", "its insertion is left out"],
-  "none found": ["!", "is abrupt; nothing was found to smooth it"],
+  smooth: ["–", "smooth"],
+  abrupt: ["!", "abrupt: will be smoothed"],
+  waiting: ["…", "not checked yet"],
+  inserted: ["+", "movement inserted"],
+  discarded: ["×", "insertion discarded"],
+  "none found": ["!", "abrupt: no insertion found"],
 });
 
 /**
@@ -24,7 +24,7 @@ export function Tiles({ piece, kept, locked, onKeep, onPlay }) {
   const [settled, setSettled] = useState(/** @type {any} */ (null));
   const { blocks, seams } = piece;
   useEffect(() => {
-    const waiting = setTimeout(() => setSettled(piece), QUIET);
+    const waiting = setTimeout(() => setSettled(piece), SETTLE_MS);
     return () => clearTimeout(waiting);
   }, [piece]);
   const picture = (/** @type {any} */ block) => {
@@ -32,7 +32,7 @@ export function Tiles({ piece, kept, locked, onKeep, onPlay }) {
     return settled === piece || loaded.has(address) ? address : undefined;
   };
   return html`<ol class="tiles" data-testid="order" aria-label="The new order">
-    ${blocks.slice(0, MOST).map((/** @type {any} */ block, /** @type {number} */ i) => {
+    ${blocks.slice(0, MAX_TILES).map((/** @type {any} */ block, /** @type {number} */ i) => {
       const keeps = kept.includes(block.id);
       const fixed = locked.includes(block.id);
       const [sign, words] = i ? SEAMS[seams[i - 1].state] ?? ["…", ""] : ["", ""];
@@ -40,7 +40,7 @@ export function Tiles({ piece, kept, locked, onKeep, onPlay }) {
       const label = `${i + 1}: ${block.title}, ${block.seconds.toFixed(1)} seconds`;
       return html`<li key=${block.id} class=${keeps ? "kept" : ""} data-testid="tile-${i + 1}">
         ${i > 0 && html`<span class="seam ${seams[i - 1].state.replace(" ", "-")}" title=${words}>${sign}${inserted}</span>`}
-        <button class="picture" title="${block.title}: look at it" aria-label="Look at ${label}" onClick=${() => onPlay(block)}>
+        <button class="picture" title="Play ${block.title}" aria-label="Play ${label}" onClick=${() => onPlay(block)}>
           <img loading="lazy" alt="" width="56" height="64" src=${picture(block)}
             onLoad=${(/** @type {any} */ event) => loaded.add(event.target.getAttribute("src"))} />
         </button>
@@ -48,7 +48,7 @@ export function Tiles({ piece, kept, locked, onKeep, onPlay }) {
           class="keep"
           aria-pressed=${keeps}
           disabled=${fixed}
-          title=${fixed ? "kept: its insertion is locked on the time line" : keeps ? "let it go" : "keep it where it is"}
+          title=${fixed ? "kept: its insertion is locked on the time line" : keeps ? "release it" : "keep it in place"}
           aria-label="${keeps ? "Kept" : "Keep"} ${label}"
           onClick=${() => onKeep(block.id)}
         >
@@ -56,6 +56,6 @@ export function Tiles({ piece, kept, locked, onKeep, onPlay }) {
         </button>
       </li>`;
     })}
-    ${blocks.length > MOST && html`<li class="hint">and ${blocks.length - MOST} more</li>`}
+    ${blocks.length > MAX_TILES && html`<li class="hint">and ${blocks.length - MAX_TILES} more</li>`}
   </ol>`;
 }

@@ -1,4 +1,4 @@
-/** A variation as it is sought: the wish, what the server makes of it, and what is kept. It knows no page. */
+/** The search for a variation: the wish, the server's proposal, and what to keep. It knows no views. */
 
 import { points } from "./chart.js";
 
@@ -7,8 +7,8 @@ import { points } from "./chart.js";
  * @typedef {{block: Block, place: number}} Kept
  * @typedef {{flow: string, depart: number, nudge: number | null, start: [number, number, number] | null, stretch: number, inserted: number | null, kept: Kept[], stay: string[]}} Wish
  * @typedef {object} Proposal
- * @property {{seconds: number, parts: any[], blocks: any[], seams: any[]}} piece the variation, as a project tells its piece
- * @property {any[]} original parts of what it varies
+ * @property {{seconds: number, parts: any[], blocks: any[], seams: any[]}} piece the variation, in the format of a project's piece
+ * @property {any[]} original parts of the original
  * @property {number[]} places of the blocks' first postures
  * @property {number} count of postures
  * @property {string[]} kept ids of the blocks that are kept
@@ -19,12 +19,12 @@ import { points } from "./chart.js";
  * @property {string} trail of the piece, float32 [N][3] in base64
  * @property {string} other trail of the variation, the same
  * @property {number[]} jumps postures of the variation that do not follow
- * @property {object} about what the edit says of it
- * @property {string} basis of it in the piece, which is the same as long as the variation is that of the piece
+ * @property {object} about the edit's description of it
+ * @property {string} basis hash of the piece that it varies
  */
 
-/** The wish that a page begins with. @returns {Wish} */
-export function firstWish() {
+/** The first wish. @returns {Wish} */
+function firstWish() {
   return { flow: "lorenz", depart: 0.2, nudge: null, start: null, stretch: 2, inserted: null, kept: [], stay: [] };
 }
 
@@ -39,24 +39,24 @@ export class Varying extends EventTarget {
     this.proposal = null;
     this.error = "";
     this.stale = false;
-    /** @type {Promise<void> | null} over with the latest that was asked for; null when it is */
+    /** @type {Promise<void> | null} settles with the latest request; null if there is none */
     this.answered = null;
     this.version = 0;
   }
 
-  /** Whether something is asked for. */
+  /** Whether a request is under way. */
   get asking() {
     return this.answered !== null;
   }
 
-  /** Wish for something else; what is asked meanwhile is asked once, the latest of all. @param {Partial<Wish>} change */
+  /** Change the wish; of changes during a request only the latest is sent. @param {Partial<Wish>} change */
   want(change) {
     this.wish = { ...this.wish, ...change };
     this.#changed();
     return this.ask();
   }
 
-  /** Ask for what is wished; over once that is answered, and not what was asked for before. */
+  /** Request a variation; settles with the answer to the latest wish. */
   ask() {
     this.stale = true;
     this.answered ??= this.#ask();
@@ -78,17 +78,17 @@ export class Varying extends EventTarget {
     this.#changed();
   }
 
-  /** Begin elsewhere; while the hand is on it, with the nudge that there was, which is not sought. @param {[number, number, number]} start */
+  /** Move the start; during the drag keep the nudge, because a search for it takes time. @param {[number, number, number]} start */
   drag(start) {
     return this.want({ start, nudge: this.proposal?.nudge ?? null });
   }
 
-  /** The hand has let go: seek the nudge that departs as far as is wished. */
+  /** End the drag: search for the nudge that departs as far as wished. */
   drop() {
     return this.wish.nudge === null ? undefined : this.want({ nudge: null });
   }
 
-  /** Begin where the variation ends, which is somewhere else on the attractor. */
+  /** Start where the variation ends, elsewhere on the attractor. */
   another() {
     if (!this.proposal) return undefined;
     const end = points(this.proposal.other).slice(-3);
@@ -100,7 +100,7 @@ export class Varying extends EventTarget {
     return Boolean(this.proposal?.kept.includes(id));
   }
 
-  /** Keep a block of the proposal where it is, or let it go. @param {string} id */
+  /** Keep a block of the proposal in its place, or release it. @param {string} id */
   keep(id) {
     if (!this.proposal) return undefined;
     if (this.wish.stay.includes(id)) return this.want({ stay: this.wish.stay.filter((other) => other !== id) });
@@ -114,7 +114,7 @@ export class Varying extends EventTarget {
     return this.want({ kept });
   }
 
-  /** Keep a stretch of the piece where it is. @param {string} id */
+  /** Keep a stretch of the piece in its place. @param {string} id */
   stay(id) {
     return this.want({ stay: [...this.wish.stay, id] });
   }
@@ -140,14 +140,14 @@ function bare({ id, source, first, last, mirrored }) {
   return { id, source, first, last, mirrored };
 }
 
-/** Whether two rows of blocks are the same. @param {Block[]} one @param {Block[]} other */
+/** Whether two lists of blocks are equal. @param {Block[]} one @param {Block[]} other */
 export function alike(one, other) {
   return one.length === other.length && one.every((block, i) => JSON.stringify(bare(block)) === JSON.stringify(bare(other[i])));
 }
 
 /** How far it departs, in words. @param {number} share of the steps */
 export function departure(share) {
-  if (share < 0.005) return "as it is";
+  if (share < 0.005) return "unchanged";
   return `1 step in ${Math.max(Math.round(1 / share), 1)}`;
 }
 
