@@ -62,8 +62,7 @@ def thumbnail(motion: Motion, frame: int, height: int) -> bytes:
     root = motion.root[frame]
     cones, balls = posture_solids(*body.solids(motion.rotations[frame][None], root[None]), 0)
     cones, balls = to_view(cones, balls, view, root * [1.0, 0.0, 1.0])
-    low, high = np.concatenate([cones.reach(), balls.reach()], axis=-2)
-    (left, bottom), (right, top) = low.min(axis=0)[:2], high.max(axis=0)[:2]
+    (left, bottom), (right, top) = bounding_box(cones, balls)[:, :2]
     aspect_ratio = 0.9
     # 1.32 body heights leave room for raised arms.
     tall = max(1.32 * body.height, 1.08 * (top - bottom), 1.08 * (right - left) / aspect_ratio)

@@ -1,7 +1,7 @@
 """Transitions at the seams of a variation: which are abrupt, and the movement that the engine inserts to smooth them.
 
 A seam joins two postures that are not successive in the piece. Its transition is abrupt if the corpus lacks it: some
-joint (with `posturewise`, the whole body) makes a move between states that the corpus does not contain, or some joint
+joint (with `whole_body`, the whole body) makes a move between states that the corpus does not contain, or some joint
 turns faster than ever in the corpus. Staying in a state is no move.
 """
 
@@ -163,7 +163,7 @@ class TransitionTest:
 
     Attributes:
         engine: the corpus.
-        posturewise: whether to test moves of the whole body instead of each joint.
+        whole_body: whether to test moves of the whole body instead of each joint.
     """
 
     engine: Engine
@@ -276,7 +276,7 @@ def judge_transitions(
         piece: the piece.
         pairs: numbers of two postures each, (from, to).
         engine: the corpus that judges.
-        posturewise: whether to judge moves of the whole body instead of each joint.
+        whole_body: whether to judge moves of the whole body instead of each joint.
 
     Raises:
         SkeletonError: the piece is on another skeleton than the corpus.
@@ -322,7 +322,7 @@ def judge_and_smooth(
         pairs: numbers of two postures each, (from, to).
         engine: the corpus.
         alternatives: number of movements to find for each; a search of whole bodies finds one.
-        posturewise: whether to judge and insert whole bodies.
+        whole_body: whether to judge and insert whole bodies.
         on_progress: called before each search with the numbers of searches done and in all.
         watch: as for `Engine.tween`; once it returns True, the remaining transitions stay pending.
         options: the other arguments of `Engine.tween`.

@@ -241,7 +241,7 @@ class Variation:
         engine: Engine,
         *,
         alternatives: int = 3,
-        posturewise: bool = False,
+        whole_body: bool = False,
         on_progress: OnProgress | None = None,
         watch: Watch | None = None,
         **options: Any,
@@ -255,7 +255,7 @@ class Variation:
         Args:
             engine: the corpus that judges and smooths.
             alternatives: number of movements to find for each transition.
-            posturewise: whether to judge whole bodies, and insert only whole bodies of the corpus.
+            whole_body: whether to judge whole bodies, and insert only whole bodies of the corpus.
             on_progress: called before each search with the numbers of searches done and in all.
             watch: as for `Engine.tween`; once it returns True, the remaining seams stay as they are.
             options: the other arguments of `Engine.tween`.
@@ -295,9 +295,9 @@ class Variation:
         return self if self._state.looks_like(after._state) else after
 
 
-def _check_watchers(posturewise: bool, on_progress: OnProgress | None, watch: Watch | None) -> None:
+def _check_watchers(whole_body: bool, on_progress: OnProgress | None, watch: Watch | None) -> None:
     """Check the types of the arguments that `vary` and `Variation.smooth` share."""
-    check_flag("posturewise", posturewise)
+    check_flag("whole_body", whole_body)
     check_function("on_progress", on_progress, or_none=True)
     check_function("watch", watch, or_none=True)
 
@@ -323,7 +323,7 @@ def vary(
     inserted: float | None = None,
     stretch: int | None = None,
     alternatives: int = 3,
-    posturewise: bool = False,
+    whole_body: bool = False,
     on_progress: OnProgress | None = None,
     watch: Watch | None = None,
     **options: Any,
@@ -354,7 +354,7 @@ def vary(
             move to where the piece resembles itself more (see `motionmind.variation.limits`); if no order meets it, the
             order that inserts least is taken. None for no limit.
         stretch: the least number of postures in each stretch of the piece; None for 4 if insertions are limited, or 1.
-        alternatives: see `Variation.smooth`, as for `posturewise`, `on_progress`, `watch` and `options`.
+        alternatives: see `Variation.smooth`, as for `whole_body`, `on_progress`, `watch` and `options`.
 
     Raises:
         MotionMindError: an argument is out of its range or refused by this order, a trajectory diverges or settles,
