@@ -180,7 +180,7 @@ class _Sheet:
         halves = [float(np.abs(bounds[..., 0]).max()) for bounds in (front, beside)]
         near, far = self._feet_bounds()
         scale = min(
-            200.0 / self.body.height,  # pixels; less where a body leaps or lies
+            200.0 / self.body.height,  # a body has 200 pixels; a view at most 480, where a body leaps or lies
             480.0 / max(high - low, *(2.0 * half for half in halves)),
             sqrt(_MAX_PIXELS / len(frames) / (2.0 * sum(halves) * (high - low + far - near))),
         )

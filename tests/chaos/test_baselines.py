@@ -73,7 +73,7 @@ def test_dabbys_mapping_gives_a_piece_back_and_keeps_the_order_of_places() -> No
 
 
 def test_dabbys_mapping_needs_sites() -> None:
-    with pytest.raises(MotionMindError, match="one at least"):
+    with pytest.raises(MotionMindError, match="one or more"):
         dabby(np.zeros((0, 3)), np.zeros((1, 3)))
 
 

@@ -108,8 +108,8 @@ def test_the_size_is_the_pictures_height_where_it_is_not_flat(view: str, suffix:
         ("a.gif", 3, {"view": "below"}, r"no view 'below'; there are quarter, front, side, left, top"),
         ("a.gif", 3, {"fps": 0}, "frames a second, not 0"),
         ("a.svg", 3, {"fps": float("nan")}, "frames a second, not nan"),
-        ("a.mp4", 3, {"size": 0}, "pixels high, not 0"),
-        ("a.gif", 3, {"size": 10**6}, "pixels high, not 1000000"),
+        ("a.mp4", 3, {"size": 0}, "from 120 to 2160, not 0"),
+        ("a.gif", 3, {"size": 10**6}, "from 120 to 2160, not 1000000"),
     ],
 )
 def test_what_a_picture_has_not_is_refused(
