@@ -68,7 +68,7 @@ def test_words_say_where_and_when_one_differs_most_from_the_first(found: list[tu
     (tween, said), *others = found
     assert said.differs == ""
     for other, words in others:
-        joint, degrees, at = re.findall(r": ([a-z ]+) by (\d+)°.*, at ([\d.]+) s$", words.differs)[0]
+        joint, degrees, at = re.findall(r": ([a-z ]+) by (\d+)°.* at ([\d.]+) s$", words.differs)[0]
         apart = _degrees_apart(other.motion, tween.motion)
         frame, number = np.unravel_index(int(apart.argmax()), apart.shape)
         assert joint == other.motion.skeleton.names[number].replace("_", " ")

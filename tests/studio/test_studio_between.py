@@ -86,7 +86,7 @@ def test_a_length_is_kept_to(studio_server: Served) -> None:
     ("body", "words"),
     [
         ({"a": {"key": "ballet/nothing"}, "b": B}, "nothing"),
-        ({"a": {"key": "ballet/adagio", "frame": 100000}, "b": B}, "its frames are"),
+        ({"a": {"key": "ballet/adagio", "frame": 100000}, "b": B}, "frames 0 to"),
         ({"a": A}, "b"),
         ({"a": A, "b": B, "options": {"seconds": -1}}, "seconds"),
         ({"a": {"key": "own/bow"}, "b": B}, "no posture is saved as bow"),

@@ -70,7 +70,7 @@ def test_a_place_out_of_reach_is_approached_and_that_is_said(motion: Motion) -> 
     far = Motion(motion.skeleton, motion.rotations, away, motion.times)
     _, words = in_place(far, [Pin("left_wrist", "place", 0.0, 0.8)])
     assert len(words) == 1
-    assert words[0].startswith("left hand is up to ")
+    assert words[0].startswith("left hand drifts up to ")
     assert words[0].endswith(" cm from its place")
 
 
