@@ -19,7 +19,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.credits.credit import Credit
 from motionmind.errors import FormatError, MotionMindWarning, SkeletonError, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath
-from motionmind.formats.text import MAX_JOINTS, MAX_NUMBER
+from motionmind.formats.text import MAX_JOINTS, MAX_NUMBER, WRITTEN_LENGTH_TOLERANCE
 from motionmind.geometry import rotations as rot
 
 Vector = tuple[float, float, float]
@@ -29,8 +29,6 @@ POSTURE = "motionmind-posture"
 MOTION = "motionmind-motion"
 VERSION = 1
 
-# Lengths of quaternions written with ten decimals are off 1 by less; what this code wrote stays bit-identical.
-WRITTEN_LENGTH_TOLERANCE = 1e-9
 _LENGTH_TOLERANCE = 1e-6  # without a warning
 
 

@@ -11,7 +11,7 @@ from motionmind.body.anatomy import SIDES
 from motionmind.body.human import human44
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.formats.lossy import turning_joints
+from motionmind.geometry import rotations as rot
 from motionmind.retarget.joint_mapping import joint_mapping
 from motionmind.retarget.retarget import to_human23
 
@@ -166,3 +166,9 @@ def unmapped_joints(motion: Motion) -> list[str]:
     else:
         kept = set(joint_mapping(skeleton) or skeleton.names)
     return [name for name in turning_joints(motion) if name not in kept]
+
+
+def turning_joints(motion: Motion) -> list[str]:
+    """Return the names of joints that ever turn from rest by more than 1e-6 rad."""
+    turns = rot.angle(motion.rotations, rot.IDENTITY).max(axis=0) > 1e-6
+    return [motion.skeleton.names[joint] for joint in np.flatnonzero(turns)]

@@ -14,7 +14,6 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.errors import enumerated
 from motionmind.files import FilePath
 from motionmind.formats.added import added_suffixes, lossy_added
-from motionmind.geometry import rotations as rot
 
 WRITABLE = (".json", ".bvh", ".txt", ".glb", ".npz", ".vrma")  # suffixes
 
@@ -95,6 +94,7 @@ def _lossy_body(motion: Motion, suffix: str) -> list[str]:
         if not any(_same_proportions(body, skeleton) for body in known):
             lossy.insert(0, "the body's proportions")
     elif suffix == ".vrma":
+        from motionmind.formats._smpl import turning_joints
         from motionmind.retarget.joint_mapping import joint_mapping
 
         kept = joint_mapping(skeleton) or skeleton.names
@@ -105,12 +105,6 @@ def _lossy_body(motion: Motion, suffix: str) -> list[str]:
         ends = [skeleton.names[joint] for joint in sorted(inner)]
         lossy = [f"the tips of joints with children ({enumerated(ends)})"] if ends else []
     return lossy
-
-
-def turning_joints(motion: Motion) -> list[str]:
-    """Return the names of joints that ever turn from rest by more than 1e-6 rad."""
-    turns = rot.angle(motion.rotations, rot.IDENTITY).max(axis=0) > 1e-6
-    return [motion.skeleton.names[joint] for joint in np.flatnonzero(turns)]
 
 
 def _same_proportions(one: Skeleton, other: Skeleton) -> bool:

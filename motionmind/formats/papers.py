@@ -34,8 +34,7 @@ from motionmind.body.rates import FASTEST
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath, name_of, write_atomically
-from motionmind.formats._json import WRITTEN_LENGTH_TOLERANCE
-from motionmind.formats.text import read_lines, to_numbers
+from motionmind.formats.text import WRITTEN_LENGTH_TOLERANCE, read_lines, to_numbers
 from motionmind.geometry import rotations as rot
 
 _NUMBER = re.compile(r"[+-]?(\.?[0-9]|(inf|infinity|nan)\b)", re.IGNORECASE)  # begins no joint's name

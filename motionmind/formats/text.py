@@ -15,6 +15,9 @@ MAX_NUMBER = 1e9
 # The largest hand-made rigs have some hundreds; a file with more joints is damaged or not a body.
 MAX_JOINTS = 4000
 
+# Lengths of quaternions written with ten decimals are off 1 by less; such quaternions are read bit-identical.
+WRITTEN_LENGTH_TOLERANCE = 1e-9
+
 
 def read_lines(path: FilePath) -> list[str]:
     """Read a text file's lines, without LF, CRLF or CR; UTF-8 or UTF-16 with a byte order mark, else Latin-1."""
