@@ -177,11 +177,6 @@ class Pace:
         return float(np.exp(np.log(RESTING_OFFSET_RATIO + self.lulls[numbers]).mean()) - RESTING_OFFSET_RATIO)
 
 
-def learn_pace(corpus: Corpus) -> Pace:
-    """Learn the pace of a corpus."""
-    return refit_pace(corpus, measure_pace(Kept.none(corpus)))
-
-
 def measure_pace(kept: Kept, before: Gauge | None = None, workshop: Workshop | None = None) -> Gauge:
     """Measure the pace of a corpus's clips.
 

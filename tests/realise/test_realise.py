@@ -33,9 +33,6 @@ from motionmind.walks.likelihood import P_CONTINUE, P_TELEPORT, squared_distance
 from motionmind.walks.marginals import posterior_marginals
 from motionmind.walks.means import mean_rotations
 
-Z = np.array([0.0, 0.0, 1.0])
-
-
 # --- durations and the root -------------------------------------------------------------------------------------------
 
 
