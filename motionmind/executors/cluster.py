@@ -12,11 +12,11 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from motionmind.errors import MotionMindError
-from motionmind.executors.team import AHEAD, Team
+from motionmind.executors.team import JOBS_PER_WORKER, Team
 
 _PORT = 8786  # default port of a Dask scheduler
-_ANSWERS = 10.0  # seconds for a scheduler to answer
-_PATIENCE = 60.0  # seconds without workers until a cluster counts as lost
+_ANSWER_TIMEOUT_S = 10.0  # for a scheduler
+_WORKERS_TIMEOUT_S = 60.0  # without workers, until a cluster counts as lost
 
 
 @contextmanager
@@ -40,10 +40,10 @@ def cluster(address: str) -> Iterator[Team]:
     try:
         place = urlsplit(address)
         # Try to connect first: a client without a scheduler logs errors long after it fails.
-        socket.create_connection((place.hostname or "", place.port or _PORT), _ANSWERS).close()
-        client = connect(address, timeout=_ANSWERS, set_as_default=False)
+        socket.create_connection((place.hostname or "", place.port or _PORT), _ANSWER_TIMEOUT_S).close()
+        client = connect(address, timeout=_ANSWER_TIMEOUT_S, set_as_default=False)
     except (OSError, ValueError) as error:  # a timeout is an OSError
-        raise MotionMindError(f"{address}: no scheduler answers there (tcp://HOST:{_PORT} is usual): {error}") from None
+        raise MotionMindError(f"{address}: no scheduler answers (usual form: tcp://HOST:{_PORT}): {error}") from None
     try:
         watch = _Watch(client, address)
         while not watch.threads:
@@ -53,12 +53,12 @@ def cluster(address: str) -> Iterator[Team]:
         yield Team(
             # Not pure: Dask needs no names derived from jobs. It retries a job on another worker by itself.
             lambda: client.get_executor(pure=False),
-            lambda: AHEAD * max(watch.threads, 1),
+            lambda: JOBS_PER_WORKER * max(watch.threads, 1),
             (KilledWorker, BrokenExecutor),
             watch.missing,
         )
     finally:
-        client.close(timeout=_ANSWERS)
+        client.close(timeout=_ANSWER_TIMEOUT_S)
 
 
 class _Watch:
@@ -84,7 +84,7 @@ class _Watch:
             if self.threads:
                 self._seen = time.monotonic()
         elif self._client.status != "connecting":
-            return f"{self._address}: the scheduler is gone"
-        if time.monotonic() - self._seen > _PATIENCE:
-            return f"{self._address}: the cluster has had no workers for {_PATIENCE:g} s"
+            return f"{self._address}: lost the connection to the scheduler"
+        if time.monotonic() - self._seen > _WORKERS_TIMEOUT_S:
+            return f"{self._address}: the cluster has had no workers for {_WORKERS_TIMEOUT_S:g} s"
         return ""

@@ -12,13 +12,13 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any, ParamSpec, TypeVar
 
-from motionmind.executors.team import AHEAD, Team
+from motionmind.executors.team import JOBS_PER_WORKER, Team
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 
 # Linear algebra starts a thread for each core in every process, unless these variables are set when it is loaded.
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class Here(Executor):
@@ -43,7 +43,7 @@ def threads(number: int) -> Team:
     """Return a team of `number` threads of this process, for jobs that run mostly in compiled code."""
     if number == 1:
         return this_process()
-    return Team(lambda: ThreadPoolExecutor(number), lambda: AHEAD * number)
+    return Team(lambda: ThreadPoolExecutor(number), lambda: JOBS_PER_WORKER * number)
 
 
 @contextmanager
@@ -52,8 +52,8 @@ def processes(number: int) -> Iterator[Team]:
     import multiprocessing  # slow to import, and most tweens do not need it
     from concurrent.futures import ProcessPoolExecutor
 
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    before = {name: os.environ.get(name) for name in _THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(_THREAD_VARIABLES, "1"))
     pools: list[ProcessPoolExecutor] = []
 
     def make() -> Executor:
@@ -62,7 +62,7 @@ def processes(number: int) -> Iterator[Team]:
         return pool
 
     try:
-        yield Team(make, lambda: AHEAD * number)
+        yield Team(make, lambda: JOBS_PER_WORKER * number)
     finally:
         for pool in pools:
             pool.shutdown(cancel_futures=True)

@@ -18,8 +18,13 @@ def open_team(workers: int = 1) -> Iterator[Team]:
         MotionMindError: the number is below 1.
     """
     if workers < 1:
-        raise MotionMindError(f"there must be 1 worker at least, not {workers}")
-    if workers == 1:
+        raise MotionMindError(f"workers must be at least 1, not {workers}")
+    if scheduler is not None:
+        from motionmind.executors.cluster import cluster
+
+        with cluster(scheduler) as team:
+            yield team
+    elif workers == 1:
         yield this_process()
     else:
         with processes(workers) as team:

@@ -19,9 +19,8 @@ from motionmind.errors import MotionMindError
 _Job = TypeVar("_Job")
 _Result = TypeVar("_Result")
 
-MOST_TIMES = 3  # attempts for a job that kills its worker, alone
-AHEAD = 3  # submitted jobs for each worker
-_LOOK = 1.0  # seconds between checks of the workers
+MAX_ATTEMPTS = 3  # to run, alone, a job that kills its worker
+JOBS_PER_WORKER = 3  # submitted ahead, which keeps all workers busy
 
 
 class UnfinishedError(MotionMindError):
@@ -88,7 +87,7 @@ class Team:
         self, executor: Executor, function: Callable[[_Job], _Result], job: _Job
     ) -> tuple[Executor, Future[_Result]]:
         """Run a job alone; return the executor, a new one if it broke, and the finished future."""
-        for _ in range(MOST_TIMES):
+        for _ in range(MAX_ATTEMPTS):
             future = _submit(executor, function, job)
             try:
                 self._wait(future)
@@ -100,18 +99,18 @@ class Team:
                 pass
             return executor, future
         raise UnfinishedError(
-            f"{job}: a worker died of it {MOST_TIMES} times, alone; memory may lack, or a library has crashed"
+            f"{job}: a worker running this job alone died {MAX_ATTEMPTS} times: out of memory, or a library crashed"
         )
 
     def _wait(self, future: Future[_Result]) -> _Result:
         """Wait for a result; raise UnfinishedError if the workers are unreachable."""
-        while not wait([future], _LOOK).done:
+        while not wait([future], 1.0).done:  # check the workers every second
             if reason := self.missing():
                 raise _gone(reason)
         try:
             return future.result()
         except Cancelled:  # cancelled by the workers' side: this side never cancels
-            raise _gone(self.missing() or "the workers have dropped what they were given") from None
+            raise _gone(self.missing() or "the cluster cancelled the jobs") from None
 
     def _is_done(self, future: Future[Any]) -> bool:
         """Return whether a job has finished, with a result or an error of its own."""
@@ -132,4 +131,4 @@ def _submit(executor: Executor, function: Callable[[_Job], _Result], job: _Job) 
 
 
 def _gone(reason: str) -> UnfinishedError:
-    return UnfinishedError(f"{reason}; what is done is kept: the same command goes on from there")
+    return UnfinishedError(f"{reason}; finished work is kept: run the same command again to resume")

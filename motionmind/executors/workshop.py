@@ -26,7 +26,7 @@ _Result = TypeVar("_Result")
 _One = TypeVar("_One")
 _Other = TypeVar("_Other")
 
-LARGE = 1 << 26  # bytes from which an array is mapped from a file
+MAPPED_BYTES = 1 << 26  # smallest array that is mapped from a file
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Workshop:
             OSError: the folder's disk is full.
         """
         size = math.prod(shape) * np.dtype(dtype).itemsize
-        if self.folder is None or size < LARGE:
+        if self.folder is None or size < MAPPED_BYTES:
             return np.empty(shape, dtype)
         with _nameless(self.folder) as file:
             # Reserve the space: writing to a mapped page on a full disk would kill the process.

@@ -75,7 +75,7 @@ def test_a_job_that_always_ends_its_worker_is_named() -> None:
     with open_team(2) as team:
         results = team.map(die, range(5))
         assert [next(results), next(results)] == [0, 1]
-        with pytest.raises(UnfinishedError, match=r"^2: a worker died of it 3 times, alone"):
+        with pytest.raises(UnfinishedError, match=r"^2: a worker running this job alone died 3 times"):
             next(results)
 
 
@@ -105,12 +105,12 @@ def test_a_cluster_that_goes_away_is_told() -> None:
         results = team.map(doze, range(100))
         assert next(results) == 0
         local.close()
-        with pytest.raises(UnfinishedError, match="what is done is kept: the same command goes on from there"):
+        with pytest.raises(UnfinishedError, match="finished work is kept: run the same command again to resume"):
             list(results)
 
 
 def test_a_cluster_without_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(clusters, "_PATIENCE", 0.3)
+    monkeypatch.setattr(clusters, "_WORKERS_TIMEOUT_S", 0.3)
     with (
         distributed.LocalCluster(n_workers=0, dashboard_address=":0", processes=False, protocol="tcp") as local,
         pytest.raises(MotionMindError, match=r"tcp://\S+ the cluster has had no workers for 0\.3 s"),
@@ -121,12 +121,12 @@ def test_a_cluster_without_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense", "tcp://127.0.0.1:port"])
 def test_an_address_of_no_scheduler_is_told(address: str) -> None:
-    with pytest.raises(MotionMindError, match=f"^{address}: no scheduler answers there"), clusters.cluster(address):
+    with pytest.raises(MotionMindError, match=f"^{address}: no scheduler answers"), open_team(scheduler=address):
         pass
 
 
 def test_no_workers_are_too_few() -> None:
-    with pytest.raises(MotionMindError, match="there must be 1 worker at least, not 0"), open_team(0):
+    with pytest.raises(MotionMindError, match="workers must be at least 1, not 0"), open_team(0):
         pass
 
 

@@ -48,7 +48,7 @@ def test_what_is_learned_depends_neither_on_workers_nor_on_room(
     kind = Codebook(20.0, {"hip": 10.0})
     monkeypatch.setattr(carriage, "MAX_FULL_SEARCH", 100)  # so that there are trees
     plain = learn(gather("dances", dances(), mirror=True), kind)
-    monkeypatch.setattr(workshops, "LARGE", 0)
+    monkeypatch.setattr(workshops, "MAPPED_BYTES", 0)
     workshop = Workshop.of(workers, tmp_path)
     learned = learn(gather("dances", dances(), mirror=True, workshop=workshop), kind, workshop)
     assert_learned_alike(learned, plain)
