@@ -18,7 +18,6 @@ Send = Callable[[Message], Awaitable[None]]
 Application = Callable[[Message, Receive, Send], Awaitable[None]]
 
 ROUTES = {("GET", "/capabilities"), ("POST", "/generate")}
-_SECONDS = 20.0  # time limit to receive the body of a request
 
 
 class Guard:
@@ -29,7 +28,7 @@ class Guard:
     and the server's given name. It drops slow bodies, and reports internal errors as one line.
     """
 
-    def __init__(self, application: Application, host: str, *, seconds: float = _SECONDS) -> None:
+    def __init__(self, application: Application, host: str, *, seconds: float = 20.0) -> None:
         """Guard an application.
 
         Args:
@@ -54,14 +53,14 @@ class Guard:
         try:
             await self._application(scope, _in_time(receive, self._seconds), answer.take)
         except TimeoutError:
-            await _refuse(send, 408, "timeout", f"the request did not come within {self._seconds:g} s")
+            await _refuse(send, 408, "timeout", f"no complete request within {self._seconds:g} s")
             return
         except OverflowError:
             await _refuse(send, 400, "invalid_request", "a number is out of range")
             return
         except Exception as error:
             print(f"motionmind serve: {type(error).__name__}: {error}", file=sys.stderr)
-            await _refuse(send, 500, "internal_error", "this request cannot be answered; the server says why")
+            await _refuse(send, 500, "internal_error", "internal error: see the output of the server")
             return
         await answer.give(send)
 
@@ -70,13 +69,13 @@ class Guard:
         headers = [(name.lower(), value.decode("latin-1")) for name, value in scope["headers"]]
         hosts = [value for name, value in headers if name == b"host"]
         if len(hosts) != 1 or not self._is_own(hosts[0]):
-            return 403, "forbidden", "Host must be an address, localhost, or the name that the server was given"
+            return 403, "forbidden", "Host must be an IP address, localhost or the name of the server (--host)"
         if any(name == b"origin" and urlsplit(value).netloc != hosts[0] for name, value in headers):
-            return 403, "forbidden", "pages of other hosts may not ask: Origin"
+            return 403, "forbidden", "Origin must be that of the server"
         method, path = scope["method"], scope["path"]
         if (method, path) not in ROUTES:
             known = any(path == one for _, one in ROUTES)
-            return 405 if known else 404, "invalid_request", "there are GET /capabilities and POST /generate"
+            return 405 if known else 404, "invalid_request", "use GET /capabilities or POST /generate"
         return None
 
     def _is_own(self, host: str) -> bool:
@@ -119,8 +118,8 @@ def with_extras(body: bytes) -> bytes:
         kept = []
         for note in extension.get("notes", []):
             if note["code"] == CERTIFICATE:
-                told = {name: note[name] for name in ("message", "corpus", "stretches")}
-                gltf["animations"][note["sample"]]["extras"] = {"motionmind": told}
+                certificate = {name: note[name] for name in ("message", "corpus", "stretches")}
+                gltf["animations"][note["sample"]]["extras"] = {"motionmind": certificate}
             else:
                 kept.append(note)
         extension["notes"] = kept
@@ -134,7 +133,7 @@ def _in_time(receive: Receive, seconds: float) -> Receive:
 
     async def in_time() -> Message:
         nonlocal is_whole
-        if is_whole:  # the next message tells of a disconnect
+        if is_whole:  # the next message reports a disconnect
             return await receive()
         async with asyncio.timeout_at(until):
             message = await receive()

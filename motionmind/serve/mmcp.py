@@ -32,22 +32,17 @@ from motionmind.tween.headline import beyond, headline
 CERTIFICATE = "certificate"  # code of the notes that `guard.with_extras` moves to the animations
 
 _FPS = 30.0
-_FASTEST = 120.0  # frames a second, at most
-_SECONDS = 30.0  # of movement in a request, at most
-_JOINTS = 512
-_SAMPLES = 8
-_CONSTRAINTS = 128
-_BYTES = 1 << 20
-_BATCH = 4
-_WAITING = 4  # requests, at most, that wait for the running one
-_PATIENCE = 60.0  # seconds until a search returns its best path; after twice as long, the request fails
-_LONGEST_FLAGS = 32  # values of an option that the protocol allows
+_MAX_FPS = 120.0
+_MAX_CLIP_S = 30.0
+_MAX_JOINTS = 512
+_MAX_WAITING = 4  # requests that wait for the running one
+_SEARCH_TIMEOUT_S = 60.0  # then a search returns its best path; after twice as long, the request fails
 
 
 class Model(Backbone):  # type: ignore[misc]
     """A corpus, served as a model of the protocol."""
 
-    def __init__(self, engine: Engine, *, patience: float = _PATIENCE) -> None:
+    def __init__(self, engine: Engine, *, patience: float = _SEARCH_TIMEOUT_S) -> None:
         """Serve a corpus.
 
         Args:
@@ -63,7 +58,7 @@ class Model(Backbone):  # type: ignore[misc]
         corpus = self._engine.corpus
         names = list(corpus.chains)
         options = [ModelOption(name="novelty", type="number", default=0.0, minimum=0.0, maximum=1.0, title="Novelty")]
-        if len(names) <= _LONGEST_FLAGS:
+        if len(names) <= 32:  # the protocol allows an option no more values
             title = "Joints that keep their state"
             options.append(ModelOption(name="hold", type="flags", default=[], values=names, title=title))
         return ModelSpec(
@@ -74,14 +69,14 @@ class Model(Backbone):  # type: ignore[misc]
             model_options=options,
             supported_constraints=["pose_keyframe", "root_path", "effector_target"],
             supported_guidance_types=["nocfg"],
-            native_clip_seconds=_SECONDS,
-            recommended_max_duration_seconds=_SECONDS,
+            native_clip_seconds=_MAX_CLIP_S,
+            recommended_max_duration_seconds=_MAX_CLIP_S,
             limits=Limits(
-                max_duration_seconds=_SECONDS,
-                max_num_samples=_SAMPLES,
-                max_constraints_per_request=_CONSTRAINTS,
-                max_request_bytes=_BYTES,
-                max_batch_size=_BATCH,
+                max_duration_seconds=_MAX_CLIP_S,
+                max_num_samples=8,
+                max_constraints_per_request=128,
+                max_request_bytes=1 << 20,
+                max_batch_size=4,
             ),
         )
 
@@ -90,13 +85,13 @@ class Model(Backbone):  # type: ignore[misc]
         self._ends = True
 
     async def generate(self, request: GenerateRequest) -> MotionResult:
-        """Answer a request; up to `_WAITING` others wait.
+        """Answer a request; up to `_MAX_WAITING` others wait.
 
         Raises:
             ProtocolError: it cannot be answered.
         """
-        if self._waiting > _WAITING:
-            raise ProtocolError("rate_limited", f"{self._waiting} requests are under way: try again later")
+        if self._waiting > _MAX_WAITING:
+            raise ProtocolError("rate_limited", f"{self._waiting} requests are running or waiting: try again later")
         self._waiting += 1
         try:
             async with self._one_at_a_time:
@@ -109,17 +104,17 @@ class Model(Backbone):  # type: ignore[misc]
 
         def watch(_: Progress) -> bool:
             if self._ends:
-                raise ProtocolError("model_unavailable", "the server ends")
+                raise ProtocolError("model_unavailable", "the server is stopping")
             spent = monotonic() - began
             if spent > 2.0 * self._patience:
-                raise ProtocolError("timeout", f"nothing was found within {spent:.0f} s: ask for less at once")
+                raise ProtocolError("timeout", f"no path found within {spent:.0f} s: request less movement")
             return spent > self._patience
 
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", MotionMindWarning)  # `beyond` reports the same
                 order = order_of(request, self._engine.corpus.skeleton)
-                return _to_result(perform(self._engine, order, watch), order, self._engine, request)
+                return _to_result(perform(self._engine, order, watch), self._engine, request)
         except NoPathError as error:
             raise ProtocolError("invalid_request", str(error)) from None
         except SkeletonError as error:
@@ -127,7 +122,7 @@ class Model(Backbone):  # type: ignore[misc]
         except MotionMindError as error:
             raise ProtocolError("invalid_request", str(error)) from None
         except MemoryError:
-            raise ProtocolError("resource_exhausted", "not enough memory for this") from None
+            raise ProtocolError("resource_exhausted", "not enough memory") from None
 
 
 def app(engine: Engine, **options: Any) -> Any:
@@ -146,8 +141,8 @@ def order_of(request: GenerateRequest, own: Skeleton) -> Order:
         ProtocolError: a number is not finite or out of range, there is no pose, or the skeleton is unsupported.
     """
     fps = request.fps(_FPS)
-    if not 1.0 <= fps <= _FASTEST:
-        raise ProtocolError("invalid_options", f"timing.fps must be from 1 to {_FASTEST:g}, not {fps:g}")
+    if not 1.0 <= fps <= _MAX_FPS:
+        raise ProtocolError("invalid_options", f"timing.fps must be from 1 to {_MAX_FPS:g}, not {fps:g}")
     skeleton, stands = _from_wire(request.skeleton, own)
     number = {name: joint for joint, name in enumerate(skeleton.names)}
     poses, waypoints, pins = [], [], []
@@ -173,8 +168,8 @@ def order_of(request: GenerateRequest, own: Skeleton) -> Order:
     if not poses:
         raise ProtocolError(
             "invalid_request",
-            "there is no pose_keyframe: MotionMind moves from pose to pose, in the style of its corpus, and reads no "
-            "prompts; give the pose at the first frame and at the last",
+            "no pose_keyframe: MotionMind moves from pose to pose and ignores prompts; give the pose at the first and "
+            "last frame",
         )
     options = request.options
     chosen: Mapping[str, Any] = (options.model_options if options else None) or {}
@@ -193,21 +188,19 @@ def order_of(request: GenerateRequest, own: Skeleton) -> Order:
     )
 
 
-def _to_result(
-    performances: Sequence[Performance], order: Order, engine: Engine, request: GenerateRequest
-) -> MotionResult:
+def _to_result(performances: Sequence[Performance], engine: Engine, request: GenerateRequest) -> MotionResult:
     """Convert performances to the protocol's result, with the certificate of each as a note."""
     notes: list[dict[str, Any]] = [
         {"code": "note", "severity": "info", "message": message}
         for message in dict.fromkeys(note for one in performances for note in one.notes)
     ]
     if any(segment.type == "text" for segment in request.segments):
-        said = f"prompts are not read: the style is that of the corpus {engine.corpus.name}"
-        notes.append({"code": "prompt_ignored", "severity": "warning", "message": said})
+        message = f"prompts are ignored: the corpus {engine.corpus.name} determines the style"
+        notes.append({"code": "prompt_ignored", "severity": "warning", "message": message})
     for sample, one in enumerate(performances):
         for stretch in one.stretches:
-            for said in beyond(stretch.tween):
-                message = f"frames {stretch.first} to {stretch.last}: {said}"
+            for remark in beyond(stretch.tween):
+                message = f"frames {stretch.first} to {stretch.last}: {remark}"
                 notes.append({"code": "beyond_corpus", "severity": "warning", "message": message, "sample": sample})
     certificates = [
         {
@@ -262,8 +255,8 @@ def _from_wire(wire: WireSkeleton, own: Skeleton) -> tuple[Skeleton, Floats]:
     A skeleton with the corpus's joints also gets the corpus's tips, scaled, because the protocol has no tips.
     """
     joints = wire.joints
-    if len(joints) > _JOINTS:
-        raise ProtocolError("invalid_skeleton", f"a skeleton may have {_JOINTS} joints, not {len(joints)}")
+    if len(joints) > _MAX_JOINTS:
+        raise ProtocolError("invalid_skeleton", f"a skeleton may have {_MAX_JOINTS} joints, not {len(joints)}")
     if joints[0].parent is not None:
         raise ProtocolError("invalid_skeleton", f"the first joint must be the root, not {joints[0].name!r}")
     for joint in joints:
@@ -276,7 +269,7 @@ def _from_wire(wire: WireSkeleton, own: Skeleton) -> tuple[Skeleton, Floats]:
     offsets[0] = 0.0
     number = {joint.name: index for index, joint in enumerate(joints)}
     parents = tuple(-1 if joint.parent is None else number[joint.parent] for joint in joints)
-    skeleton = Skeleton("the request's skeleton", tuple(number), parents, offsets)
+    skeleton = Skeleton("the skeleton of the request", tuple(number), parents, offsets)
     if own.difference(skeleton) is None:
         tips = own.tips if np.allclose(offsets, own.offsets, atol=1e-6) else own.tips * skeleton.height / own.height
         skeleton = Skeleton(own.name, own.names, own.parents, offsets, tips)
@@ -286,12 +279,14 @@ def _from_wire(wire: WireSkeleton, own: Skeleton) -> tuple[Skeleton, Floats]:
 def _place(numbers: Sequence[float], where: str) -> Floats:
     found = np.array(numbers, dtype=np.float64)
     if not np.all(np.abs(found) < 1e4):
-        raise ProtocolError("invalid_request", f"{where}: {list(numbers)} is no place within 10 km, or no angle")
+        raise ProtocolError(
+            "invalid_request", f"{where}: {list(numbers)} must be finite and below 10000 (metres or radians)"
+        )
     return found
 
 
 def _unit(numbers: Sequence[float], where: str) -> Floats:
     found = np.array(numbers, dtype=np.float64)
     if not 1e-3 < np.linalg.norm(found) < 1e3:
-        raise ProtocolError("invalid_request", f"{where}: {list(numbers)} is no rotation x, y, z, w")
+        raise ProtocolError("invalid_request", f"{where}: {list(numbers)} is not a unit quaternion (x, y, z, w)")
     return found / np.linalg.norm(found)

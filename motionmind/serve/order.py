@@ -12,7 +12,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 
-MOST_ROTATIONS = 2_000_000  # in all samples together; each takes 16 bytes in the answer
+MAX_ROTATIONS = 2_000_000  # in all samples together; each takes 16 bytes in the answer
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,12 +100,12 @@ class Order:
 
     def __post_init__(self) -> None:
         if not self.poses:
-            raise MotionMindError("there is no pose to move from: give at least one, and for movement two")
+            raise MotionMindError("no poses: give at least one, or two to move between")
         for frame in [one.frame for some in (self.poses, self.waypoints, self.pins) for one in some]:
             if not 0 <= frame < self.frames:
                 raise MotionMindError(f"frame {frame} is outside 0 to {self.frames - 1}")
-        if (count := self.samples * self.frames * len(self.skeleton)) > MOST_ROTATIONS:
-            raise MotionMindError(f"{count} rotations are asked for; the most in an answer are {MOST_ROTATIONS}")
+        if (count := self.samples * self.frames * len(self.skeleton)) > MAX_ROTATIONS:
+            raise MotionMindError(f"{count} rotations requested; an answer holds at most {MAX_ROTATIONS}")
         _check_once("waypoints", [one.frame for one in self.waypoints])
         for joint in {one.joint for one in self.pins}:
             name = f"pins of {self.skeleton.names[joint]}"
@@ -122,7 +122,7 @@ class Order:
 def _check_once(name: str, frames: Sequence[int]) -> None:
     twice = sorted(frame for frame, count in Counter(frames).items() if count > 1)
     if twice:
-        raise MotionMindError(f"there are two {name} in frame {twice[0]}: give one")
+        raise MotionMindError(f"two {name} in frame {twice[0]}: give one")
 
 
 def _merged(poses: Sequence[Pose]) -> list[Pose]:

@@ -27,10 +27,9 @@ from motionmind.serve.rig import Rig
 from motionmind.tween.engine import Engine
 from motionmind.tween.result import Tween
 
-_APART = 0.4  # seconds, at least, between a posture at a waypoint and its neighbours
-_EASES = 0.3  # seconds in which pins ease in before a joint's first one, and out after its last
-_STILL = 1e-4  # radians and metres: poses that differ less are the same
-_MISSED = 1e-3  # metres: a greater miss of a pin or a waypoint gets a note
+_WAYPOINT_GAP_S = 0.4  # at least, between a posture at a waypoint and its neighbours
+_PIN_EASE_S = 0.3  # pins ease in before a joint's first one, and out after its last
+_MISS_M = 1e-3  # a greater miss of a pin or a waypoint gets a note
 
 
 @dataclass(frozen=True)
@@ -140,8 +139,8 @@ class _Stage:
                 rotations[0] = _facing(rotations[0], one.heading)
         lacks = [name for name, is_given in zip(skeleton.names, pose.given, strict=True) if not is_given]
         self.notes.append(
-            f"frame {pose.frame}: {len(lacks)} joints of the pose are not given, such as {lacks[0]}; they are those of "
-            "the corpus's nearest posture"
+            f"frame {pose.frame}: the pose lacks {len(lacks)} joints, such as {lacks[0]}; they come from the nearest "
+            "posture of the corpus"
         )
         return rotations
 
@@ -150,7 +149,7 @@ class _Stage:
 
         These postures come from a movement through the whole poses alone, and are adjusted to the order.
         """
-        apart, chosen = _APART * self.order.fps, [pose.frame for pose in self.order.poses]
+        apart, chosen = _WAYPOINT_GAP_S * self.order.fps, [pose.frame for pose in self.order.poses]
         asked: dict[int, tuple[Pose | None, Waypoint | None]] = {
             pose.frame: (pose, None) for pose in self.order.poses if all(pose.frame != frame for frame, _ in given)
         }
@@ -215,7 +214,7 @@ class _Stage:
             try:
                 return self.engine.tween(start, end, before=before, watch=self.watch, **options, unlike=found)
             except NoPathError:
-                self.notes.append(f"sample {sample}: there is no other movement in some of the {frames} frames")
+                self.notes.append(f"sample {sample}: no alternative for {frames} of the frames")
         return self.engine.tween(start, end, before=before, watch=self.watch, **options)
 
     def _on_waypoints(self, motion: Motion, frames: Ints) -> Motion:
@@ -234,17 +233,17 @@ class _Stage:
             root[:, [0, 2]] += _lines(times, *_with_zeros(between, level, frames))
         for one in self.order.waypoints:
             off = float(np.linalg.norm(root[one.frame, [0, 2]] - one.place))
-            if off > _MISSED:
+            if off > _MISS_M:
                 self.notes.append(
-                    f"frame {one.frame}: {off:.3f} m from the waypoint: poses come first, and the body is still before "
-                    "the first and after the last"
+                    f"frame {one.frame}: {off:.3f} m from the waypoint: poses take precedence, and the body is still "
+                    "before the first and after the last"
                 )
         return replace(motion, rotations=rotations, root=root)
 
     def _pin(self, motion: Motion, fixed: Sequence[int]) -> tuple[Motion, list[str]]:
         """Return the motion with joints at their pins, except in the poses' frames, and notes on misses."""
         skeleton, rotations, notes = self.order.skeleton, motion.rotations.copy(), []
-        eases = round(_EASES * self.order.fps)
+        eases = round(_PIN_EASE_S * self.order.fps)
         pins = [pin for pin in self.order.pins if pin.frame not in fixed]
         for joint in dict.fromkeys(pin.joint for pin in pins):
             mine: list[Pin] = sorted((pin for pin in pins if pin.joint == joint), key=lambda pin: pin.frame)
@@ -260,11 +259,11 @@ class _Stage:
             beside = [*fixed, frames[0] - eases, frames[-1] + eases]
             turns = _turns(rotations[frames], goals)
             for one in turned:
-                way = _lines(np.arange(len(motion)), *_with_zeros(frames, turns[:, one], np.array(beside)))
-                rotations[:, one] = rot.normalise(rot.mul(rot.exp(way), rotations[:, one]))
+                turn = _lines(np.arange(len(motion)), *_with_zeros(frames, turns[:, one], np.array(beside)))
+                rotations[:, one] = rot.normalise(rot.mul(rot.exp(turn), rotations[:, one]))
         for pin in self.order.pins:
             at = skeleton.positions(rotations[pin.frame], motion.root[pin.frame])[pin.joint]
-            if (missed := float(np.linalg.norm(at - pin.place))) > _MISSED:
+            if (missed := float(np.linalg.norm(at - pin.place))) > _MISS_M:
                 notes.append(f"frame {pin.frame}: {skeleton.names[pin.joint]} is {missed:.3f} m from its pin")
         return replace(motion, rotations=rotations), notes
 
@@ -315,4 +314,5 @@ def _with_zeros(frames: Ints, values: Floats, beside: Ints) -> tuple[Ints, Float
 
 
 def _is_same(a: Posture, b: Posture) -> bool:
-    return bool(rot.angle(a.rotations, b.rotations).max() < _STILL and np.abs(a.root - b.root).max() < _STILL)
+    tolerance = 1e-4  # radians and metres
+    return bool(rot.angle(a.rotations, b.rotations).max() < tolerance and np.abs(a.root - b.root).max() < tolerance)

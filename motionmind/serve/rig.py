@@ -15,7 +15,7 @@ from motionmind.errors import SkeletonError
 from motionmind.retarget.joint_mapping import joint_mapping
 from motionmind.retarget.retarget import from_human23, to_human23
 
-_MOST_COMPARED = 4000  # postures of a corpus, at most, to find the nearest among
+_MAX_COMPARED = 4000  # postures of a corpus to find the nearest among
 
 
 class Rig:
@@ -32,10 +32,10 @@ class Rig:
         if difference is None:
             return
         if human23().difference(corpus.skeleton) is not None:
-            raise SkeletonError(f"the corpus moves bodies on {corpus.skeleton.name} alone: {difference}")
+            raise SkeletonError(f"the corpus only moves the skeleton {corpus.skeleton.name}: {difference}")
         if joint_mapping(skeleton) is None:
             own = corpus.skeleton.name
-            raise SkeletonError(f"the joints are neither those of {own} nor of a known rig: {difference}")
+            raise SkeletonError(f"the joints fit neither {own} nor a known rig: {difference}")
         at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (len(skeleton), 1))
         self.to_corpus(Posture(skeleton, at_rest, np.zeros(3)))  # raises if it cannot be retargeted
 
@@ -49,11 +49,11 @@ class Rig:
 
     def nearest(self, like: Posture, given: Floats) -> Floats:
         """Return the rotations [J, 4] of the corpus's posture nearest to `like`, joints weighted by `given` [J]."""
-        every = max(1, -(-len(self._corpus.rotations) // _MOST_COMPARED))
+        every = max(1, -(-len(self._corpus.rotations) // _MAX_COMPARED))
         rotations = self._corpus.rotations[::every]
-        moments = np.arange(len(rotations), dtype=np.float64)
+        times = np.arange(len(rotations), dtype=np.float64)
         skeleton = self._corpus.skeleton if self._is_same else self.to_corpus(like).skeleton
-        known = Motion(skeleton, rotations, np.zeros((len(rotations), 3)), moments)
+        known = Motion(skeleton, rotations, np.zeros((len(rotations), 3)), times)
         turned = self.from_corpus(known, like).rotations
         cosines = np.abs(np.sum(turned * like.rotations, axis=-1))
         apart = np.arccos(np.clip(cosines, 0.0, 1.0)) ** 2 @ given
