@@ -1,4 +1,4 @@
-"""Checks at the public door: a value of a type that a function does not take is one clear line, a WrongTypeError."""
+"""Check the arguments of public functions: a value of the wrong type raises a WrongTypeError of one clear line."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from motionmind.errors import WrongTypeError
 if TYPE_CHECKING:
     from motionmind._typing import Floats, Ints
 
-_LONGEST = 40  # characters of a value in a message
+_MAX_VALUE_CHARS = 40  # in a message
 
 
 def check_type(name: str, value: object, *types: type, wanted: str = "", or_none: bool = False) -> None:
-    """Check that a value is of one of some types.
+    """Check that a value has one of some types.
 
     Args:
         name: the argument's name, for the message.
-        value: what was given.
-        types: what is taken.
+        value: the argument.
+        types: the accepted types.
         wanted: the types in words; by default their names.
-        or_none: whether None is taken too.
+        or_none: whether to accept None.
 
     Raises:
-        WrongTypeError: it is not; the message names the attribute of `value` that is, if there is one.
+        WrongTypeError: it has none of them; the message names the attribute `motion` of `value` if that has.
     """
     if isinstance(value, types) or (or_none and value is None):
         return
-    wanted = wanted or " or ".join(map(_one, types))
+    wanted = wanted or " or ".join(map(_a_type, types))
     within = getattr(value, "motion", None)
     hint = "; its .motion is one" if isinstance(within, types) else ""
     raise WrongTypeError(f"{name} must be {wanted}, not {described(value)}{hint}")
@@ -48,24 +48,24 @@ def check_text(name: str, value: object, *, or_none: bool = False) -> None:
 
 
 def check_real(name: str, value: object, *, or_none: bool = False) -> None:
-    """Check that a value is a number, Python's or numpy's, and no flag; WrongTypeError if it is not."""
+    """Check that a value is a number of Python or NumPy, but not a bool; WrongTypeError if it is not."""
     _check_number(name, value, Real, "a number", or_none)
 
 
 def check_integer(name: str, value: object, *, or_none: bool = False) -> None:
-    """Check that a value is a whole number, Python's or numpy's, and no flag; WrongTypeError if it is not."""
+    """Check that a value is an integer of Python or NumPy, but not a bool; WrongTypeError if it is not."""
     _check_number(name, value, Integral, "a whole number", or_none)
 
 
 def _check_number(name: str, value: object, kind: type, wanted: str, or_none: bool) -> None:
-    if isinstance(value, bool):  # which Python counts among the whole numbers
+    if isinstance(value, bool):  # a subclass of int
         raise WrongTypeError(f"{name} must be {wanted}, not {value}")
     check_type(name, value, kind, wanted=wanted, or_none=or_none)
 
 
 def check_flag(name: str, value: object) -> None:
-    """Check that a value is True or False, Python's or numpy's; WrongTypeError if it is not."""
-    # numpy's type by its name, for it need not be imported.
+    """Check that a value is a bool of Python or NumPy; WrongTypeError if it is not."""
+    # By its name: NumPy need not be imported.
     if not isinstance(value, bool) and type(value).__name__ not in ("bool", "bool_"):
         raise WrongTypeError(f"{name} must be True or False, not {described(value)}")
 
@@ -82,21 +82,21 @@ def check_mapping(name: str, value: object, *, or_none: bool = False) -> None:
 
 
 def check_items(name: str, value: object, wanted: str, *types: type) -> None:
-    """Check that a value is a sequence, and its items of some types.
+    """Check that a value is a sequence with items of some types.
 
-    Text, a sequence of letters to Python, is none. Items of what can be gone through only once are not looked at.
+    Text is not a sequence here. Items of iterators are not checked.
 
     Args:
         name: the argument's name, for the message.
-        value: what was given.
-        wanted: what the sequence is of, in words.
-        types: what its items are; nothing if they are checked elsewhere.
+        value: the argument.
+        wanted: the items in words, for the message.
+        types: the accepted types of items; none to skip their check.
 
     Raises:
-        WrongTypeError: it is not a sequence, or one of its items is none of `types`.
+        WrongTypeError: it is not a sequence, or an item has none of the types.
     """
     if isinstance(value, str | bytes) or not isinstance(value, Iterable):
-        hint = f"; write [{value!r:.{_LONGEST}}]" if str in types and isinstance(value, str) else ""
+        hint = f"; write [{value!r:.{_MAX_VALUE_CHARS}}]" if str in types and isinstance(value, str) else ""
         raise WrongTypeError(f"{name} must be a sequence of {wanted}, not {described(value)}{hint}")
     if not types or iter(value) is value:
         return
@@ -106,7 +106,7 @@ def check_items(name: str, value: object, wanted: str, *types: type) -> None:
 
 
 def as_floats(name: str, value: object) -> Floats:
-    """Return a new array of numbers, such as a list of lists has; WrongTypeError if there is something else in it."""
+    """Return a new array of floats; WrongTypeError if the value is not an array of numbers."""
     import numpy as np
 
     try:
@@ -119,7 +119,7 @@ def as_floats(name: str, value: object) -> Floats:
 
 
 def as_integers(name: str, value: object) -> Ints:
-    """Return a new array of whole numbers; WrongTypeError if there is something else in it."""
+    """Return a new array of integers; WrongTypeError if the value is not an array of integers."""
     import numpy as np
 
     try:
@@ -131,14 +131,14 @@ def as_integers(name: str, value: object) -> Ints:
     raise WrongTypeError(f"{name} must be an array of whole numbers, not {described(value)}")
 
 
-def _one(type_: type) -> str:
+def _a_type(type_: type) -> str:
     return f"a{'n' * (type_.__name__[0] in 'AEIOUaeiou')} {type_.__name__}"
 
 
 def described(value: object) -> str:
-    """Return a value as a message has it: short text and numbers as they are written, else its type."""
+    """Describe a value for a message: short text and numbers as written in Python, else its type."""
     if value is None or isinstance(value, bool | int | float):
         return repr(value)
     if isinstance(value, str):
-        return repr(displayed(value, _LONGEST))
-    return _one(type(value))
+        return repr(displayed(value, _MAX_VALUE_CHARS))
+    return _a_type(type(value))

@@ -1,7 +1,7 @@
-"""Compiled code on disk: kept for the contents of the sources that it came from, and private to its user.
+"""A private cache of compiled code on disk, keyed by the contents of the sources.
 
-A wheel may carry code, too, for any processor of its platform and for newer ones (`hatch_build.py`). The user's own,
-which is for the very processor, goes first.
+A wheel may also carry code, for any processor of its platform and for newer ones (`hatch_build.py`). The user's own,
+which is compiled for the exact processor, takes precedence.
 """
 
 from __future__ import annotations
@@ -32,11 +32,10 @@ from numba.core.registry import cpu_target
 from motionmind.files import make_folder, replace_file
 
 _HERE = Path(__file__).parent
-_HASH = 32  # bytes of a hash
+_HASH_BYTES = 32
 _IMPORT = re.compile(r"^from motionmind(?:\.([\w.]+))? import (\([^)]*\)|.*)$", re.M)  # as a module is loaded
-_MONTH = 30 * 86400.0  # seconds
-_V3 = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")  # features of processors of the level x86-64-v3
-# Of numba's core, which is not typed.
+_V3_FEATURES = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")  # of x86-64-v3
+# Numba's core is untyped.
 _result: Any = compiler.compile_result
 _codegen: Any = codegen
 _binding: Any = codegen.ll  # type: ignore[attr-defined]  # llvmlite.binding
@@ -45,7 +44,7 @@ _dumps: Any = serialize.dumps
 
 @cache
 def decorated_names() -> frozenset[str]:
-    """Return the functions of this package that are to be compiled, as "search/astar.search"; none need be loaded."""
+    """Return the jitted functions of this package, as "search/astar.search", without importing them."""
     return frozenset(
         f"{source.parent.name}/{source.stem}.{name}"
         for source in _compiling_sources()
@@ -54,7 +53,7 @@ def decorated_names() -> frozenset[str]:
 
 
 def compiled_names() -> frozenset[str]:
-    """Return those of them whose compiled code is on disk."""
+    """Return the jitted functions whose compiled code is on disk."""
     return frozenset(
         f"{_module(folder).replace('.', '/')}.{file.name.rsplit('-', 1)[0]}"
         for folder in _folders()
@@ -63,19 +62,19 @@ def compiled_names() -> frozenset[str]:
 
 
 def is_all_compiled() -> bool:
-    """Return whether all is shipped, or what `note_all_compiled` found is all there still, for these sources.
+    """Return whether the code of all functions is shipped or, since `note_all_compiled`, still on disk.
 
-    Reading all sources takes a tenth of a second, so a yes is noted under their ages, and found in a hundredth.
+    Reading all sources takes 0.1 s, so a positive result is noted under their modification times, and found in 0.01 s.
     """
     if (place := place_of_code()) is None:
         return False
-    seen = place / f"all-{_ages()}"
-    if _holds(seen):
+    seen = place / f"all-{_sources_key()}"
+    if _is_complete(seen):
         return True
     note = _note()
     if _shipped() and decorated_names() <= compiled_names():
         noted = ""
-    elif note is not None and _holds(note):
+    elif note is not None and _is_complete(note):
         noted = note.read_text("utf-8")
     else:
         return False
@@ -84,15 +83,15 @@ def is_all_compiled() -> bool:
     return True
 
 
-def _holds(note: Path) -> bool:
-    """Return whether a note is there, and all files that it names."""
+def _is_complete(note: Path) -> bool:
+    """Return whether a note exists and all files that it names."""
     with suppress(OSError, UnicodeDecodeError):
         return all((note.parent / name).is_file() for name in note.read_text("utf-8").splitlines())
     return False
 
 
-def _ages() -> str:
-    """Return a hash of the places, sizes and ages of all that compiled code comes from."""
+def _sources_key() -> str:
+    """Return a hash of the paths, sizes and modification times of all sources of compiled code."""
     files = [*_HERE.glob("*.py"), *_HERE.glob("*/*.py"), *_HERE.glob("_compiled/*.zip")]
     stats = [(str(file), found.st_size, found.st_mtime_ns) for file in sorted(files) for found in [file.stat()]]
     key = (numba.__version__, sys.implementation.cache_tag, cpu_target.target_context.codegen().magic_tuple(), stats)
@@ -100,7 +99,7 @@ def _ages() -> str:
 
 
 def note_all_compiled() -> None:
-    """Note that what is compiled now is all that there is to compile."""
+    """Note that everything is compiled, and in which files."""
     if (note := _note()) is not None:
         names = [str(file.relative_to(note.parent)) for folder in _folders() for file in sorted(folder.glob("*.nbc"))]
         with suppress(OSError):
@@ -108,17 +107,17 @@ def note_all_compiled() -> None:
 
 
 def place_of_code() -> Path | None:
-    """Return the folder that compiled code is kept in; None if there is none that can be written."""
+    """Return the folder of compiled code; None if no folder is writable."""
     folder = _folder(_HERE / "search" / "astar.py")
     return folder and folder.parent
 
 
 class Kept:
-    """The compiled code of one function on disk, in place of numba's cache: a file for each signature, with its hash.
+    """The compiled code of one function on disk, instead of Numba's cache: a file for each signature, with its hash.
 
-    numba keeps an index and numbered files. It trusts whatever it finds there, lets two processes write different code
-    under one number, fails where the disk is full, and writes into the package where its folder cannot be made. Here
-    every fault means that the function is compiled again.
+    Numba keeps an index and numbered files. It trusts their contents, lets two processes write different code under one
+    number, fails on a full disk, and writes into the package if it cannot make its folder. Here every fault means that
+    the function is compiled again.
     """
 
     def __init__(self, function: Callable[..., object]) -> None:
@@ -126,11 +125,11 @@ class Kept:
 
     @property
     def cache_path(self) -> Path | None:
-        """The folder; None if there is none that can be written."""
+        """The folder; None if no folder is writable."""
         return _folder(Path(self._function.__code__.co_filename))
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """Return the code for a signature; None if it is not there, or damaged."""
+        """Return the code for a signature; None if it is missing or damaged."""
         context.refresh()
         file = self._file(signature, context.codegen().magic_tuple())
         if file is None:
@@ -139,21 +138,21 @@ class Kept:
             data = file.read_bytes()
         except OSError:
             shipped = self._shipped_code(signature)
-            with suppress(Exception):  # damaged: it is compiled
-                return shipped and _link(context, *pickle.loads(shipped[_HASH:]))
+            with suppress(Exception):  # damaged: compile again
+                return shipped and _linked(context, *pickle.loads(shipped[_HASH_BYTES:]))
             return None
         try:
-            if hashlib.sha256(data[_HASH:]).digest() != data[:_HASH]:
-                raise ValueError("not what was written")
-            return _link(context, *pickle.loads(data[_HASH:]))
-        except Exception:  # whatever unpickling and linking raise
-            _say(f"compiled code in {file.parents[1]} was damaged; it is compiled again")
+            if hashlib.sha256(data[_HASH_BYTES:]).digest() != data[:_HASH_BYTES]:
+                raise ValueError("wrong hash")
+            return _linked(context, *pickle.loads(data[_HASH_BYTES:]))
+        except Exception:  # unpickling and linking raise many kinds
+            _warn(f"compiled code in {file.parents[1]} is damaged: compiling again")
             with suppress(OSError):
                 file.unlink(missing_ok=True)
             return None
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
-        """Write the code for a signature, where that can be done."""
+        """Write the code for a signature, if possible."""
         file = self._file(signature, compiled.codegen.magic_tuple())
         if file is None or compiled.lifted or compiled.library.has_dynamic_globals:
             return
@@ -161,20 +160,20 @@ class Kept:
         try:
             replace_file(file, hashlib.sha256(data).digest() + data)
         except OSError as error:
-            _say(f"compiled code cannot be kept in {file.parents[1]} ({error.strerror}); each run compiles it again")
+            _warn(f"cannot cache compiled code in {file.parents[1]} ({error.strerror}): each run compiles again")
 
     def _shipped_code(self, signature: Any) -> bytes | None:
-        """Return the code for a signature that the package carries; None if it carries none that is whole."""
+        """Return the shipped code for a signature; None if it is missing or damaged."""
         for target, archive in _shipped():
             file = self._file(signature, target)
             with suppress(KeyError, OSError, zipfile.BadZipFile, zlib.error):
                 data = archive.read(f"{file.parent.name}/{file.name}") if file else b""
-                if hashlib.sha256(data[_HASH:]).digest() == data[:_HASH]:
+                if hashlib.sha256(data[_HASH_BYTES:]).digest() == data[:_HASH_BYTES]:
                     return data
         return None
 
     def _file(self, signature: Any, target: tuple[str, ...]) -> Path | None:
-        """Return the file for a signature and a target: triple, processor and its features."""
+        """Return the file for a signature and a target (triple, processor, features)."""
         code, folder = self._function.__code__, self.cache_path
         if folder is None:
             return None
@@ -185,13 +184,13 @@ class Kept:
 
 
 def targets() -> list[str]:
-    """Return the processors that a wheel of this platform carries code for, the one to prefer first."""
+    """Return the processors for which a wheel of this platform carries code, in order of preference."""
     return ["x86-64-v3", "generic"] if _binding.get_process_triple().startswith("x86_64") else ["generic"]
 
 
 def _shipped() -> list[tuple[tuple[str, ...], zipfile.ZipFile]]:
-    """Return the archives of code in this package that this processor can run, each with its target."""
-    return _opened(os.getpid())  # by the process: forked ones would read at each other's places
+    """Return the shipped archives of code that this processor can run, each with its target."""
+    return _opened(os.getpid())  # one per process: forked processes would share the file's offset
 
 
 @cache
@@ -199,7 +198,7 @@ def _opened(_process: int) -> list[tuple[tuple[str, ...], zipfile.ZipFile]]:
     features = _binding.get_host_cpu_features()
     found: list[tuple[tuple[str, ...], zipfile.ZipFile]] = []
     for name in targets():
-        if name == "generic" or all(features.get(feature) for feature in _V3):
+        if name == "generic" or all(features.get(feature) for feature in _V3_FEATURES):
             with suppress(OSError, zipfile.BadZipFile):
                 target = (_binding.get_process_triple(), name, "")
                 found.append((target, zipfile.ZipFile(_HERE / "_compiled" / f"{name}.zip")))
@@ -207,29 +206,29 @@ def _opened(_process: int) -> list[tuple[tuple[str, ...], zipfile.ZipFile]]:
 
 
 def _shipped_files(folder: Path) -> Iterator[Path]:
-    """Yield the names of shipped code for a module's state, which its folder is named after."""
+    """Yield the names of shipped code for the state of a module after which its folder is named."""
     for _, archive in _shipped()[:1]:
         yield from (Path(name) for name in archive.namelist() if name.startswith(f"{folder.name}/"))
 
 
 def _symbols(library: Any) -> frozenset[str]:
-    """Return the names of what compiled code defines."""
+    """Return the names of the symbols that compiled code defines."""
     module = library._get_module_for_linking()
     defined = (one for kind in (module.functions, module.global_variables) for one in kind if not one.is_declaration)
     return frozenset(one.name for one in defined)
 
 
-def _link(context: Any, symbols: frozenset[str], state: Any, *reduced: Any) -> Any:
-    """Return the result of a compilation that was kept, as numba's `_rebuild` does, in a quarter of the time.
+def _linked(context: Any, symbols: frozenset[str], state: Any, *reduced: Any) -> Any:
+    """Return a cached result of a compilation, as Numba's `_rebuild` does, in a quarter of the time.
 
-    numba reads the intermediate code too, which only serves to compile another function that calls this one: here it is
-    read then.
+    Numba also parses the intermediate code, which only serves to compile other functions that call this one: here it
+    is parsed only then.
 
     Args:
-        context: the target that it was compiled for.
-        symbols: what it defines.
-        state: the library that `CompileResult._reduce` returned: its name, and machine and intermediate code.
-        reduced: the rest of what it returned.
+        context: the target of the compilation.
+        symbols: the symbols that the code defines.
+        state: the library from `CompileResult._reduce`: its name, and machine and intermediate code.
+        reduced: the other items from `CompileResult._reduce`.
     """
     description, environment, signature, objectmode, lifted, annotation, reload_init, environments = reduced
     for function in reload_init:
@@ -262,12 +261,12 @@ def _link(context: Any, symbols: frozenset[str], state: Any, *reduced: Any) -> A
 
 
 def _compiling_sources() -> list[Path]:
-    """Return the modules of this package that have functions to compile."""
+    """Return the modules of this package with jitted functions."""
     return [source for source in sorted(_HERE.glob("*/*.py")) if re.search(r"^@jit$", _text(source), re.M)]
 
 
 def _folders() -> list[Path]:
-    """Return the folders of compiled code of all modules that have some."""
+    """Return the folders of compiled code of all modules with jitted functions."""
     return [folder for source in _compiling_sources() if (folder := _folder(source))]
 
 
@@ -277,7 +276,7 @@ def _module(folder: Path) -> str:
 
 
 def _note() -> Path | None:
-    """Return the file that says that all is compiled, named after what code depends on but for its signatures."""
+    """Return the file that notes that everything is compiled, named after the sources and the platform."""
     if not (folders := _folders()):
         return None
     codegen = cpu_target.target_context.codegen()
@@ -286,7 +285,7 @@ def _note() -> Path | None:
 
 
 @cache
-def _say(message: str) -> None:
+def _warn(message: str) -> None:
     """Log a warning, once."""
     logging.getLogger("motionmind").warning(message)
 
@@ -305,7 +304,7 @@ def _hash(source: Path) -> str:
 
 @cache
 def _imported(source: Path) -> frozenset[Path]:
-    """Return the modules of this package that a module imports as it is loaded."""
+    """Return the modules of this package that a module imports at its top level."""
     found: set[Path] = set()
     for package, names in _IMPORT.findall(_text(source)):
         module = _HERE.joinpath(*package.split(".")) if package else _HERE
@@ -315,9 +314,9 @@ def _imported(source: Path) -> frozenset[Path]:
 
 
 def _state(source: Path) -> str:
-    """Return a hash of the contents of a module and of all that it imports from this package, directly or not.
+    """Return a hash of the contents of a module and of all its imports from this package, direct or indirect.
 
-    Compiled code holds what it calls and the constants that it reads, and these may be in other modules.
+    Compiled code contains the functions that it calls and the constants that it reads, even from other modules.
     """
     found, left = {source}, [source]
     while left:
@@ -331,9 +330,9 @@ def _state(source: Path) -> str:
 def _folder(source: Path) -> Path | None:
     """Return the folder of a module's compiled code, named after the module and its state.
 
-    Neither the path of the package nor the age of its files matters, so environments share compiled code. The folder is
-    in $NUMBA_CACHE_DIR, else in the user's cache directory, else in the system's temporary one; None if none of
-    them can be written.
+    The path of the package and the times of its files do not matter, so environments share compiled code. The folder
+    is in $NUMBA_CACHE_DIR, else in the user's cache directory, else in the system's temporary one; None if none of
+    them is writable.
     """
     name = f"{source.parent.name}.{source.stem}-{_state(source)}"
     own = os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("motionmind", appauthor=False)
@@ -349,14 +348,17 @@ def _folder(source: Path) -> Path | None:
                 if is_new:
                     _remove_unused(place)
                 return folder
-    _say(f"compiled code can be kept neither in {own} nor among temporary files; each run compiles it again")
+    _warn(f"cannot cache compiled code in {own} or among temporary files: each run compiles again")
     return None
 
 
 def _make_private(place: Path) -> None:
-    """Make a folder that nobody else may write to, since loading compiled code runs it; OSError if it is another's.
+    """Make a folder that only its owner can write to, since loading compiled code runs it.
 
-    The content of one that others could have written to is removed.
+    If others could write to an existing folder, remove its content.
+
+    Raises:
+        OSError: the folder belongs to another user or cannot be made.
     """
     make_folder(place.parent)
     with suppress(FileExistsError):
@@ -365,20 +367,17 @@ def _make_private(place: Path) -> None:
         return
     found = place.lstat()
     if not stat.S_ISDIR(found.st_mode) or found.st_uid not in (os.getuid(), 0):
-        raise PermissionError(f"{place} belongs to somebody else")
+        raise PermissionError(f"{place} belongs to another user")
     if found.st_mode & 0o022 and found.st_uid == os.getuid():
         shutil.rmtree(place)
         place.mkdir(mode=0o700)
 
 
 def _remove_unused(place: Path) -> None:
-    """Remove compiled code that no process has asked for in a month: of sources that have changed since, most likely.
-
-    A process that needs it compiles it again.
-    """
+    """Remove compiled code that no process has used for a month, most likely of sources that have since changed."""
     for found in [*place.glob("*.*-" + "[0-9a-f]" * 16), *place.glob("all-" + "[0-9a-f]" * 24)]:
         with suppress(OSError):
-            if time.time() - found.lstat().st_mtime > _MONTH:
+            if time.time() - found.lstat().st_mtime > 30 * 86400.0:  # seconds
                 if found.is_dir():
                     shutil.rmtree(found, ignore_errors=True)
                 else:
@@ -387,7 +386,7 @@ def _remove_unused(place: Path) -> None:
 
 @cache
 def _temporary() -> Path:
-    """Return a folder among the system's temporary files in which nobody else may write; OSError if there is none."""
+    """Return a private folder among the system's temporary files; OSError if none can be made."""
     user = os.getuid() if hasattr(os, "getuid") else 0
     folder = Path(tempfile.gettempdir()) / f"motionmind-{user}"
     folder.mkdir(mode=0o700, exist_ok=True)

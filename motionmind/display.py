@@ -1,6 +1,6 @@
-"""Foreign text, such as names and titles that files hold, as it is displayed: in messages, tables, pages and pictures.
+"""Make foreign text, such as names and titles from files, safe to display in messages, tables, pages and pictures.
 
-Files and reports keep it whole, escaped as their formats do.
+Files and reports keep the whole text, with the escapes of their formats.
 """
 
 from __future__ import annotations
@@ -8,52 +8,52 @@ from __future__ import annotations
 import os
 import re
 
-LONGEST_NAME = 60  # characters; the longest joint of common rigs has half as many
-_LONGEST_PATH = 300  # which is of use only whole
-_LONGEST_LINE = 2000
+_MAX_NAME_CHARS = 60  # the longest joint name of common rigs has half as many
+_MAX_PATH_CHARS = 300  # half a path is useless
+_MAX_LINE_CHARS = 2000
 
-# Control characters but ends of lines and tabs; characters that turn the direction of text or end lines; and halves of
-# characters, which no output can encode.
+# Control characters except newline and tab; characters that change the direction of text or end lines; and surrogates,
+# which no output can encode.
 _UNSAFE = re.compile(
     r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
 )
-_LONG_WORDS = re.compile(rf"\S{{{_LONGEST_PATH},}}")
-_LONG_LINES = re.compile(rf"[^\n]{{{_LONGEST_LINE},}}")
+_LONG_WORDS = re.compile(rf"\S{{{_MAX_PATH_CHARS},}}")
+_LONG_LINES = re.compile(rf"[^\n]{{{_MAX_LINE_CHARS},}}")
 
 
-def displayed(name: str, most: int = LONGEST_NAME) -> str:
-    """Return a name as it is displayed: in one line that a terminal or a page shows and does not act on.
+def displayed(name: str, most: int = _MAX_NAME_CHARS) -> str:
+    """Return a name in one line that is safe to display in a terminal or page.
 
-    Unsafe characters are escaped as JSON escapes them; the middle is left out if there are more than `most` characters.
+    Escape unsafe characters as JSON does; leave out the middle of names of more than `most` characters.
 
     >>> from motionmind.display import displayed
     >>> displayed("left\\x1b[31m hip")
     'left\\\\u001b[31m hip'
     """
-    # Cut first, so that a name of a million characters costs no more than one of sixty, and then what escapes added.
+    # Shorten before escaping, so that long names cost no time, and again after it.
     return _shortened(escaped(_shortened(name, most)).replace("\n", "\\u000a").replace("\t", "\\u0009"), most)
 
 
 def displayed_path(path: str | os.PathLike[str]) -> str:
-    """Return the name of a file as it is displayed: as `displayed`, but longer, for half a path leads nowhere."""
-    return displayed(os.fspath(path), _LONGEST_PATH)
+    """Return a path as `displayed` does, up to a greater length, because half a path is useless."""
+    return displayed(os.fspath(path), _MAX_PATH_CHARS)
 
 
 def printable(text: str) -> str:
-    """Return a message, in which names may stand, as it is displayed; it keeps its lines.
+    """Return a message, which may contain names, safe to display; keep its lines.
 
-    Unsafe characters are escaped, and the middle of words and lines that would fill a screen is left out.
+    Escape unsafe characters, and leave out the middle of words and lines that would fill a screen.
     """
     short = _LONG_WORDS.sub(lambda word: _shortened(word[0], 80), escaped(text))
-    return _LONG_LINES.sub(lambda line: _shortened(line[0], _LONGEST_LINE), short)
+    return _LONG_LINES.sub(lambda line: _shortened(line[0], _MAX_LINE_CHARS), short)
 
 
 def escaped(text: str) -> str:
-    """Escape unsafe characters as JSON does, so that JSON stays what it is; ends of lines and tabs stay."""
+    """Escape unsafe characters as JSON does, which leaves JSON equivalent; keep newlines and tabs."""
     return _UNSAFE.sub(lambda one: f"\\u{ord(one[0]):04x}", text)
 
 
 def _shortened(text: str, most: int) -> str:
-    """Return text with its middle left out if it has more than `most` characters, three quarters of them before it."""
+    """Shorten text to `most` characters: leave out its middle, and keep three quarters of them before it."""
     end = (most - 3) // 4
     return text if len(text) <= most else f"{text[: most - 3 - end]}...{text[len(text) - end :]}"

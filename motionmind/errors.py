@@ -10,7 +10,7 @@ from difflib import get_close_matches
 from itertools import islice
 from typing import Any
 
-_MOST_COMPARED = 64, 2000  # characters of a word, and words, among which a slip of the pen is looked for
+_MAX_WORD_CHARS = 64  # of words to compare
 
 
 class MotionMindError(Exception):
@@ -26,7 +26,7 @@ class MotionMindError(Exception):
 
 
 class WrongTypeError(MotionMindError, TypeError):
-    """A value of a type that its function does not take, or an option that there is not.
+    """A value of the wrong type, or an unknown option.
 
     >>> from motionmind import write_motion
     >>> write_motion("clip.bvh", "clip.glb")
@@ -39,7 +39,7 @@ class FormatError(MotionMindError):
     """A file that cannot be read as the format it claims to be.
 
     Args:
-        message: what was wrong, and what would be right.
+        message: the fault, and what would be right.
         path: the file, put before the message.
         line: the line in that file, counted from 1.
 
@@ -118,9 +118,9 @@ def quoted(text: str, most: int = 40) -> str:
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return '; did you mean X?' for the known name most similar to `name`, or '' if none is similar."""
-    # Comparing takes the product of the lengths: long words and long lists are not what a slip is found among.
-    comparable = (word for word in known if len(word) <= _MOST_COMPARED[0])
-    near = list(islice(comparable, _MOST_COMPARED[1])) if len(name) <= _MOST_COMPARED[0] else []
+    # A comparison takes the product of the lengths: skip long words, and compare 2,000 words at most.
+    comparable = (word for word in known if len(word) <= _MAX_WORD_CHARS)
+    near = list(islice(comparable, 2000)) if len(name) <= _MAX_WORD_CHARS else []
     close = get_close_matches(name, near, n=1)
     return f"; did you mean {close[0]}?" if close else ""
 
@@ -129,10 +129,10 @@ def suggestion(name: str, known: Iterable[str], otherwise: str = "there are", mo
     """Return '; did you mean X?', or else the known names: '; there are X, Y', the first `most` of them.
 
     Args:
-        name: the name that nothing has.
-        known: the names that there are.
+        name: the unknown name.
+        known: the known names.
         otherwise: the words before them.
-        most: how many to list.
+        most: number of names to list.
     """
     known = list(known)
     return did_you_mean(name, known) or f"; {otherwise} {enumerated(known, most) or 'none'}"

@@ -1,4 +1,4 @@
-"""Reading and writing whole files: one clear error if a file cannot be read, and never a half-written file."""
+"""Read and write whole files: one clear error if a file cannot be read, and never a half-written file."""
 
 from __future__ import annotations
 
@@ -32,10 +32,9 @@ FilePath = str | os.PathLike[str]
 _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{20}}")
 
-TEMPORARY = re.compile(r"\.motionmind-(?:(\d+)-)?[0-9a-f]{16}\.tmp")  # with the process that writes it
-_LOCKED = 2**40  # the byte that is locked where files are locked in parts; far behind the last
-_MINUTE, _DAY = 60.0, 86400.0  # seconds
-_HELD_OPEN = (0.01, 0.03, 0.1, 0.3, 0.5)  # seconds to wait for another program that holds a file open
+TEMPORARY = re.compile(r"\.motionmind-(?:(\d+)-)?[0-9a-f]{16}\.tmp")  # with the number of the writing process
+_DAY_S = 86400.0
+_RETRY_PAUSES_S = (0.01, 0.03, 0.1, 0.3, 0.5)  # while another program holds a file open
 
 
 def name_of(path: FilePath) -> str:
@@ -44,14 +43,14 @@ def name_of(path: FilePath) -> str:
 
 
 def as_text(name: str) -> str:
-    """Return a file's name as text that can be written: its bytes that are no UTF-8 become escapes."""
+    """Return a file's name as text that can be encoded: bytes that are not UTF-8 become escapes."""
     return name.encode("utf-8", "backslashreplace").decode()
 
 
 def read_bytes(path: FilePath) -> bytes:
-    """Return all bytes of the file at `path`; FormatError if it does not exist or cannot be read, as a terminal.
+    """Return all bytes of the file at `path`; FormatError if it is missing, unreadable or a terminal.
 
-    A pipe gives its bytes once: in the context of `pipes_kept` they are kept for those who read it again.
+    A pipe yields its bytes once; the context of `pipes_kept` keeps them for later reads.
     """
     data = _read(path)
     if (recorded := _recorded.get()) is not None:
@@ -81,7 +80,7 @@ _kept: ContextVar[dict[tuple[int, int], bytes] | None] = ContextVar("kept", defa
 
 
 def give_back(array: NDArray[Any]) -> None:
-    """Let go of the memory in which a mapped array was read, if it is one; what is needed again is read again."""
+    """Release the pages of a mapped array, if it is one; the system reads them again when needed."""
     base: Any = array
     while base is not None and not isinstance(base, mmap.mmap):
         base = getattr(base, "base", None)
@@ -91,7 +90,7 @@ def give_back(array: NDArray[Any]) -> None:
 
 @contextmanager
 def pipes_kept() -> Iterator[None]:
-    """Keep what is read from pipes in the context, so that each can be read as often as a file."""
+    """Keep the bytes read from pipes in the context, so that each pipe can be read again like a file."""
     token = _kept.set({})
     try:
         yield
@@ -104,7 +103,7 @@ _recorded: ContextVar[dict[str, str] | None] = ContextVar("recorded", default=No
 
 @contextmanager
 def reads_recorded() -> Iterator[dict[str, str]]:
-    """Record which files are read in the context; yield the hash of each (SHA-256), by its absolute path."""
+    """Record the files read in the context; yield their hashes (SHA-256), by absolute path."""
     recorded: dict[str, str] = {}
     token = _recorded.set(recorded)
     try:
@@ -114,11 +113,11 @@ def reads_recorded() -> Iterator[dict[str, str]]:
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Parse TOML whose keys have 20 parts at most: the parser's memory grows with the square of their number.
+    """Parse TOML with keys of at most 20 parts: the parser's memory grows with the square of their number.
 
     Raises:
-        ValueError: it is not such TOML; the message names the line.
-        RecursionError: it is nested too deep.
+        ValueError: the text is not such TOML; the message gives the line.
+        RecursionError: the nesting is too deep.
     """
     if found := _LONG_KEY.search(text):
         line = text.count("\n", 0, found.start()) + 1
@@ -129,9 +128,9 @@ def parse_toml(text: str) -> dict[str, Any]:
 def write_atomically(path: FilePath, data: bytes) -> None:
     """Write `data` to `path` atomically: a reader finds either the old file or the new one, never a part.
 
-    The bytes go to a temporary file in the same folder, are flushed to disk, and are moved into place. Links are
-    followed, and the permissions of a replaced file are kept. Anything but a regular file (a pipe, `/dev/stdout`) is
-    written to directly. In the context of `all_or_none` the move waits for its end.
+    Write a temporary file in the same folder, flush it to disk, and move it into place. Follow links, and keep the
+    permissions of a replaced file. Write directly to anything but a regular file (a pipe, `/dev/stdout`). In the
+    context of `all_or_none` the move waits for its end.
 
     Raises:
         MotionMindError: writing failed; the temporary file is removed.
@@ -154,13 +153,13 @@ def write_atomically(path: FilePath, data: bytes) -> None:
 
 
 class Written(NamedTuple):
-    """A file that was written beside its place.
+    """A file written beside its target.
 
     Attributes:
-        path: its path as it was given.
-        target: its place, links followed.
-        temporary: where it is.
-        is_new: whether there is no file in its place.
+        path: the path given.
+        target: where to move it, links followed.
+        temporary: the temporary file.
+        is_new: whether the target did not exist.
     """
 
     path: Path
@@ -174,9 +173,9 @@ _held_back: ContextVar[list[Written] | None] = ContextVar("held_back", default=N
 
 @contextmanager
 def all_or_none() -> Iterator[list[Written]]:
-    """Hold back the files that are written atomically in the context, and move them into place together at its end.
+    """Hold back the files written atomically in the context, and move them into place together at its end.
 
-    If an error or Ctrl-C ends it, those that were in place stay as they were, and there are no new ones.
+    If an error or Ctrl-C ends the context, existing files stay as they were, and no new ones appear.
 
     Yields:
         The files so far.
@@ -207,19 +206,19 @@ def all_or_none() -> Iterator[list[Written]]:
 
 
 def sha256_of(written: Sequence[Written], path: Path | None) -> str | None:
-    """Return the hash of the file written to `path`; None if there is none: what goes to a pipe is not held back."""
+    """Return the hash of the file written to `path`; None if there is none, as for a pipe."""
     return next((hashlib.sha256(one.temporary.read_bytes()).hexdigest() for one in written if one.path == path), None)
 
 
 def replace_file(target: Path, data: bytes, mode: int | None = None) -> None:
     """Write a file beside `target`, flush it, move it there and flush the folder; OSError if that fails.
 
-    What processes that were killed left in the folder is removed.
+    Remove temporary files that killed processes left in the folder.
 
     Args:
-        target: where; a regular file there is replaced.
+        target: the file; a regular file there is replaced.
         data: the file's bytes.
-        mode: its permissions; None for those of any new file.
+        mode: its permissions; None for those of a new file.
     """
     temporary = _write_beside(target, data, mode)
     try:
@@ -252,7 +251,7 @@ def _write_beside(target: Path, data: bytes, mode: int | None) -> Path:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, and those that it lies in, if it is not there, and flush them to disk."""
+    """Make a folder and its missing parents, and flush them to disk."""
     if not folder.is_dir():
         make_folder(folder.parent)
         folder.mkdir(exist_ok=True)
@@ -260,27 +259,27 @@ def make_folder(folder: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Flush to disk which files a folder holds, where the system can."""
-    if os.name == "nt":  # it opens no folders, and logs their changes in order
+    """Flush the entries of a folder to disk, where the system can."""
+    if os.name == "nt":  # Windows cannot open folders, and logs their changes in order
         return
     try:
         descriptor = os.open(folder, os.O_RDONLY)
-    except PermissionError:  # a folder that one may write to and not look into
+    except PermissionError:  # a folder that is writable but not readable
         return
     try:
         os.fsync(descriptor)
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # a file system that flushes no folders
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # some file systems cannot flush folders
             raise
     finally:
         os.close(descriptor)
 
 
 def lock_alone(descriptor: int) -> bool:
-    """Lock an open file for this process alone, until it is closed; False if another holds it."""
+    """Lock an open file for this process until it is closed; return False if another process holds the lock."""
     try:
         if sys.platform == "win32":
-            os.lseek(descriptor, _LOCKED, os.SEEK_SET)
+            os.lseek(descriptor, 2**40, os.SEEK_SET)  # lock one byte, far behind the end
             msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
         else:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -290,8 +289,8 @@ def lock_alone(descriptor: int) -> bool:
 
 
 def _move(source: Path, target: Path) -> None:
-    """Move a file over another, at once; wait a second at most while a program holds that open, as Windows lets it."""
-    for pause in (*_HELD_OPEN, None):
+    """Move a file over another atomically; wait up to a second while a program holds that open (Windows)."""
+    for pause in (*_RETRY_PAUSES_S, None):
         try:
             source.replace(target)
             return
@@ -302,21 +301,21 @@ def _move(source: Path, target: Path) -> None:
 
 
 def _remove_leftovers(folder: Path) -> None:
-    """Remove the temporary files of processes that ended before they were done with them."""
+    """Remove the temporary files of dead processes."""
     with suppress(OSError):
         for entry in os.scandir(folder):
             if parts := TEMPORARY.fullmatch(entry.name):
                 with suppress(OSError):
                     age = time.time() - entry.stat(follow_symlinks=False).st_mtime
-                    # A process may run on another machine that shares the folder, or have the number of one that died.
-                    if age > _DAY or (age > _MINUTE and parts[1] and not _runs(int(parts[1]))):
+                    # The process may run on another machine that shares the folder, or reuse the number of a dead one.
+                    if age > _DAY_S or (age > 60.0 and parts[1] and not _runs(int(parts[1]))):
                         Path(entry.path).unlink()
 
 
 def make_room(purpose: str) -> Path:
-    """Return a new folder among the system's temporary ones, which others may not read.
+    """Make a private folder among the system's temporary ones.
 
-    What processes that were killed left of the same purpose, a word, is removed after a day.
+    Remove folders of the same purpose, a word, that dead processes left more than a day ago.
     """
     import shutil
     import tempfile
@@ -328,15 +327,15 @@ def make_room(purpose: str) -> Path:
             if (parts := rooms.fullmatch(entry.name)) and not _runs(int(parts[1])):
                 with suppress(OSError):
                     found = entry.stat(follow_symlinks=False)
-                    # It may run where numbers of processes are others, and see the same folder.
-                    if stat.S_ISDIR(found.st_mode) and found.st_uid == own and time.time() - found.st_mtime > _DAY:
+                    # The process may run in another container that shares the folder.
+                    if stat.S_ISDIR(found.st_mode) and found.st_uid == own and time.time() - found.st_mtime > _DAY_S:
                         shutil.rmtree(entry.path)
     return room
 
 
 def _runs(process: int) -> bool:
-    """Return whether a process of this number runs on this machine; True where that cannot be asked."""
-    if os.name == "nt":  # where asking would end it
+    """Return whether a process of this number runs on this machine; True where the system cannot tell."""
+    if os.name == "nt":  # where the query would end the process
         return True
     try:
         os.kill(process, 0)

@@ -1,4 +1,4 @@
-"""The one place that uses numba: functions are compiled once, and kept on disk for the exact sources they came from."""
+"""Compile functions with Numba, once for each state of their sources. All of MotionMind uses Numba through it."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from motionmind.codecache import Kept
 
 _F = TypeVar("_F", bound=Callable[..., object])
 _Array = TypeVar("_Array", bound=np.ndarray[Any, Any])
-# Of numba's core, which is not typed.
+# Numba's core is untyped.
 _normalise: Any = sigutils.normalize_signature
 _CFunc: Any = ccallback.CFunc
 _bytecode: Any = bytecode
 
 
 class _Numbers:
-    """The numbers by which numba tells functions of one name and signature apart, as the loops of sort and of argsort.
+    """The numbers by which Numba distinguishes functions of one name and signature, as in sort and argsort.
 
-    numba counts from 1 in each process. But code that several have compiled comes together in one, where the linker
-    takes the first function of a name for all of them: another one is called, or the process crashes. So numbers are
-    drawn at random, and are not those of any other process, nor of one that was forked.
+    Numba counts from 1 in each process. But a process also loads code that others compiled, and its linker takes the
+    first function of a name for all of them: it calls the wrong one, or crashes. Random numbers differ between
+    processes, even forked ones.
     """
 
     def __next__(self) -> int:
@@ -37,9 +37,9 @@ _bytecode.FunctionIdentity._unique_ids = _Numbers()
 
 
 def jit(function: _F) -> _F:
-    """Compile `function` to machine code on its first call; arithmetic as written, so the same bytes every time.
+    """Compile `function` to machine code on its first call, with arithmetic as written: the same bytes every time.
 
-    It may call other compiled functions that its module imports, and runs beside other threads.
+    It may call other compiled functions that its module imports, and releases the GIL.
     """
     compiled: Any = numba.njit(error_model="numpy", nogil=True)(function)
     compiled._cache = Kept(function)
@@ -47,15 +47,15 @@ def jit(function: _F) -> _F:
 
 
 def either(function: _F) -> _F:
-    """Return `function` for calls from compiled code, where it is compiled, and from Python, where it is not."""
+    """Make `function` callable from compiled code, where it is compiled, and from Python, where it is not."""
     registered: _F = register_jitable(function)
     return registered
 
 
 def read_only(array: _Array) -> _Array:
-    """Return a view of an array that cannot be written to, as the arrays of a corpus that was loaded.
+    """Return a read-only view of an array, like the arrays of a loaded corpus.
 
-    For arrays that can be written to, a loop would be compiled once more.
+    Numba would compile a function once more for writable arrays.
     """
     view = array.view()
     view.setflags(write=False)
@@ -63,18 +63,17 @@ def read_only(array: _Array) -> _Array:
 
 
 def pointer(function: Callable[..., object], signature: Any, *, keep: bool) -> Any:
-    """Compile `function` for one signature, to be passed by address: one compiled loop serves all such functions.
+    """Compile `function` for one signature, to pass it by address: one compiled loop serves all such functions.
 
-    A loop that is passed a function of `jit` would be compiled for it anew in every process. Exceptions raised inside
-    are lost.
+    Numba would compile a loop that takes a function of `jit` anew in every process. Exceptions inside are lost.
 
     Args:
         function: a function, which may be a closure over others and over values.
-        signature: numba's signature of it.
-        keep: whether to store it on disk, as for functions of this package.
+        signature: its signature in Numba.
+        keep: whether to cache it on disk, as for functions of this package.
 
     Raises:
-        numba.core.errors.NumbaError: it cannot be compiled.
+        numba.core.errors.NumbaError: the function cannot be compiled.
     """
     compiled = _CFunc(function, _normalise(signature), locals={}, options={"error_model": "numpy"})
     if keep:

@@ -1,7 +1,7 @@
-"""Formats, discretizations and flows that other packages add, found by the entry points of installed packages.
+"""Find formats, discretizations and flows that installed packages add, by their entry points.
 
-A package is asked only for what MotionMind itself does not have, and imported only when it is used, so that neither the
-time to start nor what is built in depends on what is installed. See docs/how-to/plugins.md.
+Built-in names take precedence, and a package is imported only when used: installed packages change neither the start
+time nor the built-in names. See docs/how-to/plugins.md.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ Group = Literal["motionmind.formats", "motionmind.discretizations", "motionmind.
 
 
 def added(group: Group) -> list[str]:
-    """Return the names that installed packages add to a group, sorted; none of the packages is imported."""
+    """Return the names that installed packages add to a group, sorted, without importing the packages."""
     return sorted({found.name for found in _entries(group)})
 
 
 def load(group: Group, name: str) -> Any | None:
-    """Return what an installed package adds under a name; None if none does.
+    """Load the object that an installed package adds under a name; None if there is none.
 
     Raises:
-        MotionMindError: several packages add it, or the one that does cannot be imported; the message names them.
+        MotionMindError: several packages add it, or the package cannot be imported; the message names them.
     """
     found = [one for one in _entries(group) if one.name == name]
     if not found:
@@ -34,7 +34,7 @@ def load(group: Group, name: str) -> Any | None:
     packages = sorted({_package(one) for one in found})
     if len(packages) > 1:
         raise MotionMindError(
-            f"{displayed(name)} is added to {group} by several packages, {', '.join(packages)}: uninstall all but one"
+            f"several packages add {displayed(name)} to {group}: {', '.join(packages)}; uninstall all but one"
         )
     try:
         return found[0].load()
@@ -43,18 +43,18 @@ def load(group: Group, name: str) -> Any | None:
 
 
 def origin(group: Group, name: str) -> str:
-    """Return what adds a name, in words: the name, its group and the package."""
+    """Return a name, its group and its package in words."""
     packages = sorted({_package(found) for found in _entries(group) if found.name == name})
     return f"{displayed(name)} in {group}, by the package {', '.join(packages)},"
 
 
 def failure(group: Group, name: str, error: Exception) -> str:
-    """Say in a line that something added fails."""
+    """Return the message for an added object that fails, in one line."""
     return f"{origin(group, name)} fails: {_worded(error)}"
 
 
 def unfit(group: Group, name: str, wanted: str) -> MotionMindError:
-    """Return the error that says that something added is not what it should be."""
+    """Return the error for an added object of the wrong kind."""
     return MotionMindError(f"{origin(group, name)} must be {wanted}")
 
 
@@ -70,5 +70,5 @@ def _package(found: EntryPoint) -> str:
 
 
 def _worded(error: Exception) -> str:
-    """Return an error's type and its message, in a line."""
+    """Return the type and the message of an error, in one line."""
     return displayed(f"{type(error).__name__}: {' '.join(str(error).split())}", 300)

@@ -108,7 +108,7 @@ def test_what_was_all_for_another_numba_or_other_sources_is_not_all(monkeypatch:
     with monkeypatch.context() as patch:
         patch.setattr(door.numba, "__version__", "0.1")
         assert not door.is_all_compiled()
-    monkeypatch.setattr(door, "_ages", lambda: "other")
+    monkeypatch.setattr(door, "_sources_key", lambda: "other")
     monkeypatch.setattr(door, "_folders", lambda: [*folders[:-1], folders[-1].with_name(f"{folders[-1].name[:-1]}x")])
     assert not door.is_all_compiled()
 
