@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from motionmind._typing import Floats, Int32s, Ints
-from motionmind.corpus.corpus import Corpus
+from motionmind._typing import Bools, Floats, Int32s, Ints
+from motionmind.body.motion import Motion
+from motionmind.corpus.corpus import FACING, Corpus
 from motionmind.credits.credit import Credit, add_up
 from motionmind.discretize.states import StateSpace
 from motionmind.geometry import rotations as rot
@@ -202,6 +203,25 @@ def sources_of(corpus: Corpus, postures: Ints | Int32s, to: Ints | Int32s, joint
         start, is_reversed = posture - clip.start, other < posture
         out.append(Source(clip.name, start, whence, clip.mirrored, is_reversed, seconds, reconstructed))
     return out
+
+
+def sources_followed(
+    sources: tuple[tuple[Source | None, ...], ...], followed: Bools
+) -> tuple[tuple[Source | None, ...], ...]:
+    """Return the sources [T][L] of the moves that the motion follows at both ends [T + 1, L]; None for the others."""
+    seen = followed[:-1] & followed[1:]
+    return tuple(
+        tuple(source if shown else None for source, shown in zip(row, shows, strict=True))
+        for row, shows in zip(sources, seen, strict=True)
+    )
+
+
+def mark_motion(motion: Motion, bridges: Sequence[Bridge], found: tuple[Credit, ...]) -> Motion:
+    """Attach credits to a tween's motion and mark its bridged joints; the root for the facing, which it turns."""
+    (insertion,) = motion.insertions
+    root = motion.skeleton.names[0]
+    named = ((root if bridge.joint == FACING else bridge.joint, bridge.move) for bridge in bridges)
+    return replace(motion, insertions=(replace(insertion, bridged=tuple(dict.fromkeys(named)), credits=found),))
 
 
 def gap_of(cost: float, lower_bound: float) -> float:

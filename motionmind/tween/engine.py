@@ -13,11 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from motionmind._typing import Bools
 from motionmind.arguments import check_function, check_integer, check_type
 from motionmind.body.motion import Motion, Posture
-from motionmind.corpus.corpus import FACING
-from motionmind.credits.credit import Credit
 from motionmind.display import displayed
 from motionmind.errors import InfeasibleError, MotionMindWarning, NoPathError
 from motionmind.geometry.splines import rotation_spline
@@ -28,7 +25,14 @@ from motionmind.search.apart import TooAlikeError, difference, solve_apart
 from motionmind.search.problem import places
 from motionmind.search.sample import sample_path
 from motionmind.search.solve import Certificate, Watch, solve
-from motionmind.tween.certificate import Bridge, Source, break_down_cost, credit_tween, sources_of, trace_path
+from motionmind.tween.certificate import (
+    break_down_cost,
+    credit_tween,
+    mark_motion,
+    sources_followed,
+    sources_of,
+    trace_path,
+)
 from motionmind.tween.constraints import find_conflicts
 from motionmind.tween.ends import bring_ends
 from motionmind.tween.formulate import Formulation, formulate
@@ -309,7 +313,7 @@ class Engine(LearnedCorpus):
             formulation.coordination,
             search.coordination_factor,
         )
-        motion = _with_bridges(realised.motion, bridges)
+        motion = realised.motion
         tempo = tempo_of(self, formulation.times, formulation.usual_moves, formulation.detours, motion)
         if tempo.faster and (request.fixes_length or request.pace > 1.0):
             warnings.warn(
@@ -321,10 +325,10 @@ class Engine(LearnedCorpus):
         reached = rotation_spline(motion.times, motion.rotations, motion.insertions[0].times)
         path_degrees = self.space.distance(self.corpus.to_chains(reached), path)
         followed = path_degrees <= self.space.tolerances + FOLLOWED_SLACK_DEG
-        shown = _shown(sources, followed)
+        shown = sources_followed(sources, followed)
         found = tuple(sources_of(self.corpus, begins, np.minimum(begins + 1, last), [""] * len(begins)))
         return Tween(
-            motion=_credited(motion, credit_tween(self.corpus, shown, found, motion.insertions[0].times)),
+            motion=mark_motion(motion, bridges, credit_tween(self.corpus, shown, found, motion.insertions[0].times)),
             joints=self.corpus.chains,
             path=path,
             status=certificate.status,
@@ -402,26 +406,3 @@ def _no_other_path(request: TweenRequest, most: float) -> NoPathError:
     others = "the earlier one" if count == 1 else f"each of {count} earlier ones"
     found = f"no path of {moves} moves was found that differs by {request.differ:.1%} from {others}"
     return NoPathError(f"{found}; none can by more than {most:.1%}", diagnosis)
-
-
-def _shown(sources: tuple[tuple[Source | None, ...], ...], followed: Bools) -> tuple[tuple[Source | None, ...], ...]:
-    """Return the sources [T][L] of the moves that the motion follows at both ends; None for the others."""
-    seen = followed[:-1] & followed[1:]
-    return tuple(
-        tuple(source if shown else None for source, shown in zip(row, shows, strict=True))
-        for row, shows in zip(sources, seen, strict=True)
-    )
-
-
-def _credited(motion: Motion, found: tuple[Credit, ...]) -> Motion:
-    """Attach credits to the motion of a tween."""
-    (insertion,) = motion.insertions
-    return replace(motion, insertions=(replace(insertion, credits=found),))
-
-
-def _with_bridges(motion: Motion, bridges: tuple[Bridge, ...]) -> Motion:
-    """Mark the bridged joints of a motion; mark the root for a bridged facing, which turns it."""
-    (insertion,) = motion.insertions
-    root = motion.skeleton.names[0]
-    named = ((root if bridge.joint == FACING else bridge.joint, bridge.move) for bridge in bridges)
-    return replace(motion, insertions=(replace(insertion, bridged=tuple(dict.fromkeys(named))),))
