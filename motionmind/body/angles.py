@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Ints
-from motionmind.geometry.single import about, length, product, rotation
+from motionmind.geometry.compiled import from_axis_angle, log, mul
 from motionmind.jit import jit
 
 
@@ -23,21 +23,17 @@ def swings_and_twists(turned: Floats, long: Ints, outer: Bools, rest: Floats, mi
     out = np.empty((len(turned), len(long), 3))
     for n in range(len(turned)):
         for joint in range(len(long)):
-            q, axis = rotation(turned[n, joint]), long[joint]
-            if mirrored[joint]:
-                q = q[0], -q[1], -q[2], q[3]
+            (x, y, z, w), axis = turned[n, joint], long[joint]
+            q = (x, -y, -z, w) if mirrored[joint] else (x, y, z, w)
             if rest[joint] != 0.0:
-                q = product(q, about((0.0, 0.0, 1.0), -rest[joint]))
+                q = mul(q, from_axis_angle((0.0, 0.0, 1.0), -rest[joint]))
             twist = 2.0 * np.arctan2(q[axis], q[3])
             twist -= 2.0 * np.pi * np.round(twist / (2.0 * np.pi))
             sine, cosine = np.sin(-0.5 * twist), np.cos(0.5 * twist)
             back = sine * (axis == 0), sine * (axis == 1), sine * (axis == 2), cosine
-            swing = product(back, q) if outer[joint] else product(q, back)
-            # As `rotations.log`.
-            side = length((swing[0], swing[1], swing[2]))
-            scale = 2.0 * np.arctan2(side, abs(swing[3])) / side if side > 1e-8 else 2.0
+            swing = log(mul(back, q) if outer[joint] else mul(q, back))
             for k in range(3):
-                out[n, joint, k] = -scale * swing[k] if swing[3] < 0.0 else scale * swing[k]
+                out[n, joint, k] = swing[k]
             out[n, joint, axis] = twist
     return out
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Floats, Ints
+from motionmind.geometry.compiled import mul, mul_vec
 from motionmind.jit import jit
 
 
@@ -18,12 +19,9 @@ def turn_with_parents(rotations: Floats, parents: Ints) -> None:
     """
     for t in range(len(rotations)):
         for joint in range(1, len(parents)):
-            ax, ay, az, aw = rotations[t, parents[joint]]
-            bx, by, bz, bw = rotations[t, joint]
-            rotations[t, joint, 0] = aw * bx + ax * bw + ay * bz - az * by
-            rotations[t, joint, 1] = aw * by - ax * bz + ay * bw + az * bx
-            rotations[t, joint, 2] = aw * bz + ax * by - ay * bx + az * bw
-            rotations[t, joint, 3] = aw * bw - ax * bx - ay * by - az * bz
+            turned = mul(rotations[t, parents[joint]], rotations[t, joint])
+            for k in range(4):
+                rotations[t, joint, k] = turned[k]
 
 
 @jit
@@ -39,13 +37,9 @@ def place_points(places: Floats, turned: Floats, joints: Ints, offsets: Floats) 
     for t in range(len(places)):
         for point in range(1, len(joints)):
             joint = joints[point]
-            x, y, z, w = turned[t, joint]
-            vx, vy, vz = offsets[point]
-            # As in `rotations.mul_vec`.
-            tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
-            places[t, point, 0] = places[t, joint, 0] + (vx + w * tx + (y * tz - z * ty))
-            places[t, point, 1] = places[t, joint, 1] + (vy + w * ty + (z * tx - x * tz))
-            places[t, point, 2] = places[t, joint, 2] + (vz + w * tz + (x * ty - y * tx))
+            offset = mul_vec(turned[t, joint], offsets[point])
+            for k in range(3):
+                places[t, point, k] = places[t, joint, k] + offset[k]
 
 
 @jit
@@ -59,10 +53,7 @@ def write_lowest(lowest: Floats, turned: Floats, joints: Ints, offsets: Floats) 
         heights[0] = lowest[t]
         for point in range(1, len(joints)):
             joint = joints[point]
-            x, y, z, w = turned[t, joint]
-            vx, vy, vz = offsets[point]
-            tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
-            heights[point] = heights[joint] + (vy + w * ty + (z * tx - x * tz))
+            heights[point] = heights[joint] + mul_vec(turned[t, joint], offsets[point])[1]
             lowest[t] = min(lowest[t], heights[point])
 
 
@@ -80,10 +71,6 @@ def weigh(places: Floats, turned: Floats, shares: Floats, centres: Floats, out: 
     for t in range(len(places)):
         out[t] = 0.0
         for joint in range(len(shares)):
-            x, y, z, w = turned[t, joint]
-            vx, vy, vz = centres[joint]
-            # As in `rotations.mul_vec`.
-            tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
-            out[t, 0] += shares[joint] * (places[t, joint, 0] + (vx + w * tx + (y * tz - z * ty)))
-            out[t, 1] += shares[joint] * (places[t, joint, 1] + (vy + w * ty + (z * tx - x * tz)))
-            out[t, 2] += shares[joint] * (places[t, joint, 2] + (vz + w * tz + (x * ty - y * tx)))
+            centre = mul_vec(turned[t, joint], centres[joint])
+            for k in range(3):
+                out[t, k] += shares[joint] * (places[t, joint, k] + centre[k])

@@ -362,18 +362,14 @@ def learn() -> None:
 
 
 def _read(clip: Motion) -> None:
-    """Read a clip from a file, as it would have been recorded, and turn the way of one that lasts minutes."""
-    import numpy as np
-
+    """Read a clip from a file, as if recorded."""
     from motionmind.body.plausibility import at_rate
     from motionmind.formats import read_motion, write_motion
-    from motionmind.geometry import rotations as rot
 
     with tempfile.TemporaryDirectory(prefix="motionmind-") as folder:
         path = Path(folder) / "clip.bvh"
         write_motion(path, at_rate(clip))
         read_motion(path)
-    rot.mul_vec(rot.IDENTITY, np.zeros((5000, 3)))
 
 
 def _realise(engine: Engine, carriage: Carriage) -> None:

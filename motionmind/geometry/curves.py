@@ -13,16 +13,16 @@ def natural_curve(times: Floats, values: Floats, at: Floats) -> Floats:
     """Return the natural cubic spline through values [K, m], two or more, at some times [N]: [N, m].
 
     Args:
-        times: of the knots, increasing [K].
-        values: at the knots.
+        times: times of the knots, increasing [K].
+        values: values at the knots.
         at: times to evaluate at.
     """
-    bends, out = bends_of(times, values), np.empty((len(at), values.shape[1]))
+    bends, out = second_derivatives(times, values), np.empty((len(at), values.shape[1]))
     for t in range(len(at)):
-        knot = piece_of(times, at[t])
+        knot = _piece_at(times, at[t])
         after, before = times[knot + 1] - at[t], at[t] - times[knot]
         step = after + before
-        # On each piece: the straight line, plus the contribution of both bends, which is 0 at its knots.
+        # The straight line, plus the contribution of both second derivatives, which is 0 at the knots.
         a, b = after**3 / step - step * after, before**3 / step - step * before
         for k in range(values.shape[1]):
             line = (values[knot, k] * after + values[knot + 1, k] * before) / step
@@ -31,13 +31,13 @@ def natural_curve(times: Floats, values: Floats, at: Floats) -> Floats:
 
 
 @jit
-def piece_of(times: Floats, at: float) -> int:
-    """Return the knot that begins the piece of a spline which a time lies in: beyond its ends, the outermost piece."""
+def _piece_at(times: Floats, at: float) -> int:
+    """Return the knot at which the spline piece around a time begins; beyond the ends, that of the outermost piece."""
     return min(max(int(np.searchsorted(times, at, side="right")) - 1, 0), len(times) - 2)
 
 
 @jit
-def bends_of(times: Floats, values: Floats) -> Floats:
+def second_derivatives(times: Floats, values: Floats) -> Floats:
     """Return the second derivatives [K, m] of the natural spline through values [K, m] at its knots.
 
     They solve the tridiagonal system h[i-1] M[i-1] + 2 (h[i-1] + h[i]) M[i] + h[i] M[i+1] = 6 (d[i] - d[i-1]), with

@@ -1,8 +1,9 @@
-"""Rotations as plain arrays of unit quaternions, shape [..., 4], in the order x, y, z, w.
+"""Rotations as arrays of unit quaternions [..., 4] in the order x, y, z, w.
 
 `q` and `-q` are the same rotation. `mul(a, b)` turns by `b` first, then by `a`, as matrices do, so a joint's
-global rotation is `mul(parent_global, local)`. Angles are in radians; leading dimensions broadcast. Formulas are those
-of Shoemake, "Animating rotation with quaternion curves", SIGGRAPH (1985), unless a function names another source.
+global rotation is `mul(parent_global, local)`. Angles are in radians; leading dimensions broadcast. Formulas come from
+Shoemake, "Animating rotation with quaternion curves", SIGGRAPH (1985), unless a function names another source. Compiled
+loops call the functions of the same names in `compiled`.
 
 >>> quarter = from_axis_angle([0.0, 1.0, 0.0], np.pi / 2)  # about the vertical, from +Z to +X
 >>> mul_vec(quarter, np.array([0.0, 0.0, 1.0])).round(6).tolist()
@@ -11,8 +12,7 @@ of Shoemake, "Animating rotation with quaternion curves", SIGGRAPH (1985), unles
 
 from __future__ import annotations
 
-from functools import cache, reduce
-from types import ModuleType
+from functools import reduce
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,22 +21,10 @@ from motionmind._typing import Floats
 
 IDENTITY: Floats = np.array([0.0, 0.0, 0.0, 1.0])
 IDENTITY.setflags(write=False)
-_MANY = 64  # items from which compiled code (`many`) does the same arithmetic
-_LEAST = 1e-12  # longer is what can be made a rotation
-
-
-@cache
-def _many() -> ModuleType:
-    """Return the loops over many rotations; numba is slow to import."""
-    from motionmind.geometry import many
-
-    return many
 
 
 def mul(a: Floats, b: Floats) -> Floats:
     """Return the product [..., 4]: the rotation `b` followed by the rotation `a`."""
-    if a.size >= 4 * _MANY or b.size >= 4 * _MANY:
-        return _product(a, b)
     ax, ay, az, aw = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
     bx, by, bz, bw = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
     x = aw * bx + ax * bw + ay * bz - az * by
@@ -48,29 +36,6 @@ def mul(a: Floats, b: Floats) -> Floats:
     return out
 
 
-def _product(a: Floats, b: Floats, of_a: float = 1.0, of_b: float = 1.0) -> Floats:
-    """Return the product [..., 4] of many rotations whose vector parts are of these signs: -1 inverts."""
-    shape = a.shape[:-1] if a.shape == b.shape else np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
-    out = np.empty((*shape, 4))
-    _many().multiply(_rows(a, shape), _rows(b, shape), of_a, of_b, out.reshape(-1, 4))
-    return out
-
-
-def _rows(x: Floats, shape: tuple[int, ...] | None = None) -> Floats:
-    """Return the rows of `x` [..., n] as compiled code takes them, in an array [N, n] that may be written to.
-
-    Those of a result of this shape may repeat them.
-    """
-    if shape is not None:
-        own = x.shape[:-1]
-        while own and own[0] == 1:
-            own = own[1:]
-        if own != shape[len(shape) - len(own) :]:
-            x = np.broadcast_to(x, (*shape, x.shape[-1]))
-    x = np.ascontiguousarray(x, dtype=np.float64).reshape(-1, x.shape[-1])
-    return x if x.flags.writeable else x.copy()
-
-
 def inv(q: Floats) -> Floats:
     """Return the inverse rotation [..., 4] of a unit quaternion [..., 4]."""
     return np.asarray(q * np.array([-1.0, -1.0, -1.0, 1.0]))
@@ -78,25 +43,16 @@ def inv(q: Floats) -> Floats:
 
 def inv_mul(a: Floats, b: Floats) -> Floats:
     """Return `inv(a) * b` [..., 4]: the rotation from `a` to `b`, in the frame of `a`."""
-    if a.size >= 4 * _MANY or b.size >= 4 * _MANY:
-        return _product(a, b, of_a=-1.0)
     return mul(inv(a), b)
 
 
 def mul_inv(a: Floats, b: Floats) -> Floats:
     """Return `a * inv(b)` [..., 4]: the rotation from `b` to `a`, in the outer frame."""
-    if a.size >= 4 * _MANY or b.size >= 4 * _MANY:
-        return _product(a, b, of_b=-1.0)
     return mul(a, inv(b))
 
 
 def mul_vec(q: Floats, v: Floats) -> Floats:
     """Return the vectors `v` [..., 3] turned by `q` [..., 4]."""
-    if q.size >= 4 * _MANY or v.size >= 3 * _MANY:
-        shape = np.broadcast_shapes(q.shape[:-1], v.shape[:-1])
-        out = np.empty((*shape, 3))
-        _many().turn(_rows(q, shape), _rows(v, shape), out.reshape(-1, 3))
-        return out
     # v + w t + u x t with t = 2 (u x v) and u the vector part: cheaper than two products of quaternions.
     u, w = q[..., :3], q[..., 3:]
     t = 2.0 * cross(u, v)
@@ -131,7 +87,7 @@ def normalise(q: ArrayLike) -> Floats:
     """
     q = np.asarray(q, dtype=np.float64)
     length = norm(q)
-    if not np.all(length > _LEAST):
+    if not np.all(length > 1e-12):
         raise ValueError("a quaternion of length zero is no rotation")
     return np.asarray(q / length[..., None])
 
@@ -182,14 +138,13 @@ def from_axis_angle(axis: ArrayLike, theta: ArrayLike) -> Floats:
 
 
 def from_euler(order: str, angles: Floats) -> Floats:
-    """Return the rotation [..., 4] of intrinsic turns about the axes in `order`, one after another.
+    """Return the rotation [..., 4] of intrinsic turns about the axes in `order`.
 
-    "ZXY" turns about z, then about the new x, then about the newest y: the product Rz Rx Ry, BVH's meaning of
-    channels in that order.
+    "ZXY" turns about z, then about the new x, then about the newest y: the product Rz Rx Ry, as BVH's channels do.
 
     Args:
         order: any number of letters x, y and z, in either case.
-        angles: of the turns [..., len(order)], radians.
+        angles: angles of the turns [..., len(order)], radians.
 
     >>> from_euler("ZY", np.array([0.0, np.pi])).round(6).tolist()
     [0.0, 1.0, 0.0, 0.0]
@@ -221,8 +176,7 @@ def to_euler(order: str, q: Floats) -> Floats:
         np.arctan2(sign * m[..., k, j], m[..., j, j]),
         np.arctan2(-sign * m[..., j, k], m[..., k, k]),
     )
-    # Taken from the rest after undoing the first turn: near the lock, where the first is ill-determined, the last
-    # compensates for it.
+    # Undo the first turn before taking the last, which then compensates for an ill-determined first near the lock.
     undone = np.cos(first)[..., None] * m[..., j, :] + sign * np.sin(first)[..., None] * m[..., k, :]
     last = np.where(locked, 0.0, np.arctan2(sign * undone[..., i], undone[..., j]))
     return np.stack([first, middle, last], axis=-1)
@@ -236,7 +190,7 @@ def to_matrix(q: Floats) -> Floats:
 def from_matrix(m: Floats) -> Floats:
     """Return the quaternions [..., 4] of rotation matrices [..., 3, 3].
 
-    Of four equivalent formulas the one with the largest divisor is used. Source: Shepperd, "Quaternion from rotation
+    Of four equivalent formulas, use the one with the largest divisor. Source: Shepperd, "Quaternion from rotation
     matrix", J. Guidance and Control 1:223 (1978).
     """
     xx, yy, zz = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
@@ -255,7 +209,7 @@ def from_matrix(m: Floats) -> Floats:
 def between(a: Floats, b: Floats) -> Floats:
     """Return the smallest rotation [..., 4] from the direction `a` [..., 3] to the direction `b` [..., 3].
 
-    For opposite directions the axis is ambiguous: one at right angles to `a` is taken.
+    For opposite directions, the axis is one at right angles to `a`.
     """
     a, b = (v / norm(v)[..., None] for v in (a, b))
     cosine = np.sum(a * b, axis=-1, keepdims=True)
@@ -266,7 +220,7 @@ def between(a: Floats, b: Floats) -> Floats:
 
 
 def slerp(a: Floats, b: Floats, t: ArrayLike) -> Floats:
-    """Return the rotation [..., 4] a share `t` [...] of the way from `a` to `b` [..., 4], the short way round.
+    """Return the rotation [..., 4] at a share `t` [...] of the shortest arc from `a` to `b` [..., 4].
 
     >>> round(float(heading(slerp(about_vertical(0.2), about_vertical(0.6), 0.25))), 6)
     0.3
@@ -275,10 +229,10 @@ def slerp(a: Floats, b: Floats, t: ArrayLike) -> Floats:
 
 
 def heading(q: Floats) -> Floats:
-    """Return the turn [...] about the vertical (y) in `q` [..., 4], radians: the twist of swing and twist.
+    """Return the twist [...] of `q` [..., 4] about the vertical (y), radians.
 
-    `q = mul(about_vertical(heading), swing)` with the swing's axis level. If `q` turns y upside down the twist is
-    undefined, and 0 is returned. Source: Dobrowolski, "Swing-twist decomposition in Clifford algebra",
+    `q = mul(about_vertical(heading), swing)`, and the swing's axis is level. Return 0 where `q` turns y upside down,
+    which leaves the twist undefined. Source: Dobrowolski, "Swing-twist decomposition in Clifford algebra",
     arXiv:1506.05481 (2015).
     """
     # The twist is the normalised projection of q on (y, w), whether it is applied before or after the swing.
@@ -294,7 +248,7 @@ def about_vertical(theta: ArrayLike) -> Floats:
 
 
 def mirror(q: Floats, axis: int = 0) -> Floats:
-    """Return `q` [..., 4] as seen in a mirror that reverses an axis: left and right (x, axis 0) by default."""
+    """Mirror `q` [..., 4] along an axis: left and right (x, axis 0) by default."""
     sign = np.array([-1.0, -1.0, -1.0, 1.0])
     sign[axis] = 1.0
     return np.asarray(q * sign)

@@ -1,4 +1,4 @@
-"""Distances between straight segments, for compiled loops."""
+"""Distances between line segments, for compiled loops."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import numpy as np
 from motionmind._typing import Floats
 from motionmind.jit import jit
 
-_SHORT = 1e-12  # square metres: a segment no longer than a micrometre is a point
+POINT_M2 = 1e-12  # square of the length up to which a segment counts as a point
 
 
 @jit
 def nearest_points(first: Floats, second: Floats) -> tuple[float, float, float]:
-    """Return the distance of two segments, and where along each its nearest point is, from 0 to 1.
+    """Return the distance between two segments, and the positions of the nearest points along each, 0 to 1.
 
     Source: Ericson, "Real-time collision detection" (2005), section 5.1.9.
 
     Args:
-        first: the ends of a segment [2, 3].
-        second: the ends of the other.
+        first: ends of a segment [2, 3].
+        second: ends of the other.
     """
     along_first = along_second = across = to_first = to_second = 0.0
     for k in range(3):
@@ -30,12 +30,12 @@ def nearest_points(first: Floats, second: Floats) -> tuple[float, float, float]:
         to_second += v * w
     s = 0.0
     square = along_first * along_second - across * across
-    if square > _SHORT * along_second:  # not parallel
+    if square > POINT_M2 * along_second:  # not parallel
         s = min(max((across * to_second - to_first * along_second) / square, 0.0), 1.0)
-    t = (across * s + to_second) / along_second if along_second > _SHORT else 0.0
-    if along_second <= _SHORT or t < 0.0 or t > 1.0:
+    t = (across * s + to_second) / along_second if along_second > POINT_M2 else 0.0
+    if along_second <= POINT_M2 or t < 0.0 or t > 1.0:
         t = min(max(t, 0.0), 1.0)
-        s = min(max((across * t - to_first) / along_first, 0.0), 1.0) if along_first > _SHORT else 0.0
+        s = min(max((across * t - to_first) / along_first, 0.0), 1.0) if along_first > POINT_M2 else 0.0
     total = 0.0
     for k in range(3):
         gap = first[0, k] + s * (first[1, k] - first[0, k]) - second[0, k] - t * (second[1, k] - second[0, k])

@@ -18,8 +18,8 @@ def natural_spline(times: Floats, values: Floats, at: Floats) -> Floats:
     constant.
 
     Args:
-        times: of the knots, increasing [K].
-        values: at the knots [K, ...].
+        times: times of the knots, increasing [K].
+        values: values at the knots [K, ...].
         at: times to evaluate at [N].
 
     Returns:
@@ -37,13 +37,13 @@ def rotation_spline(times: Floats, keys: Floats, at: Floats) -> Floats:
     """Evaluate a twice continuously differentiable curve of rotations through keys.
 
     Around each key, take the natural spline of the rotation vectors from it to all keys (the chart of SO(3) centred
-    there), unrolled so that neighbouring keys lie within half a turn of each other. Between two keys the curve blends
-    from the one's spline to the other's, by a weight whose first two derivatives are 0 at both. It is exact at the
-    keys; for keys that turn about one axis all charts agree, and it is the spline of their angle. A single chart would
-    not do: it ends a whole turn from its centre, where vectors in all directions are the same rotation.
+    there), unrolled so that neighbouring keys lie within half a turn of each other. Between two keys, blend from the
+    first one's spline to the second one's, by a weight whose first two derivatives are 0 at both. The curve is exact at
+    the keys; for keys that turn about one axis all charts agree on the spline of their angle. A single chart does not
+    suffice: it ends a whole turn from its centre, where vectors in all directions are the same rotation.
 
     Args:
-        times: of the keys, increasing [K].
+        times: times of the keys, increasing [K].
         keys: unit quaternions [K, ..., 4].
         at: times to evaluate at [N].
 
@@ -62,6 +62,6 @@ def rotation_spline(times: Floats, keys: Floats, at: Floats) -> Floats:
 
 
 def _floats(x: Floats) -> Floats:
-    """Return an array as compiled code takes it: in one piece, and one that may be written to."""
+    """Return a contiguous, writable array, the kind for which the loops are compiled."""
     x = np.ascontiguousarray(x, dtype=np.float64)
     return x if x.flags.writeable else x.copy()

@@ -103,11 +103,15 @@ def _joined(parts: Sequence[tuple[Floats, Ints, Floats]]) -> Frames:
     """Concatenate stretches of frames."""
     chains, postures, times = (np.concatenate(found) for found in zip(*parts, strict=True))
     stretches = np.repeat(np.arange(len(parts)), [len(found) for found, _, _ in parts])
-    rates = RATE * rot.log(rot.inv_mul(chains[:-1], chains[1:]))
-    rates = np.concatenate([rates, np.zeros((1, *rates.shape[1:]))])
-    ends = np.flatnonzero(np.diff(stretches, append=len(parts)) > 0)
-    rates[ends] = np.where((np.diff(ends, prepend=-1) > 1)[:, None, None], rates[ends - 1], 0.0)  # lone frames rest
+    rates = np.concatenate([_rates(found) for found, _, _ in parts])
     return Frames(np.ascontiguousarray(chains), stretches, postures, times, rates)
+
+
+def _rates(chains: Floats) -> Floats:
+    """Return angular velocities [n, L, 3], radians per second, to the next frame; at the last, the one before."""
+    rates = RATE * rot.log(rot.inv_mul(chains[:-1], chains[1:]))
+    last = rates[-1:] if len(rates) else np.zeros((1, *chains.shape[1:-1], 3))
+    return np.concatenate([rates, last])
 
 
 def frames_of(corpus: Corpus, clip: int, begin: float, end: float) -> Frames:

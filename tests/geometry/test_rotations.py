@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import doctest
-from collections.abc import Callable
 from itertools import permutations
 from types import ModuleType
 
@@ -262,50 +261,3 @@ def test_examples_in_docstrings_hold(module: ModuleType) -> None:
     found = doctest.testmod(module)
     assert found.attempted > 0
     assert found.failed == 0
-
-
-# --- many at once -----------------------------------------------------------------------------------------------------
-
-
-def _of_all_signs(count: int) -> Floats:
-    """Rotations [count, 4], some about one axis alone and some of no turn, with zeros of either sign."""
-    q = some(count)
-    q[::5] = rot.from_axis_angle(UP, _angles(len(q[::5]), 3))
-    q[::7] = rot.IDENTITY
-    q[1::7] *= -1.0
-    return q
-
-
-_MANY, _FEW = rot._MANY + 53, 200  # only of the former does compiled code do it
-
-
-@pytest.mark.parametrize(
-    "function",
-    [
-        rot.mul,
-        rot.inv_mul,
-        rot.mul_inv,
-        rot.angle,
-        lambda a, b: rot.slerp(a, b, 0.3),
-        lambda a, b: rot.mul_vec(a, b[:, :3]),
-        lambda a, _: rot.to_matrix(a),
-    ],
-)
-def test_what_is_computed_of_many_is_to_the_bit_what_is_computed_of_a_few(
-    function: Callable[[Floats, Floats], Floats],
-) -> None:
-    a, b = _of_all_signs(_MANY), _of_all_signs(_MANY)[::-1]
-    few = [function(a[start : start + _FEW], b[start : start + _FEW]) for start in range(0, _MANY, _FEW)]
-    assert function(a, b).tobytes() == np.concatenate(few).tobytes()
-
-
-@pytest.mark.parametrize("shape", [(4,), (23, 4), (1, 23, 4), (100, 1, 4), (1, 1, 4), (100, 23, 4)])
-def test_many_products_broadcast_as_few_do(shape: tuple[int, ...]) -> None:
-    every = _of_all_signs(2300)
-    a, b = every[: np.prod(shape[:-1], dtype=int)].reshape(shape), every[::-1].reshape(100, 23, 4)
-    assert len(every) > rot._MANY
-    a.setflags(write=False)
-    whole = np.broadcast_to(a, b.shape)
-    for function in (rot.mul, rot.inv_mul, lambda q, v: rot.mul_vec(q, v[..., :3])):
-        rows = np.stack([function(one, other) for one, other in zip(whole, b, strict=True)])
-        assert function(a, b).tobytes() == rows.tobytes()
