@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from motionmind._typing import Floats, Ints
+from motionmind.body.ik import chain_to, reach
 from motionmind.body.motion import Motion, Posture
-from motionmind.body.reaching import chain_to, reach
 from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
 from motionmind.search.solve import Progress, Watch

@@ -8,13 +8,13 @@ import numpy as np
 
 from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.contact import heels_of
+from motionmind.body.joint_angles import JointAngles
 from motionmind.body.mirror import mirrored
 from motionmind.body.motion import Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError, suggestion
 from motionmind.geometry import rotations as rot
-from motionmind.studio.joint_angles import JointAngles
 
 # Joints to drag, with everyday words for them.
 _HANDLES = {

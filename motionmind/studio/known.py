@@ -11,7 +11,7 @@ from motionmind.body.contact import contact_points
 from motionmind.body.motion import Posture
 from motionmind.discretize.states import nearest
 from motionmind.geometry import rotations as rot
-from motionmind.studio.reach import drag, place_of, plant, standing_soles
+from motionmind.studio.reach import drag, plant, position_of, standing_soles
 
 if TYPE_CHECKING:
     from motionmind.learned.learning import Learned
@@ -68,7 +68,7 @@ class Memory:
         planted = plant(found, posture)
         held = planted
         if kept is not None:
-            held = drag(planted, kept, place_of(posture, kept))
+            held = drag(planted, kept, position_of(posture, kept))
         return next((one for one in (held, planted) if "unseen" not in self.known(one)), found)
 
     def bring_whole(self, posture: Posture) -> tuple[Posture, str, float]:

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from motionmind._typing import Floats
+from motionmind.body.ik import chain_to, reach
 from motionmind.body.motion import Motion
-from motionmind.body.reaching import chain_to, reach
 from motionmind.body.skeleton import Skeleton
 from motionmind.display import displayed
 from motionmind.geometry import rotations as rot

@@ -9,12 +9,12 @@ from motionmind import Engine
 from motionmind._typing import Floats
 from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.contact import contact_points
+from motionmind.body.joint_angles import JointAngles
 from motionmind.body.motion import Posture
 from motionmind.geometry import rotations as rot
 from motionmind.names.finding import open_collection
 from motionmind.names.spelling import Source
-from motionmind.studio.joint_angles import JointAngles
-from motionmind.studio.reach import drag, place_of, put_on_floor, standing_feet, standing_soles
+from motionmind.studio.reach import drag, position_of, put_on_floor, standing_feet, standing_soles
 
 MILLIMETRE = 1e-3
 DRAGS = [("left_wrist", 0.12), ("right_elbow", 0.1), ("atlantal", 0.06), ("right_ankle", 0.1), ("pelvis", 0.08)]
@@ -177,29 +177,29 @@ def test_a_heel_that_is_dragged_up_raises_the_body_over_the_balls_that_stay(ball
     posture = _standing(ballet, name)
     feet, skeleton = standing_feet(posture), posture.skeleton
     heels = [foot.replace("toes", "heel") for foot in feet]
-    up = place_of(posture, heels[0]) + np.array([0.0, 0.09, 0.0])
+    up = position_of(posture, heels[0]) + np.array([0.0, 0.09, 0.0])
     risen = drag(posture, heels[0], up)
     for foot, heel in zip(feet, heels, strict=True):  # both, where both stand
-        assert abs(place_of(risen, heel)[1] - up[1]) < MILLIMETRE
+        assert abs(position_of(risen, heel)[1] - up[1]) < MILLIMETRE
         assert np.linalg.norm(_place(risen, foot) - _place(posture, foot)) < MILLIMETRE
     assert _place(risen, "atlantal")[1] - _place(posture, "atlantal")[1] > 0.05
     knees = [skeleton.index(foot.replace("toes", "knee")) for foot in feet]
     assert np.degrees(rot.angle(risen.rotations[knees], posture.rotations[knees])).max() < 15.0
     assert standing_feet(risen) == feet
     back = drag(risen, heels[0], up - np.array([0.0, 0.09, 0.0]))
-    assert max(abs(place_of(back, heel)[1] - place_of(posture, heel)[1]) for heel in heels) < MILLIMETRE
+    assert max(abs(position_of(back, heel)[1] - position_of(posture, heel)[1]) for heel in heels) < MILLIMETRE
 
 
 def test_a_heel_rises_alone_where_the_other_foot_may_leave(ballet: Engine) -> None:
     posture = _standing(ballet, "first")
-    up = place_of(posture, "left_heel") + np.array([0.0, 0.09, 0.0])
+    up = position_of(posture, "left_heel") + np.array([0.0, 0.09, 0.0])
     alone = drag(posture, "left_heel", up, standing=["left_toes"])
-    assert abs(place_of(alone, "left_heel")[1] - up[1]) < MILLIMETRE
-    assert place_of(alone, "right_heel")[1] < up[1] - MILLIMETRE  # it hangs where the body takes it
+    assert abs(position_of(alone, "left_heel")[1] - up[1]) < MILLIMETRE
+    assert position_of(alone, "right_heel")[1] < up[1] - MILLIMETRE  # it hangs where the body takes it
 
 
 def test_the_heel_of_a_foot_in_the_air_goes_where_it_is_dragged(ballet: Engine) -> None:
     posture = _standing(ballet, "arabesque")
     heel = next(f"{side}_heel" for side in ("left", "right") if f"{side}_toes" not in standing_feet(posture))
-    place = place_of(posture, heel) + np.array([0.05, -0.05, 0.05])
-    assert np.linalg.norm(place_of(drag(posture, heel, place), heel) - place) < MILLIMETRE
+    place = position_of(posture, heel) + np.array([0.05, -0.05, 0.05])
+    assert np.linalg.norm(position_of(drag(posture, heel, place), heel) - place) < MILLIMETRE

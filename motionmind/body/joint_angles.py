@@ -1,4 +1,4 @@
-"""Joint angles for editing a posture: anatomical angles within limits, or free rotations from the given posture.
+"""Joint angles as parameters of a posture: anatomical angles within limits, or free rotations from a posture.
 
 A body with an anatomy has anatomical angles (`motionmind.body.anatomy`): a knee only bends, so it never turns aside.
 Limits are widened to the edited posture, because dancers exceed the tables. The joints of any other body turn freely
@@ -16,10 +16,6 @@ from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 
-_STEP = 1e-6  # radians of the finite differences
-_HALF = np.pi - 1e-6  # radians of a swing, at most: half a turn
-_ROUND = 2.0 * np.pi - 1e-9  # radians of a range that is a full turn, thus no limit
-
 
 class JointAngles:
     """The angles of a body's joints, radians, and their limits around given postures.
@@ -32,16 +28,17 @@ class JointAngles:
         frames: the joint in whose frame each joint's angles are measured [J]; -1 for the world.
     """
 
-    def __init__(self, skeleton: Skeleton, given: Floats) -> None:
+    def __init__(self, skeleton: Skeleton, given: Floats, *, anatomical: bool = True) -> None:
         """Set up the angles around postures.
 
         Args:
             skeleton: the body.
             given: local rotations [G, J, 4] of postures, to which the limits are widened; joints without an anatomy
                 turn from their rotations in the first.
+            anatomical: whether joints have the angles and limits of the body's anatomy, if it has one.
         """
         self.skeleton = skeleton
-        self._anatomy, self._rest = anatomy_of(skeleton), given[0]
+        self._anatomy, self._rest = anatomy_of(skeleton) if anatomical else None, given[0]
         self.frames: Ints = np.array(skeleton.parents)
         self.swings: Bools = np.ones((len(skeleton), 3), dtype=np.bool_)
         if self._anatomy is None:
@@ -56,7 +53,7 @@ class JointAngles:
         angles = self.of(given)
         least, most = np.radians(self._anatomy.limits)
         self.free = np.isfinite(least)
-        unlimited = most - least >= _ROUND
+        unlimited = most - least >= 2.0 * np.pi - 1e-9  # a full turn
         self.least = np.where(unlimited, -np.inf, np.minimum(least, angles.min(axis=0)))
         self.most = np.where(unlimited, np.inf, np.maximum(most, angles.max(axis=0)))
 
@@ -70,7 +67,8 @@ class JointAngles:
         """Clip angles [J, 3] to their limits, and swings to half a turn, beyond which they mean another rotation."""
         angles = np.clip(angles, self.least, self.most)
         swing = rot.norm(np.where(self.swings, angles, 0.0))[:, None]
-        return np.where(self.swings & (swing > _HALF), angles * (_HALF / np.maximum(swing, _HALF)), angles)
+        most = np.pi - 1e-6  # radians
+        return np.where(self.swings & (swing > most), angles * (most / np.maximum(swing, most)), angles)
 
     def rotations(self, angles: Floats) -> Floats:
         """Return local rotations [..., J, 4] of angles [..., J, 3]."""
@@ -85,11 +83,12 @@ class JointAngles:
 
         Axes are in world coordinates; their length is the joint's rotation in radians per radian of the angle.
         """
-        steps = np.concatenate([np.zeros((1, 3)), _STEP * np.eye(3)])
+        small = 1e-6  # radians of the finite differences
+        steps = np.concatenate([np.zeros((1, 3)), small * np.eye(3)])
         turned = self.skeleton.global_rotations(self.rotations(angles + steps[:, None, :]))
         frames = np.where((self.frames >= 0)[:, None], turned[:, self.frames], rot.IDENTITY)
         own = rot.inv_mul(frames, turned)
-        axes = rot.mul_vec(frames[0], rot.log(rot.mul_inv(own[1:], own[0])) / _STEP)
+        axes = rot.mul_vec(frames[0], rot.log(rot.mul_inv(own[1:], own[0])) / small)
         return turned[0], np.swapaxes(axes, 0, 1)
 
     @cached_property

@@ -7,7 +7,7 @@ import pytest
 
 from motionmind._typing import Floats
 from motionmind.body.human import human23, human44
-from motionmind.body.reaching import chain_to, reach
+from motionmind.body.ik import chain_to, reach
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 
