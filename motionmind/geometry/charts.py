@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Floats, Ints
-from motionmind.geometry.compiled import exp, inv_mul, log, mul, norm
+from motionmind.geometry.compiled import Vector, exp, inv_mul, log, mul, norm
 from motionmind.geometry.curves import second_derivatives
 from motionmind.jit import jit
 
@@ -94,7 +94,7 @@ def _vectors_around(keys: Floats, centre: int, first: int, last: int) -> Floats:
 
 
 @jit
-def _unrolled(v: Floats, toward: Floats) -> tuple[float, float, float]:
+def _unrolled(v: Vector, toward: Floats) -> Vector:
     """Return a rotation vector with whole turns added so that it is nearest to another."""
     angle = norm(v)
     # A zero vector may be a whole turn about any axis: take its neighbour's, if that is not zero too.
