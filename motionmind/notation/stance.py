@@ -14,10 +14,8 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.anatomy import SIDES, Anatomy, Leg
 from motionmind.geometry import rotations as rot
 
-ON_BALL = 24.0  # degrees of a lifted heel from which the ball alone bears the weight
-MAX_ROUNDS = 60  # of moving the pelvis; each leaves about a fifth of the imbalance
-BALANCED = 1e-7  # metres of imbalance at which the rounds end
-HIGHEST = np.radians(120.0)  # to which a touching leg is raised
+ON_BALL_DEG = 24.0  # lift of a heel from which the ball alone bears the weight
+MAX_RAISE_RAD = np.radians(120.0)  # of a touching leg
 
 
 @dataclass(frozen=True)
@@ -148,14 +146,14 @@ def place_legs(body: Anatomy, leg: Leg, rotations: Floats, feet: Feet) -> Stance
     # Between two straight legs a tiny shift of the pelvis bends one knee or the other, by its square root. If the error
     # changes sign without shrinking, the step is halved.
     error, step = np.zeros_like(shift), np.ones_like(shift)
-    for _ in range(MAX_ROUNDS):
+    for _ in range(60):  # each leaves about a fifth of the imbalance
         root, shortfall = _stand(bones, legs, out, pelvis, hips - middle[:, None], shift, feet)
         root = root - middle
         shortfall += _touch(bones, legs, out, root, hips)
         previous, error = error, body.centre_of_mass(out, root)[:, [0, 2]] - support
         error = np.where((stands & (total[:, 0] > 0.0))[:, None], error - feet.lean, 0.0)
         step = np.where((error * previous < 0.0) & (np.abs(error) > 0.5 * np.abs(previous)), 0.5 * step, step)
-        far = np.abs(error).max(axis=1) > BALANCED
+        far = np.abs(error).max(axis=1) > 1e-7  # metres
         if not far.any():
             break
         # Balanced postures stay, so no posture depends on the others.
@@ -171,11 +169,11 @@ def _ball(bones: _Bones, feet: Feet, side: int) -> Floats:
 def _support(bones: _Bones, feet: Feet, shares: Floats) -> Floats:
     """Return the point on the floor [T, 2], left and ahead, over which the centre of mass belongs, metres.
 
-    A flat foot supports halfway between ankle and ball, one whose heel is lifted by `ON_BALL` or more at its ball.
+    A flat foot supports halfway between ankle and ball, one whose heel is lifted by `ON_BALL_DEG` or more at its ball.
     """
     out = np.zeros((len(shares), 2))
     for side, sign in enumerate((1.0, -1.0)):
-        back = 0.5 * bones.toes[2] * (1.0 - np.clip(np.degrees(feet.heel[:, side]) / ON_BALL, 0.0, 1.0))
+        back = 0.5 * bones.toes[2] * (1.0 - np.clip(np.degrees(feet.heel[:, side]) / ON_BALL_DEG, 0.0, 1.0))
         ball, turn = _ball(bones, feet, side), feet.turn[:, side]
         place = np.stack([sign * (ball[:, 0] - back * np.sin(turn)), ball[:, 2] - back * np.cos(turn)], axis=-1)
         out += shares[:, side, None] * np.where(feet.stands[:, side, None], place, 0.0)
@@ -203,7 +201,7 @@ def _stand(
     for side, (sign, leg) in enumerate(zip((1.0, -1.0), legs, strict=True)):
         hip = np.array([sign, 1.0, 1.0]) * hips[:, side]
         hip += np.stack([sign * shift[:, 0], height, shift[:, 1]], axis=-1)
-        thigh, knee = _reach(bones, leg.ankle - hip, feet.knee[:, side])
+        thigh, knee = _two_bone_ik(bones, leg.ankle - hip, feet.knee[:, side])
         mirrored_pelvis = pelvis if side == 0 else rot.mirror(pelvis)
         joints = np.stack(
             [
@@ -237,11 +235,13 @@ def _hip_height(legs: list[_Leg], hips: Floats, shift: Floats, feet: Feet) -> tu
     return np.where(np.isfinite(height), height, 0.0), short
 
 
-def _reach(bones: _Bones, target: Floats, towards: Floats) -> tuple[Floats, Floats]:
+def _two_bone_ik(bones: _Bones, target: Floats, towards: Floats) -> tuple[Floats, Floats]:
     """Solve for the rotations of hip and knee [T, 4] that bring the ankle to `target` [T, 3] relative to the hip.
 
-    The knee points `towards` [T] radians outward: thigh, shank and that direction are coplanar. By the law of cosines;
-    the ankle may lie off the shank's axis.
+    The knee points `towards` [T] radians outward: thigh, shank and that direction are coplanar. The ankle may lie off
+    the shank's axis. Closed form, by the law of cosines: the rounds of `place_legs` need the exact ankle. Source:
+    Tolani, Goswami and Badler, "Real-time inverse kinematics techniques for anthropomorphic limbs", Graphical Models
+    62 (2000).
     """
     thigh, shank = -bones.knee[1], float(np.hypot(bones.ankle[1], bones.ankle[2]))
     slant = np.arctan2(bones.ankle[2], -bones.ankle[1])
@@ -286,7 +286,7 @@ def _angle_off_floor(leg: _Leg, floor: Floats) -> Floats:
     far = np.hypot(leg.up, leg.ahead)
     share = np.clip(-floor[:, None] / np.maximum(far, 1e-9), -1.0, 1.0)
     leaves = np.arctan2(-leg.ahead, -leg.up) + np.arccos(share)
-    return np.asarray(np.where(share < 1.0, leaves, 0.0).max(axis=-1).clip(0.0, HIGHEST))
+    return np.asarray(np.where(share < 1.0, leaves, 0.0).max(axis=-1).clip(0.0, MAX_RAISE_RAD))
 
 
 def _foot_points(bones: _Bones, joints: Floats) -> Floats:
