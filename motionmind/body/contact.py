@@ -28,10 +28,6 @@ RATE = 30.0  # frames a second at which feet are measured
 LOW = 0.05  # metres above the floor below which a foot should stand
 FAR = 0.025  # metres that a standing foot may move from one frame to the next
 TALL = 1.0  # metres: of bodies at least as tall it is known how far a foot may move
-STAYS = 0.05  # metres that a foot which stays in its place may slide, as it rolls
-_SOFT = 0.025  # metres above the floor at which Zhang et al. stop counting a slide
-_NEAR = 0.1  # of the body's height: how near a leaf must end, at rest, to the lowest point to be a foot
-_FLOOR = 0.05  # share of the frames whose lowest point lies at or below the floor
 
 
 class Heel(NamedTuple):
@@ -215,7 +211,7 @@ def floor_height(lowest: Floats) -> float:
 
     A recording's own zero is often off: the floor is the 5 % quantile of the lowest point's height.
     """
-    return float(np.quantile(lowest, _FLOOR))
+    return float(np.quantile(lowest, 0.05))
 
 
 def find_floor(skeleton: Skeleton, rotations: Floats, root: Floats, *, heels: bool = False) -> float:
@@ -241,7 +237,7 @@ def find_feet(skeleton: Skeleton) -> list[int]:
     """
     at_rest = skeleton.rest[:, 1]
     ends = np.minimum(at_rest[: len(skeleton)], at_rest[len(skeleton) :])
-    low = ends.min() + _NEAR * np.ptp(at_rest)
+    low = ends.min() + 0.1 * np.ptp(at_rest)
     return [joint for joint in range(len(skeleton)) if not skeleton.children(joint) and ends[joint] <= low]
 
 
@@ -301,7 +297,7 @@ def feet_that_stay(skeleton: Skeleton, rotations: Floats, root: Floats, floor: f
     """
     moved, height = _foot_ends(skeleton, skeleton.positions_and_tips(rotations, root), floor)
     least = np.where(height < LOW, moved, np.inf).min(axis=-1)
-    return np.asarray(least.sum(axis=0) <= STAYS)
+    return np.asarray(least.sum(axis=0) <= 0.05)  # metres that a foot may slide as it rolls
 
 
 def foot_slide(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float = 0.0) -> float:
@@ -319,7 +315,7 @@ def foot_slide(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float
         floor: height of the floor, metres; for a recording, from `find_floor`.
     """
     moved, height = _foot_ends(skeleton, skeleton.positions_and_tips(rotations, root), floor)
-    share = np.clip(2.0 - 2.0 ** (height / _SOFT), 0.0, 1.0)
+    share = np.clip(2.0 - 2.0 ** (height / 0.025), 0.0, 1.0)
     least = np.where(share > 0.0, moved * share, np.inf).min(axis=-1)
     return float(100.0 * np.where(np.isfinite(least), least, 0.0).mean()) if least.size else 0.0
 

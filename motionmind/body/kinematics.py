@@ -11,11 +11,11 @@ from motionmind.jit import jit
 
 @jit
 def turn_with_parents(rotations: Floats, parents: Ints) -> None:
-    """Turn local rotations [N, J, 4] into those in the world, in place: each becomes its parent's times its own.
+    """Convert local rotations [N, J, 4] to world rotations in place: multiply each by its parent's.
 
     Args:
         rotations: unit quaternions of the joints.
-        parents: of the joints [J], each before its children; the first has none.
+        parents: parents of the joints [J], each before its children; the first has none.
     """
     for t in range(len(rotations)):
         for joint in range(1, len(parents)):
@@ -26,13 +26,13 @@ def turn_with_parents(rotations: Floats, parents: Ints) -> None:
 
 @jit
 def place_points(places: Floats, turned: Floats, joints: Ints, offsets: Floats) -> None:
-    """Place points [N, P, 3] but for the first, which is in its place: each at an offset from its joint's own.
+    """Place all points [N, P, 3] but the first, which is given: each at an offset from its joint.
 
     Args:
-        places: of the points, metres; the first J are the joints themselves.
+        places: positions of the points, metres; the first J are the joints themselves.
         turned: orientations of the joints in the world [N, J, 4].
-        joints: those in whose frames the points are [P], each before its points.
-        offsets: places of the points in these frames [P, 3], metres.
+        joints: the joint in whose frame each point is [P]; joints come before their points.
+        offsets: positions of the points in these frames [P, 3], metres.
     """
     for t in range(len(places)):
         for point in range(1, len(joints)):
@@ -44,7 +44,7 @@ def place_points(places: Floats, turned: Floats, joints: Ints, offsets: Floats) 
 
 @jit
 def write_lowest(lowest: Floats, turned: Floats, joints: Ints, offsets: Floats) -> None:
-    """Write the heights [N] of the lowest of points, metres, that `place_points` places, over those of the first.
+    """Write the heights [N] of the lowest points of `place_points`, metres, over those of the first points.
 
     Other arguments are as there.
     """
@@ -62,10 +62,10 @@ def weigh(places: Floats, turned: Floats, shares: Floats, centres: Floats, out: 
     """Write the centres of mass [N, 3] of bodies, metres.
 
     Args:
-        places: of the joints, and whatever points after them [N, P, 3], metres.
+        places: positions of the joints, then of any other points [N, P, 3], metres.
         turned: orientations of the joints in the world [N, J, 4].
-        shares: of the body's mass that the joints' segments have [J].
-        centres: of mass of the segments in the joints' frames [J, 3], metres.
+        shares: the segments' shares of the body's mass [J].
+        centres: centres of mass of the segments in the joints' frames [J, 3], metres.
         out: the centres of mass.
     """
     for t in range(len(places)):

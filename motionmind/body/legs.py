@@ -15,13 +15,13 @@ from motionmind.geometry import rotations as rot
 
 @remembered
 def find_legs(skeleton: Skeleton) -> tuple[list[int], list[tuple[list[int], int]]]:
-    """Find the legs of a body: limbs of two bones or more that hang from the root, or from the first fork below it.
+    """Find the legs of a body: limbs of at least two bones at the root, or at the first fork below it.
 
     Args:
         skeleton: the body.
 
     Returns:
-        The legs' numbers in `limbs_of`; and for each leg its joints, outward, and the place among them of its knee, the
+        The legs' indices in `limbs_of`; and for each leg its joints, outward, and the index among them of its knee, the
         joint between its two longest neighbouring bones.
     """
     numbers, out, above = [], [], stem_of(skeleton)[-1]
@@ -38,9 +38,9 @@ def find_legs(skeleton: Skeleton) -> tuple[list[int], list[tuple[list[int], int]
 
 
 def find_hinge(skeleton: Skeleton, knee: int) -> Floats | None:
-    """Return the axis [3] about which a knee bends, in its own frame; None where nothing is known of the body's joints.
+    """Return the axis [3] about which a knee bends, in its own frame; None without an anatomy.
 
-    It is that of the angle with the greatest range, in the sense in which the joint goes farther.
+    It is the axis of the angle with the greatest range, in the sense of the larger limit.
     """
     anatomy = anatomy_of(skeleton)
     if anatomy is None:
@@ -49,6 +49,6 @@ def find_hinge(skeleton: Skeleton, knee: int) -> Floats | None:
     joint, described = anatomy.anatomy(name)
     angle = max(described.angles.values(), key=lambda one: one.range[1] - one.range[0])
     axis = np.eye(3)[angle.axis] * angle.sign * np.sign(sum(angle.range))
-    # A turn is mirrored as its axis is, and reversed.
+    # Mirroring a rotation mirrors its axis and reverses its sense.
     mirrored = anatomy.paired(joint) and name.startswith("right_")
     return np.asarray(axis * np.array([1.0, -1.0, -1.0]) if mirrored else axis)

@@ -1,4 +1,4 @@
-"""Joint limits: find the joints that a corpus bends beyond them, and bring others back within them."""
+"""Joint limits: find the joints that a corpus bends beyond them, and clip the angles of others."""
 
 from __future__ import annotations
 
@@ -10,25 +10,21 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.skeleton import Skeleton
 
-BEYOND = 5.0  # degrees past a limit from which a posture breaks it
-RARE = 0.01  # share of postures that may break a limit
-_BLOCK = 4096  # postures whose angles are looked at at a time
-
 
 def within_limits(
     skeleton: Skeleton, rotations: Floats, given: Floats, loose: Bools, joints: Sequence[int] | None = None
 ) -> Floats:
-    """Return the same movement, local rotations [T, J, 4], without angles beyond the limits of its joints.
+    """Clip a movement, local rotations [T, J, 4], to the limits of its joints.
 
-    Limits are those of the anatomy of human23 or human44, widened to the angles of the given postures. Angles are
-    clipped one by one, as swing and twist. A body of another kind is returned unchanged.
+    Limits are those of the anatomy of human23 or human44, widened to the angles of the given postures. Swing and twist
+    angles are clipped one by one. Other bodies have no limits.
 
     Args:
         skeleton: the body.
         rotations: local rotations [T, J, 4].
-        given: local rotations of postures that are right as they are [G, J, 4].
+        given: local rotations of postures that define the widened limits [G, J, 4].
         loose: joints without limits [J].
-        joints: those that may be beyond their limits; None for all.
+        joints: the joints to clip; None for all.
     """
     from motionmind.body.angles import find_beyond  # numba is slow to import
 
@@ -53,16 +49,16 @@ def within_limits(
 
 
 def find_loose(skeleton: Skeleton, rotations: Floats) -> Bools:
-    """Return which joints [J] break their limits by more than BEYOND in more than RARE of the postures [N, J, 4].
+    """Return which joints [J] break their limits by more than 5 degrees in over 1 % of postures [N, J, 4].
 
-    Movement brought over from another rig need not bend as the body's anatomy does.
+    Movement retargeted from another rig may exceed the anatomy's limits.
     """
     anatomy = anatomy_of(skeleton)
     if anatomy is None:
         return np.zeros(len(skeleton), dtype=np.bool_)
     least, most = anatomy.limits
     counts = np.zeros(len(skeleton), dtype=np.int64)
-    for start in range(0, len(rotations), _BLOCK):
-        degrees = anatomy.degrees(rotations[start : start + _BLOCK])
-        counts += np.any((degrees < least - BEYOND) | (degrees > most + BEYOND), axis=-1).sum(axis=0)
-    return np.asarray(counts / len(rotations) > RARE)
+    for start in range(0, len(rotations), 4096):
+        degrees = anatomy.degrees(rotations[start : start + 4096])
+        counts += np.any((degrees < least - 5.0) | (degrees > most + 5.0), axis=-1).sum(axis=0)
+    return np.asarray(counts / len(rotations) > 0.01)

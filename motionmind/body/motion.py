@@ -38,11 +38,10 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-_AT_ONCE = 4096  # frames that are interpolated at a time
-_MOMENT = 1e-6  # seconds: times no further apart count as equal
+SAME_TIME_S = 1e-6  # times no further apart count as equal
 # Seconds over which a velocity is taken. In a dancer's recordings, at 30 and at 120 frames a second, a line over this
 # time is nearest to the movement on both sides of its end: a shorter one has more noise, a longer one is out of date.
-_VELOCITY_SPAN = 1.0 / 15.0
+VELOCITY_SPAN_S = 1.0 / 15.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +178,7 @@ class Motion:
         # A file's name may hold bytes that are not text, which no format can write.
         object.__setattr__(self, "name", self.name.encode("utf-8", "replace").decode())
         for before, after in pairwise(self.insertions):
-            if after.times[0] < before.times[-1] - _MOMENT:
+            if after.times[0] < before.times[-1] - SAME_TIME_S:
                 raise MotionMindError(f"{self.name or 'motion'}: insertions must follow one another")
         for joint, _ in (bridge for insertion in self.insertions for bridge in insertion.bridged):
             if joint not in self.skeleton.names:
@@ -228,7 +227,7 @@ class Motion:
         """Return which frames [T] the engine made: those between the A and the B of an insertion."""
         found = np.zeros(len(self), dtype=bool)
         for one in self.insertions:
-            found |= (self.times > one.times[0] + _MOMENT) & (self.times < one.times[-1] - _MOMENT)
+            found |= (self.times > one.times[0] + SAME_TIME_S) & (self.times < one.times[-1] - SAME_TIME_S)
         return found
 
     def bridged(self) -> Bools:
@@ -237,7 +236,9 @@ class Motion:
         for one in self.insertions:
             for joint, move in one.bridged:
                 start, end = one.times[move : move + 2]
-                found[:, self.skeleton.index(joint)] |= (self.times > start - _MOMENT) & (self.times < end + _MOMENT)
+                found[:, self.skeleton.index(joint)] |= (self.times > start - SAME_TIME_S) & (
+                    self.times < end + SAME_TIME_S
+                )
         return found & self.inserted()[:, None]
 
     @property
@@ -252,10 +253,10 @@ class Motion:
         shares, rest = [], end - start
         for one in self.insertions:
             seconds = float(min(one.times[-1], end) - max(one.times[0], start))
-            if seconds > _MOMENT:
+            if seconds > SAME_TIME_S:
                 rest -= seconds
                 shares += [replace(credit, share=credit.share * seconds) for credit in one.credits or (Credit(1.0),)]
-        rest = rest if rest > _MOMENT else 0.0
+        rest = rest if rest > SAME_TIME_S else 0.0
         return add_up([*shares, *(replace(credit, share=credit.share * rest) for credit in self.own_credits)])
 
     @property
@@ -317,8 +318,8 @@ class Motion:
         before = after - 1
         share = ((times - self.times[before]) / (self.times[after] - self.times[before])).clip(0.0, 1.0)
         rotations = np.empty((len(times), len(self.skeleton), 4))
-        for start in range(0, len(times), _AT_ONCE):  # what is in between takes some times the memory of the result
-            part = slice(start, start + _AT_ONCE)
+        for start in range(0, len(times), 4096):  # intermediate results take several times the memory of the result
+            part = slice(start, start + 4096)
             ends = self.rotations[before[part]], self.rotations[after[part]]
             rotations[part] = rot.normalise(rot.slerp(*ends, share[part, None]))
         return replace(
@@ -390,8 +391,7 @@ class Velocity:
     @classmethod
     def at_start(cls, motion: Motion) -> Velocity:
         """Return the velocity with which a motion begins: see `at_end`."""
-        check_type("motion", motion, Motion)
-        return cls._about(motion, 0, motion.times <= motion.times[0] + _VELOCITY_SPAN + _MOMENT, 1)
+        return cls._about(motion, 0, motion.times <= motion.times[0] + VELOCITY_SPAN_S + SAME_TIME_S, 1)
 
     @classmethod
     def at_end(cls, motion: Motion) -> Velocity:
@@ -403,8 +403,7 @@ class Velocity:
         Raises:
             MotionMindError: there is one frame only.
         """
-        check_type("motion", motion, Motion)
-        return cls._about(motion, -1, motion.times >= motion.times[-1] - _VELOCITY_SPAN - _MOMENT, -2)
+        return cls._about(motion, -1, motion.times >= motion.times[-1] - VELOCITY_SPAN_S - SAME_TIME_S, -2)
 
     @classmethod
     def _about(cls, motion: Motion, end: int, near: Bools, neighbour: int) -> Velocity:

@@ -30,8 +30,7 @@ from motionmind.geometry.splines import natural_spline, rotation_spline
 SEEN = ("balance", "bounce", "flight", "crossed_limbs")
 GRAVITY = 9.81  # metres a second squared
 CALM = 2.0  # metres a second squared: level acceleration up to which a body should be in balance
-FALLING = 0.5  # of gravity: a body off the floor that falls faster is in the air, and one that is pushed so is not
-_FALLS = 3  # frames in the air at least, from which an acceleration can be told
+FALLING = 0.5  # share of gravity: a body off the floor that falls faster is in the air
 
 
 def implausibility(skeleton: Skeleton, rotations: Floats, root: Floats, fps: float, floor: float = 0.0) -> Floats:
@@ -61,18 +60,18 @@ def implausibility(skeleton: Skeleton, rotations: Floats, root: Floats, fps: flo
 
 
 def floor_of(skeleton: Skeleton, rotations: Floats, root: Floats) -> float:
-    """Return the height of the floor under movement that need not touch it, metres: 0, or lower where the body is."""
+    """Return the height of the floor under movement that need not touch it, metres: 0, or the body's lowest point."""
     return min(0.0, float(lowest_height(skeleton, rotations, root).min()))
 
 
 def greatest(values: Floats) -> Floats:
-    """Return the greatest of each column of values [T, M], NaN where all are NaN."""
+    """Return the maximum of each column of values [T, M], NaN where all are NaN."""
     most = np.where(np.isnan(values), -np.inf, values).max(axis=0, initial=-np.inf)
     return np.where(np.isfinite(most), most, np.nan)
 
 
 def at_rate(motion: Motion) -> Motion:
-    """Return the movement at 30 frames a second: coarser movement is interpolated by splines, finer is thinned."""
+    """Resample movement to 30 frames per second: interpolate coarser movement by splines, thin finer movement."""
     if motion.fps >= RATE or len(motion) < 2:
         return motion.resample(RATE)
     start, keys = motion.times[0], motion.times
@@ -86,12 +85,12 @@ def at_rate(motion: Motion) -> Motion:
 def _lack_of_gravity(heights: Floats, airborne: Bools, fps: float) -> Floats:
     """Return the share of gravity that the mass lacks in each frame in the air [T]; NaN elsewhere.
 
-    The acceleration of a flight is that of the parabola that is nearest to it: of single frames it is mostly noise.
+    Fit a parabola to each flight: accelerations of single frames are mostly noise.
     """
     out = np.full(len(heights), np.nan)
     steps = np.diff(np.concatenate([[False], airborne, [False]]).astype(np.int8))
     for begin, end in zip(np.flatnonzero(steps == 1), np.flatnonzero(steps == -1), strict=True):
-        if end - begin >= _FALLS:
+        if end - begin >= 3:  # a parabola needs three frames
             times = np.arange(end - begin) / fps
             acceleration = 2.0 * np.polynomial.polynomial.polyfit(times - times.mean(), heights[begin:end], 2)[2]
             out[begin:end] = 1.0 + acceleration / GRAVITY

@@ -2,24 +2,24 @@
 
 from motionmind.errors import MotionMindError
 
-FASTEST = 10_000.0  # frames a second; faster is a slip of the keyboard
-# Frames a second of the slowest recording. Of fewer, each is taken as a posture that someone chose: films on twos have
-# 12, and the quickest score that comes with MotionMind 12.5.
+FASTEST = 10_000.0  # frames per second; more is a typing error
+# Frames per second of the slowest recording. With fewer, each frame counts as a chosen posture: films on twos have 12,
+# and the fastest bundled score 12.5.
 FILM_RATE = 15.0
-# Frames times joints of a motion that is made, not read: an hour of human23 at 30 frames a second, and some 800 MB.
+# Frames times joints of a generated motion: an hour of human23 at 30 frames per second, about 800 MB.
 MOST_PLACES = 3_000_000
 
 
 def check_size(frames: float, joints: int, name: str) -> None:
-    """Check, before memory is taken, that a motion may be made.
+    """Check that a motion is not too large to generate.
 
     Args:
-        frames: its frames; any number.
-        joints: the joints that move in each.
-        name: what to call it.
+        frames: number of frames, not necessarily an integer.
+        joints: number of moving joints.
+        name: the motion's name, for the message.
 
     Raises:
-        MotionMindError: there are too many frames for so many joints.
+        MotionMindError: frames times joints exceed the limit.
     """
     if not frames * joints <= MOST_PLACES:
         raise MotionMindError(

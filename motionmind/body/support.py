@@ -1,12 +1,12 @@
-"""Support: which limbs bear a body, where its mass is over them, when it is in the air, and feet that rise.
+"""Support: the limbs that bear a body, its balance over them, flights, and standing feet that rise.
 
 A limb *bears* the body in a frame in which one of its points is near the lowest point of the body and hardly moves. A
-body is *airborne* while even its lowest point is well above the floor. In between, as on half-pointe, or where a
-recording's floor is a little off, it stands: so "near" is measured from the body's lowest point, not from the floor.
+body is *airborne* while even its lowest point is well above the floor. In between, as on half-pointe, or in a recording
+with an inexact floor, it stands: so "near" is measured from the body's lowest point, not from the floor.
 
-The *support* is the convex hull of the bearing limbs' low points on the floor, and the *overhang* how far outside of it
-the centre of mass is, seen from above. Limbs are those of `limbs_of`, and last the trunk: a body can stand on its hands
-and sit, and an insect has six limbs to stand on. Lengths are of a person as tall as human23, and grow with the body.
+The *support* is the convex hull of the bearing limbs' low points on the floor; the *overhang* is the distance of the
+centre of mass from it, seen from above. Limbs are those of `limbs_of`, then the trunk: a body can stand on its hands
+and sit, and an insect stands on six limbs. Lengths are for a person as tall as human23, and scale with the body.
 """
 
 from __future__ import annotations
@@ -30,8 +30,7 @@ NEAR = 0.05  # metres above the body's lowest point within which a limb can bear
 STILL = 0.3  # metres a second: a point that moves faster does not bear
 # Metres above the floor of the lowest point of a body in the air. Dancers on half-pointe, and recordings whose floor is
 # a little off, reach 8 to 12 cm; above it, the mass of the dancers of `cmu-05` and `cmu-16` falls freely.
-AIRBORNE = 0.12
-STEPS = 0.1  # metres: a foot that is put so far from where it stood has made a step
+AIRBORNE_M = 0.12
 
 
 class Support(NamedTuple):
@@ -41,8 +40,8 @@ class Support(NamedTuple):
         bears: whether each limb, and last the trunk, bears the body [T, limbs + 1].
         airborne: whether the body is in the air [T].
         mass: the centre of mass [T, 3], metres; None for a body whose masses are not known.
-        overhang: how far the centre of mass is outside of the support, seen from above [T], metres: 0 where it is over
-            it, NaN where no limb bears; None as for `mass`.
+        overhang: distance of the centre of mass from the support, seen from above [T], metres: 0 over it, NaN where no
+            limb bears; None as for `mass`.
     """
 
     bears: Bools
@@ -54,7 +53,7 @@ class Support(NamedTuple):
 def find_support(
     skeleton: Skeleton, rotations: Floats, root: Floats, fps: float, floor: float | Floats = 0.0
 ) -> Support:
-    """Find which limbs bear a body, and where its mass is over them, in each frame.
+    """Find the limbs that bear a body, and its balance over them, in each frame.
 
     Args:
         skeleton: the body.
@@ -84,16 +83,16 @@ def find_bearers(
         floor: height of the floor, or in each frame [T], metres.
     """
     lowest = places[..., 1].min(axis=-1)
-    airborne = lowest > floor + AIRBORNE * size
+    airborne = lowest > floor + AIRBORNE_M * size
     bears, touches = _find_bearers(places, limb, lowest + NEAR * size, airborne, STILL * size, fps)
     return bears, airborne, touches
 
 
 @remembered
 def size_of(skeleton: Skeleton) -> float:
-    """Return how large a body is beside human23, by its greatest extent at rest: legs that spread count as well.
+    """Return the size of a body relative to human23, by its greatest extent at rest, spread legs included.
 
-    A body that is a single point counts as one as large.
+    A body that is a single point has size 1.
     """
     return (_extent(skeleton) / _extent_of_person()) or 1.0
 
@@ -102,7 +101,7 @@ def centre_of_mass(skeleton: Skeleton, rotations: Floats, root: Floats) -> Float
     """Return the centre of mass [..., 3], metres; None for a body whose masses are not known.
 
     Args:
-        skeleton: the body; of other proportions than its anatomy's own it has the same shares of mass.
+        skeleton: the body; any proportions have the shares of mass of the anatomy.
         rotations: local rotations [..., J, 4].
         root: positions of the root [..., 3], metres.
     """
@@ -114,7 +113,7 @@ def centre_of_mass(skeleton: Skeleton, rotations: Floats, root: Floats) -> Float
 
 
 def mass_of(skeleton: Skeleton, posed: Posed) -> Floats | None:
-    """Return the same of a movement that is posed [T, 3], metres."""
+    """Return the centre of mass of a posed movement [T, 3], metres; None where masses are unknown."""
     masses = masses_of(skeleton)
     return None if masses is None else masses.centre(posed.places, posed.turned)
 
@@ -127,23 +126,23 @@ def masses_of(skeleton: Skeleton) -> Masses | None:
 
 
 def overhang(points: Floats, supports: Bools, mass: Floats) -> Floats:
-    """Return how far outside of the convex hull of its supports a centre of mass is [T], metres.
+    """Return the distance of a centre of mass from the convex hull of its supports [T], metres.
 
     Args:
-        points: of the body, seen from above [T, P, 2], metres.
-        supports: whether each is a support [T, P].
+        points: points of the body, seen from above [T, P, 2], metres.
+        supports: whether each point is a support [T, P].
         mass: centre of mass, seen from above [T, 2], metres.
 
     Returns:
-        0 where it is over the hull, and NaN where there is no support.
+        Distances: 0 over the hull, NaN without a support.
     """
     return _overhang(np.ascontiguousarray(points), supports, np.ascontiguousarray(mass))
 
 
 def stands_alone(skeleton: Skeleton, rotations: Floats, root: Floats) -> Ints:
-    """Return the number of the limb, or trunk, that postures stand on alone [...]; -1 where several are low.
+    """Return the number of the one limb, or trunk, that postures stand on [...]; -1 where several are low.
 
-    A posture has no speed: here the limb is the only one with a point near the body's lowest.
+    A posture has no speed: the limb is the only one with a point near the body's lowest.
 
     Args:
         skeleton: the body.
@@ -156,9 +155,7 @@ def stands_alone(skeleton: Skeleton, rotations: Floats, root: Floats) -> Ints:
 
 
 def standing_rise(skeleton: Skeleton, rotations: Floats, root: Floats) -> float:
-    """Return how far the limb that a movement stands on alone at both ends rises above it on the way, metres.
-
-    The greatest of `standing_rises`; NaN where that is None.
+    """Return the greatest rise of the only standing limb during a movement (`standing_rises`), metres; NaN if None.
 
     Args:
         skeleton: the body.
@@ -170,10 +167,10 @@ def standing_rise(skeleton: Skeleton, rotations: Floats, root: Floats) -> float:
 
 
 def standing_rises(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats | None:
-    """Return how far the limb that a movement stands on alone at both ends is above where it should be [T], metres.
+    """Return the rise of the one limb that a movement stands on at both ends [T], metres.
 
-    It is the height of the limb's lowest point above a line from where it is first to where it is last. None where the
-    ends do not stand on one and the same limb, or where it makes a step.
+    It is the height of the limb's lowest point above a line from its first to its last place. None if the ends do not
+    stand on the same single limb, or if it steps.
 
     Args:
         skeleton: the body.
@@ -186,7 +183,7 @@ def standing_rises(skeleton: Skeleton, rotations: Floats, root: Floats) -> Float
     places, joints = contact_points(skeleton, rotations, root)
     places = places[:, limb_of_points(skeleton)[joints] == ends[0]]
     moved = (places[-1] - places[0])[:, [0, 2]]
-    if np.linalg.norm(moved, axis=1).min() > STEPS * size_of(skeleton):
+    if np.linalg.norm(moved, axis=1).min() > 0.1 * size_of(skeleton):  # a step
         return None
     heights = places[..., 1].min(axis=1)
     return np.asarray(heights - np.linspace(heights[0], heights[-1], len(heights)))

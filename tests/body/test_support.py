@@ -15,7 +15,7 @@ from motionmind.body.human import human23
 from motionmind.body.limbs import limbs_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import (
-    AIRBORNE,
+    AIRBORNE_M,
     centre_of_mass,
     find_support,
     overhang,
@@ -111,11 +111,11 @@ def test_a_body_that_is_carried_along_stands_on_nothing() -> None:
 
 def test_in_the_air_nothing_bears() -> None:
     rotations, root = standing()
-    above = root + np.array([0.0, 2.0 * AIRBORNE, 0.0])
+    above = root + np.array([0.0, 2.0 * AIRBORNE_M, 0.0])
     support = find_support(BODY, rotations, above, FPS)
     assert support.airborne.all()
     assert not support.bears.any()
-    raised = find_support(BODY, rotations, above, FPS, np.full(30, 2.0 * AIRBORNE))
+    raised = find_support(BODY, rotations, above, FPS, np.full(30, 2.0 * AIRBORNE_M))
     assert not raised.airborne.any()
     assert raised.bears[:, [LEFT, RIGHT]].all()
 
