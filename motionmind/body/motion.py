@@ -391,6 +391,7 @@ class Velocity:
     @classmethod
     def at_start(cls, motion: Motion) -> Velocity:
         """Return the velocity with which a motion begins: see `at_end`."""
+        check_type("motion", motion, Motion)
         return cls._about(motion, 0, motion.times <= motion.times[0] + VELOCITY_SPAN_S + SAME_TIME_S, 1)
 
     @classmethod
@@ -403,6 +404,7 @@ class Velocity:
         Raises:
             MotionMindError: there is one frame only.
         """
+        check_type("motion", motion, Motion)
         return cls._about(motion, -1, motion.times >= motion.times[-1] - VELOCITY_SPAN_S - SAME_TIME_S, -2)
 
     @classmethod

@@ -19,12 +19,7 @@ def open_team(workers: int = 1) -> Iterator[Team]:
     """
     if workers < 1:
         raise MotionMindError(f"workers must be at least 1, not {workers}")
-    if scheduler is not None:
-        from motionmind.executors.cluster import cluster
-
-        with cluster(scheduler) as team:
-            yield team
-    elif workers == 1:
+    if workers == 1:
         yield this_process()
     else:
         with processes(workers) as team:

@@ -121,7 +121,7 @@ def test_a_cluster_without_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense", "tcp://127.0.0.1:port"])
 def test_an_address_of_no_scheduler_is_told(address: str) -> None:
-    with pytest.raises(MotionMindError, match=f"^{address}: no scheduler answers"), open_team(scheduler=address):
+    with pytest.raises(MotionMindError, match=f"^{address}: no scheduler answers"), clusters.cluster(address):
         pass
 
 
