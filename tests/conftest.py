@@ -26,6 +26,7 @@ import motionmind
 from motionmind.cli import main
 from motionmind.cli.warming import FIRST_RUN_NOTE
 from motionmind.codecache import is_all_compiled
+from motionmind.corpus import cache as cache_of_corpora
 from motionmind.discretize.codebook import Codebook
 from motionmind.formats import read_motion
 from motionmind.retarget.retarget import own_skeleton
@@ -140,6 +141,13 @@ def cmu05(shared_data: Path) -> Engine:
     if not clips:
         pytest.skip(f"no clips in {shared_data / 'cmu-05'}")
     return Engine.fit(clips, rate=5.0, skip=1, facing="free", discretization=Codebook(15.0))
+
+
+@pytest.fixture
+def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache of the test's own for corpora, what is learned from them, and archives."""
+    monkeypatch.setattr(cache_of_corpora, "cache_folder", lambda room: tmp_path / "cache" / room)
+    return tmp_path / "cache"
 
 
 @pytest.fixture

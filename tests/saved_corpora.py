@@ -6,7 +6,6 @@ import atexit
 import ctypes
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -15,11 +14,13 @@ from functools import cache
 from pathlib import Path
 from typing import IO, Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from motionmind import files
 from motionmind.corpus import store
+from motionmind.corpus.arrays import write_arrays
 from motionmind.corpus.entries import Packed
 
 MANIFEST = {"name": "arms", "clips": []}
@@ -47,26 +48,20 @@ def entries(folder: Path, name: str = "clips") -> list[dict[str, Any]]:
     return [json.loads(line) for line in text.splitlines()]
 
 
-def put_entries(folder: Path, found: list[dict[str, Any]]) -> None:
-    """Replace the entries of a saved corpus's clips, and leave their columns as they are."""
-    packed, stored = Packed.of(found), store.load(folder)
-    manifest = stored.manifest
-    for key, array in packed._asdict().items():
-        np.save(stored.place / f"clips.{key}.npy", array)
-        manifest["arrays"][f"clips.{key}"] = [array.dtype.str, *array.shape]
+def put_array(folder: Path, name: str, array: NDArray[Any]) -> None:
+    """Replace an array of a saved corpus, and state the checksum of the new one: a corpus that someone forged."""
+    manifest = json.loads((folder / store.MANIFEST).read_text("utf-8"))
+    place = folder / str(manifest["folder"])
+    (place / f"{name}.npy").unlink(missing_ok=True)
+    entry = write_arrays(place, {name: array}, flush=False)[name]
+    manifest["arrays"][name] = msgspec.to_builtins(entry)
     (folder / store.MANIFEST).write_text(json.dumps(manifest), "utf-8")
 
 
-def as_in_0_1(folder: Path) -> None:
-    """Lay a saved corpus out as 0.1 did: the arrays beside the manifest, and clips and faults in it."""
-    manifest = json.loads((folder / store.MANIFEST).read_text("utf-8"))
-    if "clips.text" in manifest["arrays"]:
-        manifest |= {name: entries(folder, name) for name in ("clips", "faults")}
-    version = folder / str(manifest.pop("folder"))
-    for file in version.glob("*.npy"):
-        file.rename(folder / file.name)
-    shutil.rmtree(version)
-    (folder / store.MANIFEST).write_text(json.dumps(manifest | {"version": 1}), "utf-8")
+def put_entries(folder: Path, found: list[dict[str, Any]]) -> None:
+    """Replace the entries of a saved corpus's clips, and leave their columns as they are."""
+    for key, array in Packed.of(found)._asdict().items():
+        put_array(folder, f"clips.{key}", array)
 
 
 def names(folder: Path) -> list[str]:

@@ -23,8 +23,6 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from experiments.scale import tweens
 from experiments.scale.run import NAME, Job, _recorded, performance
-from motionmind.corpus import store
-from motionmind.corpus.fingerprint import code_name
 from motionmind.executors.workshop import Workshop
 from motionmind.formats.bvh import write_bvh
 from motionmind.learned import persistence
@@ -56,9 +54,7 @@ def main() -> None:
             )
         change = [sys.executable, "-m", "motionmind", "corpus"]
         where = ["--home", str(options.keep)]
-        if store.load(options.keep / "corpora" / name).manifest.get("code") != code_name():  # it is learned anew first
-            measured([*change, "add", name, str(recording), *where])
-            measured([*change, "remove", name, ADDED, *where])
+        measured([*change, "info", name, *where])  # learns it if other code learned it before
         for number in range(options.rounds):
             for command in (["add", name, str(recording)], ["remove", name, ADDED]):
                 print(f"{times} | {command[0]} | {measured([*change, *command, *where])}", flush=True)
@@ -90,16 +86,14 @@ def measured(command: Sequence[str]) -> str:
 
 
 def learn_afresh(name: str, home: Path) -> None:
-    """Learn a corpus afresh in its own states, and compare the files."""
-    kept = store.locate(name, home)
+    """Learn a corpus afresh in its own states, and compare the arrays."""
     learned = persistence.load(name, home)
     with tempfile.TemporaryDirectory(dir=home) as room:
         afresh = learn_in(learned.corpus, learned.space, Workshop(folder=Path(room)))
-        persistence.save(afresh, Path(room) / name)
-        one, other = store.load(kept), store.load(Path(room) / name)
-        for file, same in zip(one.files, other.files, strict=True):
-            if file.read_bytes() != same.read_bytes():
-                raise SystemExit(f"{name}: {file.name} is not that of a corpus that is learned afresh")
+        one, other = (persistence.learned_arrays(of) | {"states": of.states} for of in (learned, afresh))
+        for key, array in one.items():
+            if array.tobytes() != other[key].tobytes():
+                raise SystemExit(f"{name}: {key} is not that of a corpus that is learned afresh")
 
 
 if __name__ == "__main__":

@@ -117,7 +117,8 @@ def _folders(context: click.Context) -> dict[str, Path]:
 
 def _names(context: click.Context, corpus: str) -> _Names:
     """Return the names of a corpus."""
-    from motionmind.corpus import store
+    from motionmind.corpus.cache import cache_folder
+    from motionmind.corpus.store import MANIFEST
 
     folder = _folders(context).get(corpus)
     if folder is None:
@@ -125,7 +126,9 @@ def _names(context: click.Context, corpus: str) -> _Names:
     built, manifest = folder, _manifest(folder)
     learned = manifest
     if "skeleton" not in manifest:  # a corpus that people wrote: its joints are in what was learned from it last
-        kept = sorted(store.cache().glob(f"{folder.name}-*/{store.MANIFEST}"), key=lambda path: path.stat().st_mtime)
+        kept = sorted(
+            cache_folder("corpora").glob(f"{folder.name}-*/{MANIFEST}"), key=lambda path: path.stat().st_mtime
+        )
         built = kept[-1].parent if kept else folder
         learned = _manifest(built) if kept else {}
     with suppress(TypeError, KeyError, AttributeError, OSError, ValueError):
@@ -142,13 +145,12 @@ def _names(context: click.Context, corpus: str) -> _Names:
 
 
 def _entries(folder: Path, manifest: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the entries of a built corpus's clips: from its manifest, of an earlier version, or line by line."""
-    entries: list[dict[str, Any]] = manifest.get("clips", [])
-    if not entries and "arrays" in manifest:
-        data = (folder / str(manifest["folder"]) / "clips.text.npy").read_bytes()
-        header = 10 + int.from_bytes(data[8:10], "little")  # of NumPy's format, version 1.0
-        entries = [json.loads(line) for line in data[header:].splitlines()]
-    return entries
+    """Return the entries of a built corpus's clips."""
+    if "folder" not in manifest:
+        return []
+    data = (folder / str(manifest["folder"]) / "clips.text.npy").read_bytes()
+    header = 10 + int.from_bytes(data[8:10], "little")  # of NumPy's format, version 1.0
+    return [json.loads(line) for line in data[header:].splitlines()]
 
 
 def _manifest(folder: Path) -> dict[str, Any]:

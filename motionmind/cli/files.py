@@ -41,7 +41,7 @@ def question_recording(path: Path, motion: Motion, up: str | None = None) -> Non
     from motionmind.body.rates import FILM_RATE
     from motionmind.body.tempo import question_tempo
     from motionmind.corpus.dropped import describe_gaps, fill_gaps
-    from motionmind.corpus.recordings import FLOOR_OFF, added_frames, floor_of
+    from motionmind.corpus.recordings import FLOOR_OFFSET_M, added_frames, floor_of
     from motionmind.retarget.joint_mapping import joint_mapping
     from motionmind.retarget.retarget import own_skeleton
 
@@ -60,7 +60,7 @@ def question_recording(path: Path, motion: Motion, up: str | None = None) -> Non
     is_long = person.fps >= FILM_RATE and len(person) - added > person.fps
     if is_long and SHORTEST <= person.skeleton.height <= TALLEST:  # else the unit is wrong
         floor = floor_of(person.slice(added, len(person)))
-        if abs(floor) > FLOOR_OFF:
+        if abs(floor) > FLOOR_OFFSET_M:
             where = "over" if floor > 0.0 else "under"
             doubts.append(f"its feet stand {100.0 * abs(floor):.0f} cm {where} 0, where the floor is")
     for doubt in doubts:

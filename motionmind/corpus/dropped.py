@@ -25,16 +25,8 @@ from motionmind.corpus.clip import JointRepair
 from motionmind.errors import enumerated
 from motionmind.geometry import rotations as rot
 
-_SAME = 1e-7  # radians on average, and metres, by which a frame that is repeated may be off
-_WINDOW = 8  # frames on either side in which a body's pace is seen
-_GOES_ON = 0.35  # share of that pace that a body has after repeated frames, had it gone on meanwhile
-_MOVES = 0.1  # radians a second on average, and metres: slower bodies are still
-_MANY = 0.1  # share of a recording's frames that are repeated where this is its clock's doing
-_FAST, _TURNS = 12.0, np.radians(750.0)  # metres, and radians a second of all joints on average: no body is as fast
-_ONE = np.radians(45.0)  # of a turn in a frame that count: joints that flip are no whole body
-_FAR, _FAR_TURNED = 0.35, np.radians(20.0)  # metres, and radians on average: less is noise of a fast camera
-_SHORT = 0.25  # seconds that are filled
-_LONG = 1.0  # seconds for which a body is elsewhere, at most
+# No body is as fast: of the root, and of all joints on average.
+_IMPOSSIBLE_MPS, _IMPOSSIBLE_RADPS = 12.0, np.radians(750.0)
 
 
 class Gap(NamedTuple):
@@ -73,10 +65,13 @@ def find_gaps(motion: Motion) -> list[Gap]:
     """
     if motion.keyframed or len(motion) < 4 or motion.fps < FILM_RATE:
         return []
-    turned = np.minimum(rot.angle(motion.rotations[:-1], motion.rotations[1:]), _ONE).mean(axis=1)
+    # No more than 45 degrees of a turn in a frame count: joints that flip are no whole body.
+    turned = np.minimum(rot.angle(motion.rotations[:-1], motion.rotations[1:]), np.radians(45.0)).mean(axis=1)
     went = rot.norm(np.diff(motion.root, axis=0))
     seconds = np.diff(motion.times)
-    quick = (went > _FAST * seconds) & (went > _FAR) | (turned > _TURNS * seconds) & (turned > _FAR_TURNED)
+    # Less than 0.35 m and 20 degrees is noise of a fast camera.
+    quick = (went > _IMPOSSIBLE_MPS * seconds) & (went > 0.35)
+    quick |= (turned > _IMPOSSIBLE_RADPS * seconds) & (turned > np.radians(20.0))
     leaps = [*_elsewhere(motion, quick)]
     held = [
         gap
@@ -103,9 +98,10 @@ def fill_gaps(motion: Motion, begin: int = 0, skipped: int = 0) -> Filled:
     """
     gaps = [gap for gap in find_gaps(motion) if gap.start > begin]
     repeated = sum(gap.stop - gap.start for gap in gaps if gap.kind == "repeated")
-    if repeated > _MANY * len(motion):
+    is_clocks = repeated > 0.1 * len(motion)  # so many frames are repeated by the recording's clock
+    if is_clocks:
         gaps = [gap for gap in gaps if gap.kind != "repeated"]
-    report = [f"{repeated} of {len(motion)} frames repeat the one before; they stay"] * (repeated > _MANY * len(motion))
+    report = [f"{repeated} of {len(motion)} frames repeat the one before; they stay"] * is_clocks
     if not gaps:
         return Filled(motion, (), (), "".join(report))
     rotations, root, times = motion.rotations.copy(), motion.root.copy(), motion.times
@@ -113,7 +109,7 @@ def fill_gaps(motion: Motion, begin: int = 0, skipped: int = 0) -> Filled:
     left: list[Gap] = []
     for gap in gaps:
         before, after = gap.start - 1, gap.stop
-        if gap.kind == "leap" or times[after] - times[before] > _SHORT:
+        if gap.kind == "leap" or times[after] - times[before] > 0.25:  # seconds
             left.append(gap)
             continue
         inner = slice(gap.start, gap.stop)
@@ -148,7 +144,8 @@ def _returns(motion: Motion, before: int, after: int) -> bool:
     seconds = float(motion.times[after] - motion.times[before])
     turned = float(rot.angle(motion.rotations[before], motion.rotations[after]).mean())
     went = float(np.linalg.norm(motion.root[after] - motion.root[before]))
-    return seconds <= _LONG and turned < 0.5 * _TURNS * seconds and went < 0.5 * _FAST * seconds
+    is_slow = turned < 0.5 * _IMPOSSIBLE_RADPS * seconds and went < 0.5 * _IMPOSSIBLE_MPS * seconds
+    return seconds <= 1.0 and is_slow
 
 
 def _repeated(motion: Motion, steps: Floats, seconds: Floats) -> Iterator[Gap]:
@@ -159,24 +156,22 @@ def _repeated(motion: Motion, steps: Floats, seconds: Floats) -> Iterator[Gap]:
         steps: to each next frame, radians of all joints on average, plus metres of the root [T - 1].
         seconds: to each next frame [T - 1].
     """
-    same = steps < _SAME
+    same = steps < 1e-7  # radians and metres: rounding
     edges = np.diff(np.concatenate([[0], same, [0]]).astype(int))
     for first, stop in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
         if first == 0 or stop == len(steps):
             continue  # it begins, or ends, still
-        around = slice(max(first - _WINDOW, 0), stop + 1 + _WINDOW)
+        around = slice(max(first - 8, 0), stop + 1 + 8)
         pace = float(steps[around].sum() / seconds[around].sum())
         meanwhile = float(seconds[first : stop + 1].sum())
-        goes_on = (
-            steps[stop] > _GOES_ON * pace * meanwhile and _way(motion, int(first) - 1, int(stop) + 1) > steps[stop]
-        )
-        if pace > _MOVES and goes_on:
+        goes_on = steps[stop] > 0.35 * pace * meanwhile and _way(motion, int(first) - 1, int(stop) + 1) > steps[stop]
+        if pace > 0.1 and goes_on:  # radians and metres a second: slower bodies are still
             yield Gap(int(first) + 1, int(stop) + 1, "repeated")
 
 
 def _way(motion: Motion, a: int, b: int) -> float:
     """Return how far a body is from one frame to another, radians of all joints on average, plus metres of the root."""
-    turned = np.minimum(rot.angle(motion.rotations[a], motion.rotations[b]), _ONE).mean()
+    turned = np.minimum(rot.angle(motion.rotations[a], motion.rotations[b]), np.radians(45.0)).mean()
     return float(turned) + float(np.linalg.norm(motion.root[b] - motion.root[a]))
 
 

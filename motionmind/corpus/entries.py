@@ -17,8 +17,6 @@ from motionmind.corpus.clip import Clip
 
 _Kind = TypeVar("_Kind")
 
-KEPT = 4096  # entries that were read lately: one tween asks for the same ones hundreds of times
-
 
 class Packed(NamedTuple):
     """A line of JSON for each of n entries.
@@ -67,7 +65,7 @@ class Entries(Sequence[_Kind]):
             return tuple(map(self._read, numbers))
         kept = self._lately  # another thread may begin a new one
         if numbers not in kept:
-            if len(kept) >= KEPT:
+            if len(kept) >= 4096:  # one tween asks for the same ones hundreds of times
                 kept = self._lately = {}
             kept[numbers] = self._read(numbers)
         return kept[numbers]

@@ -24,16 +24,6 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.clip import FLIP_DEGREES, JointFlip, JointRepair, Repair
 from motionmind.geometry import rotations as rot
 
-FLIP_SPEED = 3000.0  # degrees a second
-# Chosen on a dancer whose legs and hands flip in half of the clips (CMU's subject 05): flips of one fault are at most
-# 0.18 s apart, different faults at least 0.4 s.
-_APART = 0.3  # seconds between flips of one fault
-_LONGEST = 1.0  # seconds over which a joint is interpolated
-_CREDIBLE_SPEED = 720.0  # degrees a second at which a joint is taken from one side of a fault to the other
-_SLOPE = 0.25  # share of a flip's angle and speed above which the frames around it belong to it
-_COMPANION = 0.5  # share of a flip's angle by which a neighbour jumps to make up for it
-_LEFT = 0.5  # share of a flip's angle below which nothing is left of it
-
 
 class _Jump(NamedTuple):
     """A flip and the quick turns around it: the frame before them, and the frame after them."""
@@ -88,7 +78,7 @@ def repair_flips(motion: Motion, degrees: float = FLIP_DEGREES) -> Mended:
     rotations = motion.rotations.copy()
     repairs: list[JointRepair] = []
     for joint, jumps in _jumps(motion, degrees):
-        rotations[:, joint], found = _put_back(motion, joint, jumps, _LEFT * degrees)
+        rotations[:, joint], found = _put_back(motion, joint, jumps, 0.5 * degrees)
         repairs += found
     motion = replace(motion, rotations=rotations)
     rotations = rotations.copy()
@@ -121,13 +111,13 @@ def _turned(motion: Motion) -> Floats:
 def _is_quick(motion: Motion, turned: Floats, degrees: float, share: float) -> Bools:
     """Return which turns [T - 1, J] exceed a share of a flip's angle and speed."""
     speed = turned / np.diff(motion.times)[:, None]
-    return np.asarray((turned > share * degrees) & (speed > share * FLIP_SPEED))
+    return np.asarray((turned > share * degrees) & (speed > share * 3000.0))
 
 
 def _jumps(motion: Motion, degrees: float) -> Iterator[tuple[int, list[_Jump]]]:
     """Yield each joint that flips, with its jumps in order of time: flips without a pause between them are one."""
     turned = _turned(motion)
-    flips, quick = (_is_quick(motion, turned, degrees, share) for share in (1.0, _SLOPE))
+    flips, quick = (_is_quick(motion, turned, degrees, share) for share in (1.0, 0.25))  # 0.25: frames around a flip
     for joint in np.flatnonzero(flips.any(axis=0)):
         edges = np.diff(np.concatenate([[0], quick[:, joint], [0]]).astype(int))
         runs = zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True)
@@ -233,12 +223,13 @@ def _faults(motion: Motion, degrees: float) -> Iterator[tuple[int, _Jump]]:
         for jump in jumps:
             frames = jump.before + np.flatnonzero(flips[jump.before : jump.after, joint])
             for other in [joint, *_neighbours(motion.skeleton, joint)]:
-                if np.max(turned[frames, other]) > _COMPANION * degrees:
+                if np.max(turned[frames, other]) > 0.5 * degrees:
                     found.setdefault(other, []).append(jump)
     for joint in sorted(found):
         fault, *others = sorted(found[joint])
         for jump in others:
-            if motion.times[jump.before] - motion.times[fault.after] > _APART:
+            # Seconds. CMU's subject 05: flips of one fault are at most 0.18 s apart, different faults at least 0.4 s.
+            if motion.times[jump.before] - motion.times[fault.after] > 0.3:
                 yield joint, fault
                 fault = jump
             fault = _Jump(fault.before, max(fault.after, jump.after))
@@ -258,7 +249,7 @@ def _reconstruct(motion: Motion, own: Floats, joint: int, fault: _Jump) -> tuple
     times, before, after = motion.times, fault.before, fault.after
     while _seconds_between(own, before, after) > times[after] - times[before] and before > 0 and after < len(own) - 1:
         before, after = before - 1, after + 1
-    if times[after] - times[before] > _LONGEST:
+    if times[after] - times[before] > 1.0:  # too long to interpolate
         return own, []
     if _seconds_between(own, before, after) <= times[after] - times[before]:
         _interpolate(times, own, _Jump(before, after))
@@ -274,7 +265,7 @@ def _reconstruct(motion: Motion, own: Floats, joint: int, fault: _Jump) -> tuple
 
 def _seconds_between(own: Floats, before: int, after: int) -> float:
     """Return how long a joint takes, at a credible speed, from one of its rotations [T, 4] to another."""
-    return float(np.degrees(rot.angle(own[before], own[after]))) / _CREDIBLE_SPEED
+    return float(np.degrees(rot.angle(own[before], own[after]))) / 720.0  # degrees a second
 
 
 def _interpolate(times: Floats, own: Floats, gap: _Jump) -> None:

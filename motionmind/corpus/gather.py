@@ -44,7 +44,6 @@ from motionmind.corpus.remarks import remark
 from motionmind.errors import CorpusError, MotionMindWarning, enumerated
 from motionmind.executors.workshop import Workshop
 
-LIGHTEST, HEAVIEST = 1e-6, 1e6  # weights of a corpus that is mixed in
 _log = logging.getLogger(__name__)
 
 
@@ -229,10 +228,8 @@ def _check_mix(name: str, mix: Sequence[tuple[Corpus, float]], rate: float | Non
     """Raise CorpusError if a weight, a name or a rate rules a corpus out."""
     names = [other.name for other, _ in mix]
     for other, weight in mix:
-        if not LIGHTEST <= weight <= HEAVIEST:
-            raise CorpusError(
-                f"the weight of corpus {other.name!r} must be from {LIGHTEST:g} to {HEAVIEST:g}, not {weight}"
-            )
+        if not 1e-6 <= weight <= 1e6:
+            raise CorpusError(f"the weight of corpus {other.name!r} must be from 1e-06 to 1e+06, not {weight}")
         if other.name == name:
             raise CorpusError(f"corpus {name!r} cannot be mixed into itself; give the new corpus another name")
         if names.count(other.name) > 1:

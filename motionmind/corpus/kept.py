@@ -16,7 +16,7 @@ from motionmind.corpus.clip import Clip
 from motionmind.corpus.corpus import Corpus
 from motionmind.executors.workshop import Workshop
 
-_MOVEMENT = ("rotations", "root", "times", "detail")
+MOVEMENT = ("rotations", "root", "times", "detail")
 
 
 class Run(NamedTuple):
@@ -142,4 +142,4 @@ def _is_same(one: Corpus, clip: Clip, other: Corpus, known: Clip) -> bool:
     if replace(clip, start=known.start, stop=known.stop, weight=known.weight) != known or len(clip) != len(known):
         return False
     here, there = slice(clip.start, clip.stop), slice(known.start, known.stop)
-    return all(np.array_equal(getattr(one, name)[here], getattr(other, name)[there]) for name in _MOVEMENT)
+    return all(np.array_equal(getattr(one, name)[here], getattr(other, name)[there]) for name in MOVEMENT)

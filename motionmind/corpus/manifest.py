@@ -7,7 +7,8 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from motionmind.corpus.clip import FLIP_DEGREES, Clip, JointFlip
+from motionmind.corpus.arrays import ArrayEntry
+from motionmind.corpus.clip import FLIP_DEGREES
 from motionmind.corpus.corpus import Facing
 from motionmind.credits.credit import Origin
 from motionmind.errors import FormatError
@@ -72,25 +73,14 @@ class SpaceEntry(msgspec.Struct, frozen=True):
 
 
 class BuiltManifest(Provenance, frozen=True, kw_only=True):
-    """A built corpus without its arrays, in which its clips and faults are, too; attributes as in Corpus."""
+    """A built corpus; `folder` is the number of the folder with its arrays, other attributes as in Corpus."""
 
+    folder: int
+    arrays: dict[str, ArrayEntry]
     skeleton: BodyEntry
     space: SpaceEntry
     origins: tuple[Origin, ...] = ()
     flip_degrees: float = FLIP_DEGREES
-
-
-class NamedManifest(BuiltManifest, frozen=True, kw_only=True):
-    """A built corpus that says which code learned it (`motionmind.corpus.fingerprint`)."""
-
-    code: str
-
-
-class ListingManifest(BuiltManifest, frozen=True, kw_only=True):
-    """A corpus that an earlier version built, whose manifest lists its clips and faults."""
-
-    clips: tuple[Clip, ...]
-    faults: tuple[JointFlip, ...]
 
 
 def parse_manifest(manifest: dict[str, Any], schema: type[_Schema], path: Path) -> _Schema:

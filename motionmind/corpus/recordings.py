@@ -29,16 +29,9 @@ from motionmind.geometry.splines import rotation_spline
 Flips = Literal["drop", "keep", "repair"]
 Rate = float | Literal["auto"] | None
 
-# Postures a second of a recording, unless another rate is given: [O10]'s choice for motion capture.
-RECORDED_RATE = 5.0
-DETAIL_RATE = 30.0  # per second: the rate at which detail between postures is kept
-FAULT_DEGREES = 30.0  # a joint that departs by more between two postures was recorded badly
-FLOOR_OFF = 0.03  # metres off 0 above which a recording's floor is told
-_LOOKED_AT = 500  # frames of a recording, at most, that its floor is found from
-_JUMPING = 3  # joints that jump at once after a posture that was added
-_MOVES = 0.05  # degrees in a frame: a joint that turns by less is still
-_ADDED_SECONDS = 2.0  # for which such a posture is added at most
-_COARSE = 20.0  # frames per second; a slower recording has no detail to keep
+POSTURE_RATE_FPS = 5.0  # of a recording, unless another rate is given: [O10]'s choice for motion capture
+FLOOR_OFFSET_M = 0.03  # above which a recording's floor is reported
+_DETAIL_MIN_FPS = 20.0  # a slower recording has no detail to keep
 
 
 @dataclass(frozen=True)
@@ -149,7 +142,7 @@ def take(recording: Motion, taking: Taking) -> Recording:
 
 def floor_of(motion: Motion) -> float:
     """Return the height of the floor that feet stand on in a recording, metres, as of `find_floor` with heels."""
-    some = slice(None, None, -(-len(motion) // _LOOKED_AT))
+    some = slice(None, None, -(-len(motion) // 500))  # of 500 frames at most
     return find_floor(motion.skeleton, motion.rotations[some], motion.root[some], heels=True)
 
 
@@ -160,11 +153,11 @@ def added_frames(recording: Motion) -> int:
     """
     if recording.keyframed or recording.fps < FILM_RATE:
         return 0
-    stop = int(_ADDED_SECONDS * recording.fps) + 2
+    stop = int(2.0 * recording.fps) + 2  # they last two seconds at most
     rotations = recording.rotations[:stop]
     turned = np.degrees(rot.angle(rotations[:-1], rotations[1:]))
-    moving = np.flatnonzero(turned.max(axis=1) > _MOVES)
-    if not len(moving) or np.count_nonzero(turned[moving[0]] > FLIP_DEGREES) < _JUMPING:
+    moving = np.flatnonzero(turned.max(axis=1) > 0.05)  # degrees in a frame
+    if not len(moving) or np.count_nonzero(turned[moving[0]] > FLIP_DEGREES) < 3:
         return 0
     return int(moving[0]) + 1
 
@@ -213,12 +206,12 @@ def mirror_image(source: Source, between: int) -> Piece:
 
 def frames_between(rate: float | None) -> int:
     """Return how many frames of detail there are between two postures."""
-    return max(round(DETAIL_RATE / rate) - 1, 0) if rate else 0
+    return max(round(30.0 / rate) - 1, 0) if rate else 0
 
 
 def posture_rate(motion: Motion) -> float | None:
     """Return how many postures a second to take of a motion; None for every frame, of keyframes."""
-    return None if motion.keyframed or motion.fps < FILM_RATE else RECORDED_RATE
+    return None if motion.keyframed or motion.fps < FILM_RATE else POSTURE_RATE_FPS
 
 
 # --- inside -----------------------------------------------------------------------------------------------------------
@@ -228,17 +221,17 @@ def _detail(postures: Motion, recording: Motion, between: int) -> NDArray[np.flo
     """Return a recording's departures from the spline through its postures [N, between, J, 3], rotation vectors.
 
     They are 0 after the last posture, where each frame is a posture, and for a joint in a move in which it departs by
-    more than `FAULT_DEGREES`.
+    more than 30 degrees.
     """
     count, joints = len(postures), len(postures.skeleton)
     out = np.zeros((count, between, joints, 3), np.float16)
-    if between > 0 and 1 < count < len(recording) and recording.fps >= _COARSE:
+    if between > 0 and 1 < count < len(recording) and recording.fps >= _DETAIL_MIN_FPS:
         times = subdivide_times(postures.times, between)
         spline = rotation_spline(postures.times, postures.rotations, times)
         recorded = recording if np.array_equal(recording.times, times) else recording.at(times)
         detail = rot.log(rot.inv_mul(spline, recorded.rotations))
         detail = detail[:-1].reshape(count - 1, between + 1, joints, 3)[:, 1:]
-        faulty = np.linalg.norm(detail, axis=-1).max(axis=1) > np.radians(FAULT_DEGREES)
+        faulty = np.linalg.norm(detail, axis=-1).max(axis=1) > np.radians(30.0)
         out[:-1] = np.where(faulty[:, None, :, None], 0.0, detail)
     return out
 
@@ -267,7 +260,7 @@ def _cut(
 def _with_detail(postures: Motion, part: Motion, rate: float | None) -> Motion:
     """Return as much of a part of a recording as detail is taken from: hours of it would fill the memory."""
     between = frames_between(rate)
-    if between == 0 or len(postures) == 1 or part.fps < _COARSE:
+    if between == 0 or len(postures) == 1 or part.fps < _DETAIL_MIN_FPS:
         return postures
     return part.at(subdivide_times(postures.times, between))
 

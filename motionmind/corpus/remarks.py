@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 
-from motionmind.corpus.recordings import FLOOR_OFF, Recording, usually_added
+from motionmind.corpus.recordings import FLOOR_OFFSET_M, Recording, usually_added
 from motionmind.errors import enumerated
 from motionmind.retarget.joint_mapping import describe_unknown_rig, known_rig
 
@@ -39,7 +39,7 @@ def remark(name: str, own: Sequence[Recording], *, is_rate_given: bool, skip: in
     if made := [one.name for one in own if one.is_made]:
         text = "corpus %s: %d of %d recordings hold movement that the engine made, learned as if it were recorded: %s"
         _log.info(text, name, len(made), len(own), enumerated(made, 6))
-    off = sorted((one for one in recorded if abs(one.floor) > FLOOR_OFF), key=lambda one: -abs(one.floor))
+    off = sorted((one for one in recorded if abs(one.floor) > FLOOR_OFFSET_M), key=lambda one: -abs(one.floor))
     if off and is_known:
         where = [
             f"{one.name} by {100.0 * abs(one.floor):.0f} cm {'over' if one.floor > 0.0 else 'under'}" for one in off

@@ -31,14 +31,13 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store, versions
 from motionmind.corpus.clip import Clip, JointFlip
 from motionmind.corpus.fingerprint import code_name
+from motionmind.corpus.kept import MOVEMENT
 from motionmind.corpus.manifest import BodyEntry
 from motionmind.corpus.recordings import Piece, Recording, Taking, take
 from motionmind.errors import CorpusError, MotionMindError, MotionMindWarning
 from motionmind.executors.team import Team, UnfinishedError
 from motionmind.files import make_folder, read_bytes, reads_recorded, replace_file
 
-_KEPT_AGAIN = 7.0  # bytes on disk for each of the shards': themselves, arrays to learn from, and what is learned
-_MOVEMENT = ("rotations", "root", "times", "detail")
 _ONE_AT_A_TIME = threading.Lock()  # in a process: Python's list of warnings is one for all its threads
 
 
@@ -240,7 +239,8 @@ def _differs(job: Job, usual: Job, done: Mapping[Path, Taken]) -> str:
 def _needed(names: Mapping[Path, str], samples: Mapping[Path, Taken]) -> float:
     """Estimate the bytes on disk that all files need, from one of each format."""
     shares = {file.suffix.lower(): taken.size / max(_size(file), 1) for file, taken in samples.items()}
-    return _KEPT_AGAIN * sum(shares[file.suffix.lower()] * _size(file) for file in names)
+    # 7 bytes for each of the shards': themselves, arrays to learn from, and what is learned
+    return 7.0 * sum(shares[file.suffix.lower()] * _size(file) for file in names)
 
 
 def _size(file: Path) -> int:
@@ -356,7 +356,7 @@ def _encode(recordings: Sequence[Recording], said: tuple[str, ...], read: dict[s
             replace(piece.clip, start=start, stop=stop)
             for piece, start, stop in zip(pieces, stops[:-1], stops[1:], strict=True)
         )
-        for name in _MOVEMENT if pieces else ():
+        for name in MOVEMENT if pieces else ():
             arrays[f"{name}{number}"] = np.concatenate([getattr(piece, name) for piece in pieces])
         body = one.body
         entry = BodyEntry(body.name, body.names, body.parents, body.offsets.tolist(), body.tips.tolist())
@@ -390,7 +390,7 @@ def _decode(entry: _RecordingEntry, number: int, arrays: Mapping[str, NDArray[An
         return tuple(
             Piece(
                 replace(clip, start=0, stop=0),
-                *(arrays[f"{name}{number}"][clip.start : clip.stop] for name in _MOVEMENT),
+                *(arrays[f"{name}{number}"][clip.start : clip.stop] for name in MOVEMENT),
             )
             for clip in clips
         )

@@ -4,9 +4,8 @@
     corpora/mine/3/*.npy           its arrays
 
 To replace it, a writer makes folder 4, fills and flushes it, and moves a new manifest over the old one: up to that
-call readers find version 3, from then on version 4. Whoever reads or writes a version holds a lock on its folder, which
-ends with the process; cleaning removes versions that nobody holds. In corpora of 0.1 the arrays lie beside the
-manifest: that is a version too, in the folder itself.
+call readers find version 3, from then on version 4. Readers and writers of a version lock its folder; the lock ends
+with the process, and cleaning removes versions without locks.
 """
 
 from __future__ import annotations
@@ -22,13 +21,13 @@ from contextlib import ExitStack, contextmanager, suppress
 from itertools import count
 from pathlib import Path
 
+from motionmind.corpus.arrays import CHECKED
 from motionmind.files import TEMPORARY, sync_folder
 
 if sys.platform != "win32":
     import fcntl
 
-CHECKED = "checked"  # the file in a version that says that its arrays were found valid
-_UNUSED = 3600.0  # seconds without change after which a folder that cannot be locked is taken to be unused
+_UNUSED_S = 3600.0  # time without change after which a folder that cannot be locked counts as unused
 
 
 @contextmanager
@@ -68,30 +67,21 @@ def remove_others(folder: Path, current: Callable[[], Path | None]) -> None:
         current: returns the folder of the current version; None if there is none yet.
     """
     with suppress(OSError):
-        for version in [*filter(_is_version, folder.iterdir()), folder]:
+        for version in filter(_is_version, folder.iterdir()):
             with suppress(OSError), locked(version, alone=True) as unused:
-                # Asked only now: whoever makes a version current holds it.
-                if not unused or (kept := current()) == version:
-                    continue
-                for file in version.iterdir() if kept or version != folder else ():
-                    if _is_array(file) or (version != folder and TEMPORARY.fullmatch(file.name)):
-                        file.unlink()
-                if version != folder:
+                # Call current() only now: a writer holds a version while it makes it current.
+                if unused and current() != version:
+                    for file in version.iterdir():
+                        if _is_array(file) or TEMPORARY.fullmatch(file.name):
+                            file.unlink()
                     version.rmdir()
 
 
-def recover(folder: Path) -> None:
-    """Put back a folder that a killed process of 0.1 had moved aside, if there is none in its place."""
-    for old in _moved_aside(folder, "-old"):
-        if not folder.exists():
-            old.rename(folder)
-
-
 def remove(folder: Path) -> None:
-    """Remove a folder with all its versions, at once: it is moved aside first, under a name that is none.
+    """Remove a folder with all its versions at once: move it to a hidden name first.
 
     Raises:
-        OSError: it cannot be moved. What cannot be removed after that is removed with the next version of its name.
+        OSError: it cannot be moved. Files that cannot be removed then are removed with the next version of its name.
     """
     aside = folder.with_name(f".{folder.name}-{secrets.token_hex(6)}")
     folder.rename(aside)
@@ -100,16 +90,18 @@ def remove(folder: Path) -> None:
 
 
 def remove_unused(folder: Path) -> None:
-    """Remove a folder and all in it, unless somebody holds it; as far as that can be done."""
+    """Remove a folder and its content unless it is locked, as far as that can be done."""
     with suppress(OSError), locked(folder, alone=True) as unused:
         if unused:
             shutil.rmtree(folder, ignore_errors=True)
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove what killed processes left beside a folder: those of 0.1, and those that removed it."""
-    for aside in _moved_aside(folder, "(-old)?"):
-        shutil.rmtree(aside, ignore_errors=True)
+    """Remove the folders to which killed processes moved `folder` to remove it."""
+    name = re.compile(rf"\.{re.escape(folder.name)}-[0-9a-f]{{12}}")
+    for aside in filter(lambda entry: name.fullmatch(entry.name), folder.parent.iterdir()):
+        if find_stranger(aside, "manifest.json") is None:
+            shutil.rmtree(aside, ignore_errors=True)
 
 
 def find_stranger(folder: Path, manifest: str) -> Path | None:
@@ -135,15 +127,6 @@ def _is_array(entry: Path) -> bool:
     return entry.suffix == ".npy" or entry.name == CHECKED
 
 
-def _moved_aside(folder: Path, suffix: str) -> list[Path]:
-    """Return the folders that 0.1 called ".mine-0123456789ab" or "...-old" while it replaced "mine"."""
-    name = re.compile(rf"\.{re.escape(folder.name)}-[0-9a-f]{{12}}{suffix}")
-    found = folder.parent.iterdir() if folder.parent.is_dir() else ()
-    return sorted(
-        entry for entry in found if name.fullmatch(entry.name) and find_stranger(entry, "manifest.json") is None
-    )
-
-
 @contextmanager
 def locked(folder: Path, *, alone: bool, is_new: bool = False) -> Iterator[bool]:
     """Lock a folder until the context or the process ends: alone, or with others who do not lock it alone.
@@ -158,7 +141,7 @@ def locked(folder: Path, *, alone: bool, is_new: bool = False) -> Iterator[bool]
         a folder that has not changed for an hour is taken to be unused, and no other is removed; and Windows, which has
         none on folders, removes no file that is open.
     """
-    unused = time.time() - folder.stat().st_mtime > _UNUSED
+    unused = time.time() - folder.stat().st_mtime > _UNUSED_S
     if sys.platform == "win32":
         yield unused or is_new or not alone
         return

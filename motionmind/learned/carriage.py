@@ -55,7 +55,7 @@ class Carriage:
             extreme postures [1], metres.
         loose: whether each joint exceeds its limits in the corpus [J].
         touches: greatest penetration depth for each of `Capsules.pairs`, except in RARE postures [P], metres.
-        trees: neighbour trees over the samples; None if there are few samples, or in corpora of an earlier version.
+        trees: neighbour trees over the samples; None if there are few samples.
         trust: share of the walks' departure from the minimal movement to keep.
     """
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from motionmind._typing import Floats, States
 from motionmind.corpus.corpus import FACING, Corpus
-from motionmind.corpus.fingerprint import code_name
 from motionmind.corpus.kept import Kept
 from motionmind.discretize.protocol import ByJoint, Discretization
 from motionmind.discretize.states import StateSpace, nearest
@@ -41,8 +40,7 @@ class Learned:
         carriage: posture statistics: orientations, travel and support.
         pace: speeds, and durations by displacement.
         plausibility: limits of plausible movement.
-        gauge: measurements of pace per clip; None in corpora of an earlier version.
-        code: fingerprint of the code that learned (`motionmind.corpus.fingerprint`); "" for an earlier version.
+        gauge: measurements of pace per clip.
     """
 
     corpus: Corpus
@@ -52,8 +50,7 @@ class Learned:
     carriage: Carriage
     pace: Pace
     plausibility: Plausibility
-    gauge: Gauge | None = None
-    code: str = ""
+    gauge: Gauge
 
 
 def learn(corpus: Corpus, discretization: Discretization, workshop: Workshop | None = None) -> Learned:
@@ -65,7 +62,7 @@ def learn(corpus: Corpus, discretization: Discretization, workshop: Workshop | N
         workshop: threads, and room for large arrays; None for the current thread and memory. It never changes results.
 
     Raises:
-        CorpusError: a joint has more than MOST_STATES_LEARNED states, or the facing more than MOST_FACINGS.
+        CorpusError: a joint has more than MAX_STATES_LEARNED states, or the facing more than MAX_FACINGS.
         OSError: the workshop's disk is full.
     """
     joints = corpus.skeleton.names
@@ -94,15 +91,14 @@ def learn_changed(before: Learned, kept: Kept, workshop: Workshop | None = None)
     """Learn from a changed corpus in the states of an earlier one: the same as `learn_in`, to the last bit.
 
     States and measurements of kept clips are reused. Only new clips are discretized and measured, and whatever depends
-    on all clips is refitted. If other code learned the earlier corpus, everything is learned anew.
+    on all clips is refitted.
 
     Args:
         before: result for the earlier corpus.
         kept: the clips shared with it (`motionmind.corpus.kept`).
         workshop: as in `learn`.
     """
-    # Other code may have measured the same clips differently.
-    if before.gauge is None or before.code != code_name() or kept.before is None:
+    if kept.before is None:
         return learn_in(kept.corpus, before.space, workshop)
     return _learn(kept, lambda joint, _: before.space.alone(joint), workshop, before)
 
@@ -192,7 +188,7 @@ def _learn_all(
     (gauge, pace), carriage = workshop.both(pace_of, partial(learn_carriage, corpus, workshop, kept, carriage_before))
     carriage = replace(carriage, trust=learn_trust(corpus, carriage, workshop))
     plausibility = learn_plausibility(corpus, pace.fastest)
-    return Learned(corpus, space, states, grammar, carriage, pace, plausibility, gauge, code_name())
+    return Learned(corpus, space, states, grammar, carriage, pace, plausibility, gauge)
 
 
 def _keep_visited(space: StateSpace, states: States) -> tuple[StateSpace, States]:

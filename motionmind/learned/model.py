@@ -82,7 +82,7 @@ class LearnedCorpus(Learned):
     def load(cls, name: str, home: str | os.PathLike[str] | None = None) -> Self:
         """Load what was learned from a corpus, by its name or folder: a built corpus or a bundled one.
 
-        A bundled corpus is learned on first use and kept in the platform's cache directory.
+        What the user's cache folder does not hold is learned and kept there.
 
         Args:
             name: of the corpus, or its folder.
@@ -98,7 +98,7 @@ class LearnedCorpus(Learned):
         return cls._of(learned, perf_counter() - began)
 
     def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write all that was learned to a folder, whole or not at all.
+        """Write the corpus to a folder, completely or not at all, and cache what was learned.
 
         Args:
             folder: where; a built corpus that is there is replaced.
@@ -120,6 +120,5 @@ class LearnedCorpus(Learned):
             learned.pace,
             learned.plausibility,
             learned.gauge,
-            learned.code,
             load_seconds=load_seconds,
         )

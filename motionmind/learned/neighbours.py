@@ -50,7 +50,7 @@ class Neighbours:
         radii: radii of the nodes [P, K], radians.
         weights: total weight of each node's samples [P, K].
         codes: orientations of each part's samples, in 127ths, part after part and leaf after leaf; a leaf of n samples
-            and m joints has 4 m rows of n numbers. Empty in corpora of earlier versions.
+            and m joints has 4 m rows of n numbers.
     """
 
     parts: tuple[Ints, ...]
@@ -64,9 +64,8 @@ class Neighbours:
 
     @property
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """The arrays by name, `codes` only if not empty."""
-        names = [field.name for field in fields(self) if field.name != "parts"]
-        return {name: getattr(self, name) for name in names if name != "codes" or len(self.codes)}
+        """The arrays by name."""
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "parts"}
 
     def centres_of(self, number: int) -> Singles:
         """Return the centres of the nodes of a part's tree [K, m, 4]."""

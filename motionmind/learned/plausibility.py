@@ -83,8 +83,7 @@ class Plausibility:
     Attributes:
         fastest: fastest speeds of the joints, rad/s, of the body's turn, rad/s, and of its travel, heights/s [J + 2].
         most: limits in the order of `MEASURES` [M]; NaN where a measure never applies in the corpus.
-        slides: limit on the speed of a foot near the floor, heights/s [1]; NaN for bodies without feet, and in corpora
-            of earlier versions.
+        slides: limit on the speed of a foot near the floor, heights/s [1]; NaN for bodies without feet.
     """
 
     fastest: Floats

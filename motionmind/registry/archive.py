@@ -16,8 +16,6 @@ from typing import IO
 from motionmind.errors import CorpusError
 from motionmind.registry.index import File
 
-_CHUNK = 2**20  # bytes
-
 
 def pack(files: Mapping[str, Path], archive: Path) -> None:
     """Pack files, given by their names in the archive, in this order; raise OSError if reading or writing fails.
@@ -68,7 +66,7 @@ def _copy(source: IO[bytes], place: Path, file: File, archive: Path) -> None:
     place.parent.mkdir(exist_ok=True)
     digest = hashlib.sha256()
     with place.open("xb") as target:
-        while chunk := source.read(_CHUNK):
+        while chunk := source.read(1 << 20):
             digest.update(chunk)
             target.write(chunk)
     if digest.hexdigest() != file.sha256:

@@ -21,10 +21,7 @@ from urllib.parse import urlsplit
 from motionmind.errors import CorpusError
 from motionmind.files import sync_folder
 
-_TIMEOUT = 30.0  # seconds for a server to answer, or to send the next bytes
-_CHUNK = 2**18  # bytes
-_MOST_CONNECTIONS = 5  # for one file; each must deliver some bytes
-_REDIRECTIONS = 5
+_TIMEOUT_S = 30.0  # for a server to answer, or to send the next bytes
 
 Progress = Callable[[int], None]  # called with the number of bytes so far
 
@@ -64,7 +61,7 @@ def _is_loopback(host: str) -> bool:
 class _Redirections(urllib.request.HTTPRedirectHandler):
     """Follows redirections to allowed addresses only."""
 
-    max_redirections = _REDIRECTIONS
+    max_redirections = 5
 
     def redirect_request(
         self, req: urllib.request.Request, fp: IO[bytes], code: int, msg: str, headers: Any, newurl: str
@@ -83,7 +80,7 @@ def _open(url: str, start: int = 0) -> Any:
     handlers: list[urllib.request.BaseHandler] = [_Redirections()]
     if _is_loopback(urlsplit(url).hostname or ""):
         handlers.append(urllib.request.ProxyHandler({}))  # a proxy would ask its own machine
-    return urllib.request.build_opener(*handlers).open(request, timeout=_TIMEOUT)
+    return urllib.request.build_opener(*handlers).open(request, timeout=_TIMEOUT_S)
 
 
 def _reason(error: Exception) -> str:
@@ -92,7 +89,7 @@ def _reason(error: Exception) -> str:
         return f"the server answers {error.code} {error.reason}"
     cause = error.reason if isinstance(error, URLError) else error
     if isinstance(cause, TimeoutError):
-        return f"nothing came for {_TIMEOUT:g} s"
+        return f"nothing came for {_TIMEOUT_S:g} s"
     if isinstance(cause, OSError):
         return cause.strerror or str(cause)
     return str(cause) or type(cause).__name__
@@ -157,8 +154,8 @@ def download(url: str, place: Path, size: int, sha256: str, on_progress: Progres
 
 
 def _complete(url: str, file: IO[bytes], size: int, on_progress: Progress | None) -> None:
-    """Append the missing bytes to a file, over up to `_MOST_CONNECTIONS` connections as long as each delivers some."""
-    for _ in range(_MOST_CONNECTIONS):
+    """Append the missing bytes to a file, over up to five connections as long as each delivers some."""
+    for _ in range(5):
         if (start := file.tell()) == size:
             return
         reason = "the connection ended"
@@ -183,7 +180,7 @@ def _append(url: str, file: IO[bytes], size: int, response: Any, on_progress: Pr
         _empty(file)  # the server sends the whole file
     elif not response.headers.get("Content-Range", "").startswith(f"bytes {file.tell()}-"):
         raise http.client.HTTPException("the server sends another part of the file than it was asked for")
-    while chunk := response.read(_CHUNK):
+    while chunk := response.read(1 << 18):
         if file.tell() + len(chunk) > size:
             _empty(file)
             raise CorpusError(f"{url}: is larger than the {size:,} bytes that the index states")

@@ -9,9 +9,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-import platformdirs
-
 from motionmind.corpus import store
+from motionmind.corpus.cache import cache_folder
 from motionmind.corpus.versions import locked
 from motionmind.errors import CorpusError, FormatError
 from motionmind.files import make_folder
@@ -21,13 +20,12 @@ from motionmind.registry.archive import unpack
 from motionmind.registry.download import Progress, check_address, download, file_hash
 from motionmind.registry.index import Archive, Entry, Recipe, Source, find, is_address, open_index
 
-_ARCHIVE = "archive.tar"
-_TOLD = ("title", "author", "source", "licence", "citation", "origins")  # fields that index and corpus must agree on
+_STATED = ("title", "author", "source", "licence", "citation", "origins")  # fields that index and corpus must agree on
 
 
 def archives() -> Path:
     """Return the folder of fetched archives, each under its SHA-256."""
-    return Path(platformdirs.user_cache_dir("motionmind", appauthor=False)) / "archives"
+    return cache_folder("archives")
 
 
 def look_up(name: str, index: str | None = None) -> tuple[Entry | Recipe, Source]:
@@ -80,9 +78,8 @@ def fetch(
     place = store.place_for(chosen, home)
     if (place / store.MANIFEST).exists():
         raise CorpusError(f"there is a corpus {chosen!r} already; fetch this one under another name")
-    if entry.corpus_version not in store.VERSIONS[store.BUILT]:
-        newest = store.VERSIONS[store.BUILT][-1]
-        raise CorpusError(f"{entry.name} is a corpus of version {entry.corpus_version}; {newest} can be read")
+    if entry.corpus_version != (version := store.VERSIONS[store.BUILT]):
+        raise CorpusError(f"{entry.name} is a corpus of version {entry.corpus_version}; {version} can be read")
     with _held(entry) as folder:
         archive = _obtain(entry, source, folder, on_progress)
         learned = _learn(entry, archive, folder / "unpacked")
@@ -113,7 +110,7 @@ def _obtain(entry: Entry, source: Source, folder: Path, on_progress: Progress | 
     where, wanted = source.locate(entry.archive), entry.archive
     if is_address(where):
         check_address(where, source.place if is_address(source.place) else None)
-        kept = folder / _ARCHIVE
+        kept = folder / "archive.tar"
         if not _is_archive(kept, wanted):
             download(where, kept, wanted.size, wanted.sha256, on_progress)
     elif not _is_archive(kept := Path(where), wanted):
@@ -138,7 +135,7 @@ def _learn(entry: Entry, archive: Path, folder: Path) -> Learned:
     except FormatError as error:
         message = str(error).removesuffix(f"; {store.remedy(place)}").replace(f"{place}{os.sep}", "")
         raise CorpusError(f"the archive of {entry.name} holds no valid corpus: {message}") from error
-    for key in _TOLD:
+    for key in _STATED:
         if (told := getattr(learned.corpus, key)) != getattr(entry, key):
             raise CorpusError(f"the archive of {entry.name} states another {key} than the index: {told!r:.200}")
     return learned

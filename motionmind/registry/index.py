@@ -14,7 +14,7 @@ from motionmind.credits.credit import Origin
 from motionmind.errors import CorpusError, FormatError, suggestion
 from motionmind.files import read_bytes
 
-LARGEST_INDEX = 16 * 10**6  # bytes: some ten thousand corpora
+MAX_INDEX_BYTES = 16 * 10**6  # some ten thousand corpora
 SHIPPED = Path(__file__).parent / "recipes.json"
 
 Name = Annotated[str, msgspec.Meta(pattern=r"^\w[\w.-]{0,63}$")]
@@ -160,8 +160,8 @@ def is_address(place: str) -> bool:
 
 def parse_index(data: bytes, place: str) -> Index:
     """Parse an index that was read from `place`; raise FormatError with the reason if it is invalid."""
-    if len(data) > LARGEST_INDEX:
-        raise FormatError(f"is larger than an index may be ({LARGEST_INDEX // 10**6} MB)", path=place)
+    if len(data) > MAX_INDEX_BYTES:
+        raise FormatError(f"is larger than an index may be ({MAX_INDEX_BYTES // 10**6} MB)", path=place)
     try:
         return msgspec.json.decode(data, type=Index)
     except (msgspec.ValidationError, ValueError, RecursionError) as error:
@@ -182,7 +182,7 @@ def open_index(place: str | None) -> Source:
         return Source(parse_index(read_bytes(place), place), place)
     from motionmind.registry.download import read_address
 
-    data, reached = read_address(place, LARGEST_INDEX)
+    data, reached = read_address(place, MAX_INDEX_BYTES)
     return Source(parse_index(data, place), reached)
 
 

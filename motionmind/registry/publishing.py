@@ -24,10 +24,6 @@ from motionmind.registry.croissant import describe
 from motionmind.registry.download import check_address, file_hash
 from motionmind.registry.index import Archive, Entry, File, Index, Recipe, parse_index
 
-INDEX = "index.json"
-_STAGED = ".motionmind-unpublished"
-_NEEDED = ("title", "author", "source", "licence")
-
 
 class Published(NamedTuple):
     """The result of publishing: the entry in the index, and the written files."""
@@ -75,7 +71,7 @@ def publish(
     learned, target = load(name, home), Path(folder)
     _check_origin(learned.corpus)
     warn_of_licences(learned.corpus)
-    staged = target / _STAGED
+    staged = target / ".motionmind-unpublished"
     try:
         make_folder(target)
         with locked(target, alone=True, is_new=True) as is_mine:
@@ -106,7 +102,7 @@ def _check_date(date: str) -> None:
 
 def _check_origin(corpus: Corpus) -> None:
     """Check that a corpus has a title, author, source and licence."""
-    if missing := [key for key in _NEEDED if not getattr(corpus, key)]:
+    if missing := [key for key in ("title", "author", "source", "licence") if not getattr(corpus, key)]:
         options = " ".join(f"--{key}" for key in missing)
         raise CorpusError(f"corpus {corpus.name!r} states no {', '.join(missing)}; build it again with {options}")
 
@@ -127,7 +123,7 @@ def _pack(corpus: Corpus, staged: Path, licence_text: str) -> Entry:
         licence=corpus.licence,
         licence_text=licence_text,
         citation=corpus.citation,
-        corpus_version=store.VERSIONS[store.BUILT][-1],
+        corpus_version=store.VERSIONS[store.BUILT],
         clips=len(corpus.clips),
         postures=len(corpus),
         archive=Archive(url=f"{corpus.name}-{sha256[:12]}.tar", size=archive.stat().st_size, sha256=sha256),
@@ -138,7 +134,7 @@ def _pack(corpus: Corpus, staged: Path, licence_text: str) -> Entry:
 
 def _write(entry: Entry, target: Path, staged: Path, described: dict[str, object]) -> tuple[Path, ...]:
     """Move the archive into place, then write the metadata and the index that name it."""
-    index = target / INDEX
+    index = target / "index.json"
     others: tuple[Entry, ...] = ()
     recipes: tuple[Recipe, ...] = ()
     if index.exists():

@@ -108,11 +108,9 @@ def _rate_of(lesson: Lesson, home: Path | None) -> float | Literal["auto"]:
 
 
 def _count_clips(manifest: dict[str, Any]) -> int:
-    """Return the number of clips of a built corpus; manifests of earlier versions list the clips."""
-    if "clips" in manifest:
-        return len(manifest["clips"])
+    """Return the number of clips of a built corpus."""
     with suppress(LookupError, TypeError):
-        return int(manifest["arrays"]["clips.order"][1])
+        return int(manifest["arrays"]["clips.order"]["shape"][0])
     return 0
 
 

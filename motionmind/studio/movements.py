@@ -277,12 +277,11 @@ def version_of(corpus: str, home: Path | None) -> str:
     """Return a hash of a corpus's content; raise MotionMindError if there is no such corpus or it is damaged."""
     folder = store.locate(corpus, home)
     stored = store.load(folder)
-    digest = hashlib.sha256()
-    manifest = {name: value for name, value in stored.manifest.items() if name != "folder"}
-    digest.update(msgspec.json.encode(manifest))
+    if stored.arrays:
+        return stored.digest
+    digest = hashlib.sha256(msgspec.json.encode(stored.manifest))
     # A corpus written by hand has its files beside its manifest.
-    files = stored.files or [path for path in sorted(folder.rglob("*")) if path.is_file() and path.name[:1] != "."]
-    for path in files:
+    for path in sorted(path for path in folder.rglob("*") if path.is_file() and path.name[:1] != "."):
         with path.open("rb") as file:
             digest.update(f"{path.name}\0".encode())
             digest.update(hashlib.file_digest(file, "sha256").digest())

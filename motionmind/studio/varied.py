@@ -16,7 +16,7 @@ from starlette.routing import BaseRoute, Route
 from motionmind.body.motion import Motion
 from motionmind.body.rates import FILM_RATE
 from motionmind.corpus import store
-from motionmind.corpus.recordings import RECORDED_RATE
+from motionmind.corpus.recordings import POSTURE_RATE_FPS
 from motionmind.errors import MotionMindError
 from motionmind.render.markup import base64_of
 from motionmind.studio import api
@@ -267,4 +267,4 @@ def _rate_of(corpus: str, studio: Studio) -> float:
     """Return a corpus's rate, postures a second."""
     folder = store.list_corpora(studio.home).get(corpus)
     rate = store.read_manifest(folder).get("rate") if folder else None
-    return float(rate) if isinstance(rate, int | float) and rate > 0.0 else RECORDED_RATE
+    return float(rate) if isinstance(rate, int | float) and rate > 0.0 else POSTURE_RATE_FPS

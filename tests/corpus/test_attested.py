@@ -155,9 +155,9 @@ def test_what_is_loaded_answers_as_what_was_saved(everything: Engine, tmp_path: 
 def test_a_manifest_that_lacks_an_array_or_has_no_such_weight_is_refused(everything: Engine, tmp_path: Path) -> None:
     everything.save(tmp_path / "old")
     manifest = json.loads((tmp_path / "old" / "manifest.json").read_text("utf-8"))
-    del manifest["arrays"]["transitions.arrives"]
+    del manifest["arrays"]["states"]
     (tmp_path / "old" / "manifest.json").write_text(json.dumps(manifest), "utf-8")
-    with pytest.raises(FormatError, match=r"lists no array transitions\.arrives; build the corpus again: motionmind"):
+    with pytest.raises(FormatError, match=r"lists no array states; rebuild it: motionmind"):
         Engine.load(str(tmp_path / "old"))
     everything.save(tmp_path / "bent")
     clips = entries(tmp_path / "bent")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import random
 import shutil
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import Run
 from numpy.typing import NDArray
 
 from motionmind.corpus import store
@@ -121,8 +123,8 @@ def test_an_array_that_is_missing_or_another_is_named(tmp_path: Path, name: str,
     ("text", "words"),
     [
         ('{"format": "motionmind-corpus", "version": 2}', "version 2; version 1 can be read"),
-        ('{"format": "motionmind-built-corpus", "version": 11}', "version 11; version 10 can be read"),
-        ('{"format": "motionmind-built-corpus", "version": 3, "folder": 3}', "there is no folder 3 beside it"),
+        ('{"format": "motionmind-built-corpus", "version": 11, "folder": 3}', "there is no folder 3 beside it"),
+        ('{"format": "motionmind-built-corpus", "version": 11}', "there is no key `folder`"),
         ('{"format": "motionmind-motion", "version": 1}', "is 'motionmind-motion' version 1"),
         ("{}", "is None version None"),
         ("[]", "cannot be read as a corpus's manifest"),
@@ -130,8 +132,7 @@ def test_an_array_that_is_missing_or_another_is_named(tmp_path: Path, name: str,
         ("", "cannot be read as a corpus's manifest"),
         ("\udcff", "cannot be read as a corpus's manifest"),
         ("[" * 100_000, "cannot be read as a corpus's manifest"),
-        ('{"format": "motionmind-built-corpus", "version": 1}', "does not say which arrays there are"),
-        ('{"format": "motionmind-built-corpus", "version": 1, "arrays": [1]}', "does not say which arrays there are"),
+        ('{"format": "motionmind-built-corpus", "version": "1"}', "version '1'; version 11 can be read"),
     ],
 )
 def test_a_manifest_that_is_none_is_a_format_error(tmp_path: Path, text: str, words: str) -> None:
@@ -140,9 +141,55 @@ def test_a_manifest_that_is_none_is_a_format_error(tmp_path: Path, text: str, wo
         store.load(tmp_path)
 
 
+@pytest.mark.parametrize(("version", "age"), [(1, "an earlier"), (10, "an earlier"), (12, "a later")])
+def test_a_corpus_of_another_version_is_one_line_with_the_command_that_rebuilds_it(
+    run: Run, tmp_path: Path, version: int, age: str
+) -> None:
+    folder = tmp_path / "home" / "corpora" / "mine"
+    (folder / "3").mkdir(parents=True)
+    for file in (folder / "states.npy", folder / "3" / "states.npy"):
+        np.save(file, np.zeros(3))
+    (folder / store.MANIFEST).write_text(json.dumps({"format": store.BUILT, "version": version, "folder": 3}), "utf-8")
+    remedy = f"{folder}/manifest.json: a corpus of {age} version; rebuild it: motionmind corpus build mine FILES\n"
+    ran = run("corpus", "info", "mine")
+    assert (ran.code, ran.out, ran.err) == (2, "", f"error: {remedy}")
+    listed = run("corpus", "list")
+    assert (listed.code, listed.err) == (0, f"note: {remedy}")
+    store.save(folder, MANIFEST, arrays())
+    assert [path.name for path in folder.iterdir() if path.is_dir()] == ["4"]
+    assert not (folder / "states.npy").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"../../etc/passwd": {"type": "<f8", "shape": [3], "sha256": ""}}, "is not the name of an array"),
+        ({"a": {"type": "|O8", "shape": [3], "sha256": ""}}, "type"),
+        ({"a": {"type": "<f8", "shape": [-1], "sha256": ""}}, "shape"),
+        ({"a": None}, "Expected `object`"),
+    ],
+)
+def test_an_entry_of_an_array_that_is_none_is_a_format_error(tmp_path: Path, change: object, words: str) -> None:
+    store.save(tmp_path / "arms", MANIFEST, arrays())
+    path = tmp_path / "arms" / store.MANIFEST
+    path.write_text(json.dumps(json.loads(path.read_text("utf-8")) | {"arrays": change}), "utf-8")
+    with pytest.raises(FormatError, match=rf"^.*manifest.json: .*{words}.*; rebuild it: "):
+        store.load(tmp_path / "arms")
+
+
+def test_a_flipped_byte_is_noticed(tmp_path: Path) -> None:
+    store.save(tmp_path / "arms", MANIFEST, arrays())
+    file = tmp_path / "arms" / "1" / "rotations.npy"
+    data = bytearray(file.read_bytes())
+    data[-1] ^= 1
+    file.write_bytes(data)
+    with pytest.raises(FormatError, match=r"rotations.npy: its checksum is not the manifest's; rebuild it: "):
+        store.load(tmp_path / "arms")
+
+
 SOURCE: dict[str, Any] = {
     "format": store.FORMAT,
-    "version": store.VERSIONS[store.FORMAT][-1],
+    "version": store.VERSIONS[store.FORMAT],
     "name": "arms",
     "title": "Arms",
     "author": "us",

@@ -1,4 +1,4 @@
-"""Learning from a corpus and keeping what was learned: what it depends on, and reading what older versions kept."""
+"""Learning from a corpus: what it depends on, and how it is summarised."""
 
 from __future__ import annotations
 
@@ -13,14 +13,11 @@ from pathlib import Path
 import numpy as np
 import platformdirs
 import pytest
-from saved_corpora import as_in_0_1
 
 import motionmind
-from motionmind.corpus import store
 from motionmind.corpus.fingerprint import LEARNED_BY, fingerprint
 from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.summary import CorpusCheck, CorpusSummary, summarise, to_plain
-from motionmind.learned.validity import MOVEMENT
 from motionmind.tween.engine import Engine
 
 PACKAGE = Path(motionmind.__file__).parent
@@ -34,23 +31,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-# --- keeping ----------------------------------------------------------------------------------------------------------
-
-
-def test_of_a_corpus_of_0_1_all_but_the_movement_is_learned_again(built: Path, tmp_path: Path) -> None:
-    old = tmp_path / "old"
-    shutil.copytree(built, old)
-    as_in_0_1(old)
-    manifest = json.loads((old / store.MANIFEST).read_text("utf-8"))
-    for name in manifest["arrays"].keys() - set(MOVEMENT):
-        del manifest["arrays"][name]
-        (old / f"{name}.npy").unlink()
-    (old / store.MANIFEST).write_text(json.dumps(manifest), "utf-8")
-    LearnedCorpus.load(str(old)).save(tmp_path / "new")
-    arrays, again = store.load(built).arrays, store.load(tmp_path / "new").arrays
-    assert arrays.keys() == again.keys()
-    for name, array in arrays.items():
-        np.testing.assert_array_equal(again[name], array, name)
+# --- loading ----------------------------------------------------------------------------------------------------------
 
 
 def test_an_engine_is_what_its_corpus_is_learned_as(built: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +13,6 @@ from motionmind._typing import Floats
 from motionmind.body.contact import floor_height, foot_slides, lowest_height
 from motionmind.body.human import human23
 from motionmind.body.plausibility import at_rate
-from motionmind.corpus import store
 from motionmind.corpus.clip import JointRepair
 from motionmind.learned.plausibility import MEASURES, MIN_FOOT_SPEED_LIMIT, Plausibility, learn_plausibility
 
@@ -86,20 +84,6 @@ def test_limits_survive_the_disk(tmp_path: Path) -> None:
     np.testing.assert_array_equal(opened.most, BALLET.plausibility.most)
     np.testing.assert_array_equal(opened.fastest, BALLET.plausibility.fastest)
     np.testing.assert_array_equal(opened.slides, BALLET.plausibility.slides)
-
-
-def test_a_corpus_that_was_built_before_feet_were_measured_is_read(tmp_path: Path) -> None:
-    BALLET.save(tmp_path / "ballet")
-    path = tmp_path / "ballet" / store.MANIFEST
-    manifest = json.loads(path.read_text("utf-8"))
-    manifest["arrays"].pop("plausibility.slides")
-    path.write_text(json.dumps(manifest | {"version": 7}), "utf-8")
-    for again in ("ballet", "again"):
-        opened = Engine.load(str(tmp_path / again))
-        assert np.isnan(opened.plausibility.slides).tolist() == [True]
-        opened.save(tmp_path / "again")
-    first, last = (opened.corpus.motion(opened.corpus.clips[0]).posture(frame) for frame in (0, 9))
-    assert len(opened.tween(first, last).motion) > 9
 
 
 def test_feet_are_seldom_faster_near_the_floor_than_was_learned() -> None:

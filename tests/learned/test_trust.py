@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,9 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionmind._typing import Floats
-from motionmind.corpus import store
-from motionmind.errors import FormatError
 from motionmind.learned import persistence
 from motionmind.learned.trust import (
     DISTANCE_RATIOS,
@@ -112,36 +108,8 @@ def engine() -> Engine:
     return replace(known, carriage=replace(known.carriage, trust=trust))
 
 
-def test_trust_is_kept_with_the_corpus_and_checked(engine: Engine, tmp_path: Path) -> None:
+def test_trust_is_kept_with_the_corpus(engine: Engine, tmp_path: Path, empty_cache: Path) -> None:
     persistence.save(engine, tmp_path / "kept")
     loaded = persistence.load(str(tmp_path / "kept")).carriage.trust
     for name in ("table", "lasts", "spread"):
         np.testing.assert_array_equal(getattr(loaded, name), getattr(engine.carriage.trust, name))
-    place = store.load(tmp_path / "kept").place
-    for name, value in (("table", 1.1), ("lasts", 0.0), ("spread", np.nan)):
-        _write_and_fail(place / f"trust.{name}.npy", value, str(tmp_path / "kept"))
-
-
-def _write_and_fail(file: Path, value: float, folder: str) -> None:
-    whole, array = file.read_bytes(), np.load(file)
-    np.save(file, _with(array, value))
-    with pytest.raises(FormatError, match=r"trust\.\w+ .*corpus build"):
-        persistence.load(folder)
-    file.write_bytes(whole)
-
-
-def _with(array: Floats, value: float) -> Floats:
-    array[0] = value
-    return array
-
-
-def test_of_a_corpus_of_an_earlier_version_the_prior_is_taken(engine: Engine, tmp_path: Path) -> None:
-    folder = tmp_path / "earlier"
-    persistence.save(engine, folder)
-    manifest = json.loads((folder / store.MANIFEST).read_bytes())
-    for name in ("table", "lasts", "spread"):
-        del manifest["arrays"][f"trust.{name}"]
-    (folder / store.MANIFEST).write_text(json.dumps(manifest))
-    loaded = persistence.load(str(folder)).carriage.trust
-    np.testing.assert_array_equal(loaded.table, PRIOR_TRUST.table)
-    np.testing.assert_array_equal(loaded.spread, engine.carriage.trust.spread)

@@ -170,7 +170,7 @@ def test_no_network_is_said_at_once_and_what_has_come_stays(place: Place) -> Non
 
 
 def test_a_server_that_says_nothing_is_not_waited_for(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(downloads, "_TIMEOUT", 0.1)
+    monkeypatch.setattr(downloads, "_TIMEOUT_S", 0.1)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         url = f"http://127.0.0.1:{silent.getsockname()[1]}/file"
         with pytest.raises(CorpusError, match=r"nothing came for 0\.1 s"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import random
 import shutil
@@ -14,11 +15,14 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from saved_corpora import put_array
 
-from motionmind.corpus import store, versions
+from motionmind.corpus import store
+from motionmind.corpus.arrays import CHECKED
 from motionmind.corpus.clip import JointFlip, JointRepair
 from motionmind.errors import FormatError, MotionMindError, NoPathError
-from motionmind.learned.validity import FORMS
+from motionmind.learned.persistence import _read_movement
+from motionmind.learned.validity import MOVEMENT
 from motionmind.tween.engine import Engine
 
 TRIALS = 1000
@@ -74,95 +78,80 @@ def use(engine: Engine, rng: random.Random) -> None:
         engine.check(pairs=10)
 
 
-def test_a_thousand_alterations_are_each_an_error_in_a_line_or_work(built: Path, tmp_path: Path) -> None:
+def test_a_thousand_alterations_are_each_an_error_in_a_line_or_work(
+    built: Path, tmp_path: Path, empty_cache: Path
+) -> None:
     folder = tmp_path / "altered"
     shutil.copytree(built, folder)
-    place = store.load(folder).place
-    rng = random.Random(0)
-    names = [name for name in FORMS if np.load(place / f"{name}.npy").size]
+    stored, rng = store.load(folder), random.Random(0)
+    names = [name for name in MOVEMENT if stored.arrays[name].size]
     messages: list[str] = []
     used = 0
     for trial in range(TRIALS):
-        file = place / f"{names[trial % len(names)]}.npy"
-        whole = file.read_bytes()
-        np.save(file, altered(np.load(file), rng))
+        name = names[trial % len(names)]
+        put_array(folder, name, altered(stored.arrays[name], rng))
         try:
-            engine = Engine.load(str(folder))
+            _read_movement(folder, store.load(folder))
             if trial // len(names) % EVERY == 0:
                 used += 1
-                use(engine, rng)
+                use(Engine.load(str(folder)), rng)
         except NoPathError:
             pass
         except MotionMindError as error:
             messages.append(str(error))
-        file.write_bytes(whole)
+        put_array(folder, name, stored.arrays[name])
     assert [message for message in messages if "\n" in message or len(message) > 1000] == []
     assert len(messages) > TRIALS // 4
-    assert used > TRIALS // EVERY // 4
+    assert used > TRIALS // EVERY // 8
 
 
-@pytest.mark.parametrize("name", [name for name, form in FORMS.items() if form.kind in ("i4", "i8")])
+@pytest.mark.parametrize("name", [name for name, form in MOVEMENT.items() if form.kind in ("i4", "i8")])
 @pytest.mark.parametrize("value", [-1, 2**31 - 1])
 def test_an_index_of_what_is_not_there_is_refused_wherever_it_stands(
     built: Path, tmp_path: Path, name: str, value: int
 ) -> None:
     folder = tmp_path / "altered"
     shutil.copytree(built, folder)
-    file = store.load(folder).place / f"{name}.npy"
-    whole = np.load(file)
+    whole = store.load(folder).arrays[name]
     for at in {0, whole.size // 2, whole.size - 1}:
         array = whole.copy()
         array.reshape(-1)[at] = value
-        np.save(file, array)
-        if name == "coordination.parents" and value == -1:
-            continue  # a chain may have no coordination
-        with pytest.raises(FormatError, match=f"{name} .*; build the corpus again"):
+        put_array(folder, name, array)
+        with pytest.raises(FormatError, match=f"{name} .*; rebuild it"):
             Engine.load(str(folder))
 
 
-@pytest.mark.parametrize("name", ["transitions.attests", "transitions.arrives"])
-def test_the_posture_after_the_last_is_refused(built: Path, tmp_path: Path, name: str) -> None:
+def test_the_state_after_the_last_is_refused(built: Path, tmp_path: Path) -> None:
     folder = tmp_path / "altered"
     shutil.copytree(built, folder)
-    file = store.load(folder).place / f"{name}.npy"
-    array = np.load(file)
-    array[0] = len(Engine.load(str(built)).corpus)
-    np.save(file, array)
-    with pytest.raises(FormatError, match=f"{name} holds an index of what is not there"):
+    array = store.load(folder).arrays["states"].copy()
+    array[-1, 1] = Engine.load(str(built)).space.sizes[1]
+    put_array(folder, "states", array)
+    with pytest.raises(FormatError, match="states holds an index out of range"):
         Engine.load(str(folder))
 
 
-@pytest.mark.parametrize("name", ["transitions.targets", "bridges.targets", "coordination.pair_states"])
-def test_the_index_after_the_last_and_one_twice_in_a_row_are_refused(built: Path, tmp_path: Path, name: str) -> None:
+def test_times_that_fall_within_a_clip_are_refused(built: Path, tmp_path: Path) -> None:
     folder = tmp_path / "altered"
     shutil.copytree(built, folder)
-    place = store.load(folder).place
-    whole, engine = np.load(place / f"{name}.npy"), Engine.load(str(built))
-    last = len(engine.corpus.skeleton) - 1 if name.startswith("coordination") else -1  # facing is not coordinated
-    rows = np.load(place / f"{name.replace('targets', 'indptr').replace('states', 'ptr')}.npy")
-    first = rows[np.diff(rows).argmax()]
-    for at, value, fault in (
-        (first + 1, whole[first], "does not rise within a row"),
-        (-1, engine.space.sizes[last], "holds an index of what is not there"),
-    ):
-        array = whole.copy()
-        array[at] = value
-        np.save(place / f"{name}.npy", array)
-        with pytest.raises(FormatError, match=f"{name} .*{fault}"):
+    stored = store.load(folder)
+    array, start = stored.arrays["times"].copy(), stored.arrays["clips.starts"][1]
+    for later in (start + 1, start - 1):  # the second posture of a clip, and the last of the one before
+        changed = array.copy()
+        changed[later] = changed[later - 1]
+        put_array(folder, "times", changed)
+        with pytest.raises(FormatError, match="times does not rise within a clip"):
             Engine.load(str(folder))
 
 
-@pytest.mark.parametrize("name", [name for name, form in FORMS.items() if form.kind == "f8"])
+@pytest.mark.parametrize("name", [name for name, form in MOVEMENT.items() if form.kind == "f8"])
 def test_what_is_no_number_is_refused_wherever_it_stands(built: Path, tmp_path: Path, name: str) -> None:
     folder = tmp_path / "altered"
     shutil.copytree(built, folder)
-    file = store.load(folder).place / f"{name}.npy"
-    array = np.load(file)
+    array = store.load(folder).arrays[name].copy()
     for value in (np.nan, np.inf):
-        if not array.size or (FORMS[name].or_nan and np.isnan(value)):
-            continue
         array.reshape(-1)[array.size // 2] = value
-        np.save(file, array)
+        put_array(folder, name, array)
         with pytest.raises(MotionMindError, match=name):
             Engine.load(str(folder))
 
@@ -181,74 +170,60 @@ def test_a_clip_or_a_fault_that_cannot_be_read_is_refused(
 ) -> None:
     folder = tmp_path / "altered"
     shutil.copytree(built, folder)
-    file = store.load(folder).place / f"{name}.npy"
-    array = np.load(file)
+    array = store.load(folder).arrays[name].copy()
     array[: len(value)] = np.frombuffer(value, np.uint8)
-    np.save(file, array)
-    with pytest.raises(FormatError, match=f"{fault}: .*; build the corpus again"):
+    put_array(folder, name, array)
+    with pytest.raises(FormatError, match=f"{fault}: .*; rebuild it"):
         Engine.load(str(folder))
 
 
 def test_columns_that_are_of_other_clips_are_refused(built: Path, tmp_path: Path) -> None:
     folder = tmp_path / "altered"
     shutil.copytree(built, folder)
-    place, clips = store.load(folder).place, len(Engine.load(str(built)).corpus.clips)
+    arrays, clips = store.load(folder).arrays, len(Engine.load(str(built)).corpus.clips)
     for name, change in (
         ("clips.weights", lambda array: 0.5 * array),
         ("clips.order", lambda array: np.full(clips, 1, np.int32)),
         ("clips.starts", lambda array: array + np.eye(1, clips + 1, 1, dtype=np.int64)[0]),
     ):
-        whole = np.load(place / f"{name}.npy")
-        np.save(place / f"{name}.npy", change(whole))
-        with pytest.raises(FormatError, match=f"{name} is not what clips.text says; build the corpus again"):
+        put_array(folder, name, change(arrays[name]))
+        with pytest.raises(FormatError, match=f"{name} is not what clips.text says; rebuild it"):
             Engine.load(str(folder))
-        np.save(place / f"{name}.npy", whole)
+        put_array(folder, name, arrays[name])
     Engine.load(str(folder))
 
 
-def test_steps_that_are_of_another_clip_are_refused(built: Path, tmp_path: Path) -> None:
+def test_arrays_are_checked_once_and_again_when_a_file_is_another(
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder = tmp_path / "altered"
-    shutil.copytree(built, folder)
-    file = store.load(folder).place / "gauge.starts.npy"
-    whole = np.load(file)
-    for column, step in (
-        (0, 1),
-        (1, -int(whole[1, 1])),
-    ):  # one step less of the second clip; no still moment of the first
-        array = whole.copy()
-        array[1, column] += step
-        np.save(file, array)
-        with pytest.raises(FormatError, match=r"gauge.starts has not the steps and still moments .*; build the corpus"):
-            Engine.load(str(folder))
-
-
-def test_arrays_are_checked_once_and_again_when_a_file_is_another(built: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "altered"
-    shutil.copytree(built, folder, ignore=shutil.ignore_patterns(versions.CHECKED))
+    shutil.copytree(built, folder, ignore=shutil.ignore_patterns(CHECKED))
     Engine.load(str(folder))
-    mark = store.load(folder).place / versions.CHECKED
+    mark = store.load(folder).place / CHECKED
     assert not mark.exists()  # files as new as this may change and keep their times
     time.sleep(2.1)
     Engine.load(str(folder))
     assert store.load(folder).is_checked
     written = mark.stat().st_mtime_ns
-    Engine.load(str(folder))
+    with monkeypatch.context() as patch:
+        patch.setattr(hashlib, "file_digest", lambda *_: pytest.fail("it was hashed again"))
+        Engine.load(str(folder))
     assert mark.stat().st_mtime_ns == written
-    file = mark.with_name("bridges.targets.npy")
+    file = mark.with_name("states.npy")
     before = file.stat()
     array = np.load(file)
     array[3] = 10**6
     with file.open("r+b") as same:
         np.save(same, array)
     os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
-    with pytest.raises(FormatError, match=r"bridges\.targets holds an index of what is not there"):
+    with pytest.raises(FormatError, match=r"states.npy: its checksum is not the manifest's"):
         Engine.load(str(folder))
 
 
 def test_a_corpus_that_cannot_be_written_to_is_checked_each_time(built: Path, tmp_path: Path) -> None:
     folder = tmp_path / "altered"
-    shutil.copytree(built, folder, ignore=shutil.ignore_patterns(versions.CHECKED))
-    mark = store.load(folder).place / versions.CHECKED
+    shutil.copytree(built, folder, ignore=shutil.ignore_patterns(CHECKED))
+    mark = store.load(folder).place / CHECKED
     mark.mkdir()
     time.sleep(2.1)
     Engine.load(str(folder))

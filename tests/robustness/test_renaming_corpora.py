@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import saved_corpora
 from faults import failing_at
-from saved_corpora import MANIFEST, arrays, as_in_0_1, names, seed_of
+from saved_corpora import MANIFEST, arrays, names, seed_of
 
 from motionmind.corpus import store, versions
 from motionmind.errors import CorpusError
@@ -30,15 +30,6 @@ def saved(folder: Path) -> None:
     store.save(folder, MANIFEST, arrays(1))
 
 
-def saved_by_0_1(folder: Path) -> None:
-    """A corpus of 0.1 is there."""
-    store.save(folder, MANIFEST, arrays(1))
-    as_in_0_1(folder)
-
-
-each_form = pytest.mark.parametrize("before", [saved, saved_by_0_1])
-
-
 def own(mine: Path) -> dict[str, Path]:
     """A user's corpora."""
     return {name: place for name, place in store.list_corpora(mine.parents[1]).items() if place.parent == mine.parent}
@@ -51,22 +42,18 @@ def run(folder: Path, do: str, change: int) -> bool:
     return code == 0
 
 
-@each_form
-def test_a_renamed_corpus_is_the_same_under_its_new_name(mine: Path, before: Callable[[Path], None]) -> None:
-    before(mine)
+def test_a_renamed_corpus_is_the_same_under_its_new_name(mine: Path) -> None:
+    saved(mine)
     target = store.rename("arms", "legs", mine.parents[1])
     assert own(mine) == {"legs": target}
     assert (seed_of(target), store.read_manifest(target)["name"]) == (1, "legs")
     assert [path.name for path in mine.parent.iterdir()] == ["legs"]
 
 
-@each_form
-def test_a_kill_leaves_it_under_one_of_its_names_and_renaming_goes_on(
-    mine: Path, before: Callable[[Path], None]
-) -> None:
+def test_a_kill_leaves_it_under_one_of_its_names_and_renaming_goes_on(mine: Path) -> None:
     for change in count(1):
         shutil.rmtree(mine.parent, ignore_errors=True)
-        before(mine)
+        saved(mine)
         ended = run(mine, "rename", change)
         ((name, place),) = own(mine).items()
         assert name in ("arms", "legs")
@@ -79,11 +66,10 @@ def test_a_kill_leaves_it_under_one_of_its_names_and_renaming_goes_on(
     assert change > 2
 
 
-@each_form
-def test_a_kill_leaves_a_whole_corpus_or_none(mine: Path, before: Callable[[Path], None]) -> None:
+def test_a_kill_leaves_a_whole_corpus_or_none(mine: Path) -> None:
     for change in count(1):
         shutil.rmtree(mine.parent, ignore_errors=True)
-        before(mine)
+        saved(mine)
         ended = run(mine, "delete", change)
         if own(mine):
             assert seed_of(mine) == 1

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 import saved_corpora
 from faults import failing_at
-from saved_corpora import MANIFEST, arrays, as_in_0_1, names, seed_of
+from saved_corpora import MANIFEST, arrays, names, seed_of
 
 from motionmind import files
 from motionmind.corpus import store, versions
@@ -48,12 +48,6 @@ def saved(folder: Path) -> None:
     store.save(folder, MANIFEST, arrays(1))
 
 
-def saved_by_0_1(folder: Path) -> None:
-    """A corpus of 0.1 is there."""
-    store.save(folder, MANIFEST, arrays(1))
-    as_in_0_1(folder)
-
-
 def check(folder: Path, before: Callable[[Path], None]) -> None:
     """Check that all is old or all new, that nothing else is listed, and that the next build mends the rest."""
     listed = {name for name, place in store.list_corpora(folder.parents[1]).items() if place.parent == folder.parent}
@@ -67,7 +61,7 @@ def check(folder: Path, before: Callable[[Path], None]) -> None:
     assert sorted(Path(name).name for name in names(folder.parent)) == WHOLE
 
 
-@pytest.mark.parametrize("before", [nothing, saved, saved_by_0_1])
+@pytest.mark.parametrize("before", [nothing, saved])
 def test_a_kill_before_any_change_of_the_disk_leaves_old_or_new(mine: Path, before: Callable[[Path], None]) -> None:
     for change in count(1):
         shutil.rmtree(mine.parent, ignore_errors=True)
@@ -83,28 +77,24 @@ def test_a_kill_before_any_change_of_the_disk_leaves_old_or_new(mine: Path, befo
 
 @pytest.mark.skipif(not shutil.which("strace"), reason="there is no strace")
 @pytest.mark.parametrize("call", CALLS)
-@pytest.mark.parametrize("before", [saved, saved_by_0_1])
-def test_a_kill_at_any_call_of_the_system_leaves_old_or_new(
-    mine: Path, before: Callable[[Path], None], call: str
-) -> None:
+def test_a_kill_at_any_call_of_the_system_leaves_old_or_new(mine: Path, call: str) -> None:
     for number in count(1):
         shutil.rmtree(mine.parent, ignore_errors=True)
-        before(mine)
+        saved(mine)
         kill = ("-e", f"trace={call}", "-e", f"inject={call}:signal=KILL:when={number}")
         code = saved_corpora.traced(kill, folder=mine, seed=2)
         assert code in (0, -9)
         ended = code == 0
-        check(mine, before)
+        check(mine, saved)
         if ended:
             break
     assert number > 1 or call in ("unlink", "rmdir", "unlinkat")
 
 
-@pytest.mark.parametrize("before", [saved, saved_by_0_1])
 def test_an_error_or_ctrl_c_on_the_way_leaves_the_old_one_and_nothing_else(
-    mine: Path, monkeypatch: pytest.MonkeyPatch, before: Callable[[Path], None]
+    mine: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    before(mine)
+    saved(mine)
     there = names(mine.parent)
     calls = {os: ["fsync", "replace", "mkdir"], Path: ["mkdir", "replace"], np.lib.format: ["write_array_header_1_0"]}
     for owner, name in [(owner, name) for owner, all_of_it in calls.items() for name in all_of_it]:
@@ -124,7 +114,7 @@ def test_an_error_or_ctrl_c_on_the_way_leaves_the_old_one_and_nothing_else(
                     assert sorted(Path(file).name for file in names(mine.parent)) == WHOLE
                     break
             shutil.rmtree(mine)
-            before(mine)
+            saved(mine)
 
 
 def test_a_disk_without_room_says_so_in_its_own_words(mine: Path) -> None:
@@ -142,14 +132,13 @@ def test_a_disk_without_room_says_so_in_its_own_words(mine: Path) -> None:
 # --- leftovers --------------------------------------------------------------------------------------------------------
 
 
-def test_what_0_1_left_when_it_was_killed_is_put_back_then_removed(mine: Path) -> None:
-    saved_by_0_1(mine)
+def test_what_a_killed_deletion_left_is_removed_and_other_folders_are_kept(mine: Path) -> None:
+    saved(mine)
     shutil.copytree(mine, mine.with_name(".arms-0123456789ab"))
     diary = mine.with_name(".arms-0123456789ac")
     diary.mkdir()
     (diary / "diary.txt").write_text("dear diary")
-    mine.rename(mine.with_name(".arms-0123456789ab-old"))
-    assert {"arms", ".arms-0123456789ab", ".arms-0123456789ac"}.isdisjoint(store.list_corpora(mine.parents[1]))
+    assert {".arms-0123456789ab", ".arms-0123456789ac"}.isdisjoint(store.list_corpora(mine.parents[1]))
     with pytest.raises(ValueError, match="Object arrays"):
         store.save(mine, MANIFEST, {"one": np.array([None])})
     assert seed_of(mine) == 1
@@ -228,7 +217,6 @@ def test_a_file_that_another_program_holds_open_is_replaced_when_it_is_closed(
 def writers(mine: Path) -> Iterator[None]:
     """Two processes that replace a corpus without end, by what holds a seed of its own."""
     store.save(mine, MANIFEST, arrays(0))
-    as_in_0_1(mine)
     program = (
         "import sys; from pathlib import Path; from saved_corpora import *\n"
         "for seed in range(int(sys.argv[2]), 10**9, 2): store.save(Path(sys.argv[1]), MANIFEST, arrays(seed))"
@@ -308,7 +296,7 @@ def test_a_version_made_anew_under_the_number_of_one_that_was_to_go_stays(
 def test_a_corpus_whose_version_is_gone_is_one_error(mine: Path) -> None:
     store.save(mine, MANIFEST, arrays(1))
     shutil.rmtree(mine / "1")
-    with pytest.raises(FormatError, match=re.escape("there is no folder 1 beside it; build the corpus again")):
+    with pytest.raises(FormatError, match=re.escape("there is no folder 1 beside it; rebuild it")):
         store.load(mine)
 
 
@@ -329,15 +317,15 @@ def test_a_version_that_is_missing_for_a_moment_is_waited_for(mine: Path, monkey
 def test_a_version_that_is_replaced_while_it_is_read_is_read_anew(mine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where a disk has no locks a version may be removed under its readers."""
     store.save(mine, MANIFEST, arrays(1))
-    read = store._open_arrays
+    read = store.open_arrays
 
-    def interrupted(folder: Path, place: Path, shapes: dict[str, Any]) -> dict[str, Any]:
+    def interrupted(place: Path, entries: Any, *, verify: bool) -> dict[str, Any]:
         monkeypatch.undo()
         store.save(mine, MANIFEST, arrays(2))
         shutil.rmtree(place)
-        return read(folder, place, shapes)
+        return read(place, entries, verify=verify)
 
-    monkeypatch.setattr(store, "_open_arrays", interrupted)
+    monkeypatch.setattr(store, "open_arrays", interrupted)
     assert seed_of(mine) == 2
 
 

@@ -22,9 +22,17 @@ from saved_corpora import entries, put_entries
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus import store
+from motionmind.corpus import cache, store
 from motionmind.discretize.codebook import Codebook
-from motionmind.errors import CorpusError, FormatError, MotionMindError, NoPathError, SkeletonError, WrongTypeError
+from motionmind.errors import (
+    CorpusError,
+    FormatError,
+    MotionMindError,
+    MotionMindWarning,
+    NoPathError,
+    SkeletonError,
+    WrongTypeError,
+)
 from motionmind.footing.root import stand
 from motionmind.formats import read_motion, read_posture, write_motion, write_posture
 from motionmind.geometry import rotations as rot
@@ -408,8 +416,8 @@ def test_a_built_corpus_that_is_damaged_is_a_clear_error(six_segments: Engine, t
         with pytest.raises(MotionMindError, match=words):
             Engine.load(str(good))
 
-    for key in manifest.keys() - {"format", "version", "skip"}:  # corpora built earlier do not say what was skipped
-        refused(lambda broken, key=key: broken.pop(key), "arrays" if key == "arrays" else f"no key `{key}`")
+    for key in manifest.keys() - {"format", "version", "skip"}:
+        refused(lambda broken, key=key: broken.pop(key), "object" if key == "arrays" else f"no key `{key}`")
     for name in manifest["arrays"]:
         refused(lambda broken, name=name: broken["arrays"].pop(name), f"lists no array {name}")
     refused(lambda broken: broken["skeleton"]["names"].pop(), "joints need as many parents")
@@ -426,22 +434,21 @@ def test_a_built_corpus_that_is_damaged_is_a_clear_error(six_segments: Engine, t
         Engine.load(str(good))
     put_entries(good, clips)
     Engine.load(str(good))
-    (good / "1" / "carriage.travel.npy").unlink()
-    with pytest.raises(FormatError, match=r"carriage\.travel\.npy"):
+    (good / "1" / "root.npy").unlink()
+    with pytest.raises(FormatError, match=r"root\.npy"):
         Engine.load(str(good))
 
 
 @pytest.fixture
-def written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def written(tmp_path: Path, empty_cache: Path) -> Path:
     """A corpus as a person writes it; what is learned from it is kept in tmp_path / "cache"."""
-    monkeypatch.setattr(store, "cache", lambda: tmp_path / "cache")
     folder = tmp_path / "corpora" / "mine"
     (folder / "clips").mkdir(parents=True)
     for clip in CLIPS:
         write_motion(folder / "clips" / f"{clip.name}.json", clip)
     manifest = {
         "format": store.FORMAT,
-        "version": store.VERSIONS[store.FORMAT][-1],
+        "version": store.VERSIONS[store.FORMAT],
         **{"name": "mine", "title": "Insects", "author": "us", "source": "here", "licence": "CC0-1.0"},
         **{"facing": "free", "rate": None, "discretization": {"kind": "codebook", "tolerance": 15}},
         "clips": [{"name": f"the {c.name}", "file": f"clips/{c.name}.json", "about": "segments"} for c in CLIPS],
@@ -453,32 +460,39 @@ def written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_written_corpus_is_learned_once_and_again_when_it_changes(written: Path, tmp_path: Path) -> None:
     first = Engine.load("mine", tmp_path)
     assert first.info()["clips"][0] == {"name": "the scurry", "postures": 40, "about": "segments", "performer": "us"}
-    (built,) = (tmp_path / "cache").iterdir()
-    before = {path: path.stat().st_mtime_ns for path in built.rglob("*.*")}
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.*")}
     assert Engine.load("mine", tmp_path).info() == first.info()
-    assert {path: path.stat().st_mtime_ns for path in built.rglob("*.*")} == before
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.*")} == before
     write_motion(written / "clips" / "hurry.json", CLIPS[1].slice(0, 30))
     assert Engine.load("mine", tmp_path).info()["postures"] == 70
 
 
 def test_a_damaged_cache_is_learned_again(written: Path, tmp_path: Path) -> None:
     info = Engine.load("mine", tmp_path).info()
-    (built,) = (tmp_path / "cache").iterdir()
-    for damage in (
-        lambda: next(built.rglob("states.npy")).unlink(),
-        lambda: (built / "manifest.json").write_text("{"),
-        lambda: shutil.rmtree(built),
+    (built,) = (tmp_path / "cache" / "corpora").iterdir()
+    for damage, words in (
+        (
+            lambda: next(built.rglob("states.npy")).unlink(),
+            r"states\.npy: cannot be read .*; learning from mine",
+        ),
+        (lambda: (built / "manifest.json").write_text("{"), r"manifest\.json: cannot be read .*; learning from mine"),
     ):
         damage()
-        assert Engine.load("mine", tmp_path).info() == info
+        with pytest.warns(MotionMindWarning, match=words) as warned:
+            assert Engine.load("mine", tmp_path).info() == info
+        assert len(warned) == 1
         store.load(built)
+    shutil.rmtree(built)
+    assert Engine.load("mine", tmp_path).info() == info
 
 
 def test_a_cache_that_cannot_be_written_is_done_without(
     written: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(store, "cache", lambda: Path("/proc/nowhere"))
-    assert Engine.load("mine", tmp_path).info()["postures"] == 80
+    monkeypatch.setattr(cache, "cache_folder", lambda room: Path("/proc/nowhere") / room)
+    with pytest.warns(MotionMindWarning, match=r"cannot be written: .*; each command will learn mine again") as warned:
+        assert Engine.load("mine", tmp_path).info()["postures"] == 80
+    assert len(warned) == 1
 
 
 def test_what_is_wrong_with_a_written_corpus_is_named(written: Path, tmp_path: Path) -> None:

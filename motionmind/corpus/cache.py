@@ -1,0 +1,134 @@
+"""The user's cache folder, with what was learned from corpora.
+
+    learned/3f9a...-c0de.../manifest.json, *.npy
+
+A folder's name is a hash of a corpus, whatever its name, and of the code that learned from it: whatever changes either
+finds another folder, or none. A writer fills a hidden folder and renames it, so that a killed one leaves nothing that
+is found. Each array has a checksum. Nothing here is ever needed: what is missing or damaged is learned again.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import time
+import warnings
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+import platformdirs
+
+from motionmind.corpus.arrays import (
+    identify,
+    is_checked,
+    open_arrays,
+    parse_entries,
+    remember_checked,
+    write_arrays,
+)
+from motionmind.corpus.fingerprint import code_name
+from motionmind.errors import FormatError, MotionMindWarning
+from motionmind.files import make_folder
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_MANIFEST = "manifest.json"
+_UNFINISHED_S, _UNUSED_S = 86_400.0, 60 * 86_400.0  # after which a folder is removed
+
+
+def cache_folder(room: str) -> Path:
+    """Return one of the folders in the user's cache: "corpora" (bundled ones, compiled), "learned" or "archives"."""
+    return Path(platformdirs.user_cache_dir("motionmind", appauthor=False)) / room
+
+
+def recall(corpus: str) -> dict[str, NDArray[Any]] | None:
+    """Return the arrays that this code learned from a corpus, by its hash; None if they are not kept, or damaged.
+
+    Warns:
+        MotionMindWarning: they are damaged, and will be learned again.
+    """
+    folder = _folder(corpus)
+    try:
+        data = (folder / _MANIFEST).read_bytes()
+    except OSError:
+        return None
+    try:
+        entries = parse_entries(msgspec.json.decode(data))
+        identity = identify(folder, data, entries)
+        is_known = is_checked(folder, identity)
+        arrays = open_arrays(folder, entries, verify=not is_known)
+    except (FormatError, ValueError, RecursionError) as error:
+        if folder.exists():  # else another process has just removed it
+            what = error if isinstance(error, FormatError) else f"{folder / _MANIFEST}: {error}"
+            warnings.warn(f"{what}; learning from the corpus again", MotionMindWarning, stacklevel=2)
+            _remove(folder)
+        return None
+    if not is_known:
+        remember_checked(folder, identity)
+    with suppress(OSError):
+        os.utime(folder)  # it is in use
+    return arrays
+
+
+def remember(corpus: str, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Keep what this code learned from a corpus, by its hash; what is kept already stays.
+
+    Warns:
+        MotionMindWarning: the cache cannot be written.
+    """
+    folder = _folder(corpus)
+    unfinished = folder.with_name(f".{secrets.token_hex(8)}")
+    try:
+        make_folder(folder.parent)
+        _remove_unused(folder.parent)
+        try:
+            unfinished.mkdir()
+            entries = write_arrays(unfinished, arrays, flush=False)  # a checksum shows what a power cut did
+            (unfinished / _MANIFEST).write_bytes(msgspec.json.encode(entries))
+            unfinished.rename(folder)
+        finally:
+            shutil.rmtree(unfinished, ignore_errors=True)
+    except OSError as error:
+        if not folder.exists():
+            what = f"{folder.parent}: cannot be written: {error.strerror or error}"
+            warnings.warn(f"{what}; each command will learn the corpus again", MotionMindWarning, stacklevel=2)
+
+
+def forget(corpus: str) -> None:
+    """Remove what any code learned from a corpus, by its hash, as far as that can be done."""
+    for folder in cache_folder("learned").glob(f"{corpus}-*"):
+        _remove(folder)
+
+
+def workroom() -> Path | None:
+    """Return a folder for large arrays while learning; None if there is none."""
+    with suppress(OSError):
+        make_folder(cache_folder("learned"))
+        return cache_folder("learned")
+    return None
+
+
+def _folder(corpus: str) -> Path:
+    return cache_folder("learned") / f"{corpus}-{code_name()}"
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder, at once for those who look for it."""
+    aside = folder.with_name(f".{secrets.token_hex(8)}")
+    with suppress(OSError):
+        folder.rename(aside)
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def _remove_unused(parent: Path) -> None:
+    """Remove what killed writers left, and folders that nothing has used for two months."""
+    for entry in parent.iterdir():
+        with suppress(OSError):
+            limit = _UNFINISHED_S if entry.name.startswith(".") else _UNUSED_S
+            if time.time() - entry.stat().st_mtime > limit:
+                _remove(entry)
