@@ -28,7 +28,6 @@ from .notation.score import Score as Score
 from .render.pictures import draw_picture as draw_picture
 from .render.sheet import draw_sheet as draw_sheet
 from .retarget.retarget import own_skeleton as own_skeleton
-from .retarget.retarget import to_human23 as to_human23
 from .tween.certificate import Bridge as Bridge
 from .tween.certificate import Source as Source
 from .tween.certificate import Wait as Wait
@@ -91,7 +90,6 @@ __all__ = [
     "read_report",
     "read_score",
     "read_variation",
-    "to_human23",
     "vary",
     "write_motion",
     "write_posture",

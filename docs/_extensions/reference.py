@@ -56,7 +56,7 @@ SUBJECTS = {
         "formats.MotionWriter",
     ),
     "Scores": ("compose", "read_score", "Score"),
-    "Skeletons of your own": ("own_skeleton", "to_human23", "retarget.read_joint_mapping"),
+    "Skeletons of your own": ("own_skeleton", "retarget.to_human23", "retarget.read_joint_mapping"),
     "States": (
         "discretize.make_discretization",
         "discretize.Discretization",

@@ -28,7 +28,8 @@ class Plate:
 
     >>> from motionmind import Engine
     >>> from motionmind.plots import Plate, draw_angles
-    >>> motion = Engine.load("ballet").tween("ballet/arabesque", "ballet/fifth").motion
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.tween(engine.posture("ballet/arabesque"), engine.posture("ballet/fifth")).motion
     >>> isinstance(draw_angles(motion), Plate)
     True
     """

@@ -58,7 +58,7 @@ class FigurePlate:
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """What stays during an insertion: the backdrop [H, W, 3], where no ghost covers it [H, W], and the ghosts."""
+    """The still parts of an insertion: the backdrop [H, W, 3], where no ghost covers it [H, W], and the ghosts."""
 
     insertion: Insertion | None
     backdrop: Pixels

@@ -69,7 +69,8 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
             unclear whether people stand or lie.
 
     >>> import numpy as np
-    >>> from motionmind import Posture, human44, to_human23
+    >>> from motionmind import Posture, human44
+    >>> from motionmind.retarget import to_human23
     >>> posture = Posture(human44(), np.tile([0.0, 0.0, 0.0, 1.0], (44, 1)), np.zeros(3))
     >>> len(to_human23(posture).skeleton)
     23

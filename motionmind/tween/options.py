@@ -174,7 +174,7 @@ def take_options(options: Any) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class SearchOptions:
-    """How to search for the path of a tween: the costs, the method and its limits.
+    """The options of the search for a path: its costs, method and limits.
 
     Attributes:
         max_moves: greatest number of moves that the search may find.
