@@ -19,9 +19,9 @@ from motionmind.geometry.distances import squared_distance
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import N_LEAVES_VISITED
 from motionmind.learned.neighbours import build_neighbours
-from motionmind.walks.likelihood import squared_distances, variance_at_ends
+from motionmind.walks.likelihood import end_variance, squared_distances
 from motionmind.walks.marginals import posterior_marginals
-from motionmind.walks.sparse import all_of, choose
+from motionmind.walks.sparse import all_samples, choose
 
 STEPS = 12  # half steps of a walk
 
@@ -82,7 +82,7 @@ def in_part(carriage: Carriage, number: int, ends: Floats) -> Floats:
     near, out = np.ones((STEPS + 1, len(weights))), []
     for k in range(2):
         few = off[k, chosen.moments]
-        variance = variance_at_ends(float(np.sqrt(few.min())))
+        variance = end_variance(float(np.sqrt(few.min())))
         near[-k] = np.exp(0.5 * (few.min() - off[k]) / variance)
         seen = np.zeros(len(weights), dtype=bool)
         seen[chosen.moments[chosen.near[k]]] = True
@@ -91,7 +91,7 @@ def in_part(carriage: Carriage, number: int, ends: Floats) -> Floats:
         farthest = weights[~seen].sum() * near[-k, ~seen].max()
         by_leaves = _by_leaves(carriage, number, given[k], seen, near[-k], (few.min(), variance))
         out.append([1.0 - kept / stands, *(x / (kept + x) for x in (rest, by_leaves, farthest)), seen])
-    every = all_of(carriage, number)
+    every = all_samples(carriage, number)
     marginals = posterior_marginals(every.begins, every.ends, every.shares, every.clusters, weights, near)
     walks = [1.0 - marginals[-k, out[k][-1]].sum() for k in range(2)]
     said, rest, leaves, radius = np.max([one[:-1] for one in out], axis=0)

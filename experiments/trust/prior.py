@@ -15,7 +15,7 @@ from experiments.material import corpus, families, part, take_of
 from motionmind._typing import Floats
 from motionmind.learned.carriage import learn_carriage
 from motionmind.learned.trust import DISTANCE_RATIOS, Squares
-from motionmind.walks.evidence import DECAY_CANDIDATES_S, errors_of_lasting, gather_evidence
+from motionmind.walks.evidence import DECAY_CANDIDATES_S, end_velocity_errors, gather_evidence
 
 DANCERS = ("cmu-05", "cmu-16", "cmu-29", "cmu-135")  # dance, runs and leaps, slow gestures, karate
 WINDOWS = 120  # of each length
@@ -30,7 +30,7 @@ def main(data: str) -> None:
         movement = part(whole, [number for number, clip in enumerate(whole.clips) if take_of(clip.name) in takes])
         found = Squares.summed(gather_evidence(movement, learn_carriage(movement), WINDOWS))
         shares.append(Squares(found.inner / found.whole, found.along / found.whole, 1.0))
-        errors = errors_of_lasting(movement, WINDOWS)
+        errors = end_velocity_errors(movement, WINDOWS)
         lasting.append(errors / errors.min())
         _tell(name, shares[-1], lasting[-1])
     _tell("together", Squares.summed(shares), np.mean(lasting, axis=0))

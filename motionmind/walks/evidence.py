@@ -29,18 +29,12 @@ from motionmind.walks.mean_walk import Walk, walk_between
 from motionmind.walks.minimal import departure, minimal_movement
 from motionmind.walks.stops import Stop, stop_at
 
-WINDOW_LENGTHS_S = (0.4, 0.6, 1.2, 2.0, 4.0)  # window lengths, seconds
-BRIEF_LENGTHS_S = WINDOW_LENGTHS_S[1:3]  # window lengths at which end velocities matter most
-N_WINDOWS_PER_LENGTH = 12  # windows per length, evenly spread over the clips
-N_POSTURES_TO_LEARN_FROM = 2_000  # postures to learn from, about: the time per window is proportional to it
-MIN_CLIPS = 8  # least number of clips to take them from
-N_RANDOM_PAIRS = 1_000  # random pairs of postures
-MIN_FAMILIES = 3  # least number of clip families: with two, each is judged by the other alone
-DECAY_CANDIDATES_S = (
-    0.3,
-    0.45,
-    0.6,
-)  # candidate decay times of end velocities, seconds; 1.0 cost a take of cmu-29 23 points
+WINDOW_LENGTHS_S = (0.4, 0.6, 1.2, 2.0, 4.0)
+N_WINDOWS_PER_LENGTH = 12  # evenly spread over the clips
+N_POSTURES = 2_000  # to learn from, about, of at least MIN_CLIPS clips: the time per window is proportional to it
+MIN_CLIPS = 8
+MIN_FAMILIES = 3  # with two families of clips, each is judged by the other alone
+DECAY_CANDIDATES_S = (0.3, 0.45, 0.6)  # of end velocities; 1.0 cost a take of cmu-29 23 points
 
 
 class _Piece(NamedTuple):
@@ -69,7 +63,7 @@ class _Window(NamedTuple):
 def learn_trust(corpus: Corpus, carriage: Carriage, workshop: Workshop | None = None) -> Trust:
     """Learn how far to trust walks through a corpus, and how long the effect of an end velocity lasts.
 
-    A corpus with fewer than FEWEST families of clips takes the prior.
+    A corpus with fewer than `MIN_FAMILIES` families of clips takes the prior.
 
     Args:
         corpus: the movement.
@@ -82,9 +76,9 @@ def learn_trust(corpus: Corpus, carriage: Carriage, workshop: Workshop | None = 
     )
     if len(evidence) < MIN_FAMILIES:
         return replace(PRIOR_TRUST, spread=spread)
-    errors = errors_of_lasting(corpus, 2 * N_WINDOWS_PER_LENGTH)
-    lasts = DECAY_CANDIDATES_S[int(np.argmin(errors))] if errors.any() else PRIOR_TRUST.lasts[0]
-    return Trust(fit_table(evidence, PRIOR_TRUST.table), np.array([lasts]), spread)
+    errors = end_velocity_errors(corpus, 2 * N_WINDOWS_PER_LENGTH)
+    decay = DECAY_CANDIDATES_S[int(np.argmin(errors))] if errors.any() else PRIOR_TRUST.lasts[0]
+    return Trust(fit_table(evidence, PRIOR_TRUST.table), np.array([decay]), spread)
 
 
 def gather_evidence(corpus: Corpus, carriage: Carriage, count: int, workshop: Workshop | None = None) -> list[Squares]:
@@ -103,23 +97,23 @@ def gather_evidence(corpus: Corpus, carriage: Carriage, count: int, workshop: Wo
         return []
 
     def learn(family: tuple[str, str]) -> Squares:
-        others = of_pieces(corpus, carriage, [piece for piece in pieces if piece.family != family])
+        others = restrict(corpus, carriage, [piece for piece in pieces if piece.family != family])
         own = (window for window in windows if window.piece.family == family)
-        return Squares.summed(_squares(corpus, carriage, others, spread, window) for window in own)
+        return Squares.summed(_compare(corpus, carriage, others, spread, window) for window in own)
 
     return list((workshop or Workshop()).map(learn, families))
 
 
 def spread_of(corpus: Corpus, carriage: Carriage) -> Floats:
     """Return the RMS distance per joint between two random postures, for each body part [P], radians."""
-    one, other = np.random.default_rng(0).integers(len(corpus), size=(2, N_RANDOM_PAIRS))
+    one, other = np.random.default_rng(0).integers(len(corpus), size=(2, 1_000))
     turned = rot.angle(carriage.orientations[one], carriage.orientations[other]) ** 2
     return np.array(
         [max(float(np.sqrt(turned[:, part].mean())), ZERO_DISPLACEMENT_RAD) for part in parts_of(corpus.skeleton)]
     )
 
 
-def of_pieces(corpus: Corpus, carriage: Carriage, pieces: Sequence[_Piece]) -> Carriage:
+def restrict(corpus: Corpus, carriage: Carriage, pieces: Sequence[_Piece]) -> Carriage:
     """Restrict a carriage to pieces of clips, given in corpus order; only the fields that walks need are updated."""
     starts, firsts, count = corpus.columns.starts, corpus.moves.firsts, len(corpus.columns.weights)
     postures = np.concatenate([np.arange(piece.start, piece.stop) for piece in pieces])
@@ -155,19 +149,15 @@ def _family(corpus: str, name: str) -> tuple[str, str]:
 
 
 def _pieces(corpus: Corpus) -> list[_Piece]:
-    """Choose pieces of clips that represent a corpus, with about MOST postures in total at most."""
+    """Choose pieces of clips that represent a corpus, with at most about `N_POSTURES` postures in all."""
     starts = corpus.columns.starts
     numbers = np.arange(len(starts) - 1)
-    if len(corpus) > N_POSTURES_TO_LEARN_FROM:
-        share = max(N_POSTURES_TO_LEARN_FROM / len(corpus), MIN_CLIPS / len(numbers))
+    if len(corpus) > N_POSTURES:
+        share = max(N_POSTURES / len(corpus), MIN_CLIPS / len(numbers))
         numbers = numbers[
             np.unique((np.arange(0.0, 1.0, 1.0 / max(share * len(numbers), 1.0)) * len(numbers)).astype(int))
         ]
-    longest = (
-        max(N_POSTURES_TO_LEARN_FROM // MIN_CLIPS, N_POSTURES_TO_LEARN_FROM // len(numbers))
-        if len(corpus) > N_POSTURES_TO_LEARN_FROM
-        else len(corpus)
-    )
+    longest = max(N_POSTURES // MIN_CLIPS, N_POSTURES // len(numbers)) if len(corpus) > N_POSTURES else len(corpus)
     out = []
     for number in numbers.tolist():
         clip = corpus.clips[number]
@@ -194,7 +184,7 @@ def _windows(corpus: Corpus, pieces: Sequence[_Piece], seconds: float, count: in
     return out
 
 
-def _squares(corpus: Corpus, carriage: Carriage, others: Carriage, spread: Floats, window: _Window) -> Squares:
+def _compare(corpus: Corpus, carriage: Carriage, others: Carriage, spread: Floats, window: _Window) -> Squares:
     """Compare the departure of walks through the other clips with the true departure in a window.
 
     Departures are in the joints' global rotations, at the inner postures. They are divided by the window's true
@@ -210,29 +200,31 @@ def _squares(corpus: Corpus, carriage: Carriage, others: Carriage, spread: Float
     made = rot.mul(minimal, rot.exp(walk.departs[2:-2:2]))
     plain, made, true = (skeleton.global_rotations(one) for one in (minimal, made, true[1:-1]))
     departs, truly = rot.log(rot.inv_mul(plain, made)), rot.log(rot.inv_mul(plain, true))
-    of_joints = _of_joints(walk, spread)
+    of_joints = _joint_weights(walk, spread)
     inner = of_joints.T @ (np.sum(departs**2, axis=(0, 2))[:, None] * of_joints)
     along, whole = of_joints.T @ np.sum(departs * truly, axis=(0, 2)), float(np.sum(truly**2))
     weight = 1.0 / max(whole, ZERO_DISPLACEMENT_RAD**2)
     return Squares(weight * inner, weight * along, weight * whole)
 
 
-def _of_joints(walk: Walk, spread: Floats) -> Floats:
+def _joint_weights(walk: Walk, spread: Floats) -> Floats:
     """Return the weight of each table entry in the share of each joint [J, 5]."""
-    of_parts = counts(walk.nearest.mean(axis=1), walk.ways, spread)
+    of_parts = counts(walk.nearest.mean(axis=1), walk.displacements, spread)
     return np.asarray(np.einsum("k,jkc->jc", np.array(BODY_PART_WEIGHTS), of_parts[walk.members]))
 
 
-def errors_of_lasting(corpus: Corpus, count: int) -> Floats:
-    """Return the error of minimal movements for each decay time in LASTS [n]: mean distances from the recordings,
-    summed over windows, radians; 0 if there are no windows.
+def end_velocity_errors(corpus: Corpus, count: int) -> Floats:
+    """Return the error of minimal movements for each decay time in `DECAY_CANDIDATES_S` [n], radians.
+
+    It is the mean distance from the recordings, summed over windows of the lengths at which end velocities matter most;
+    0 if there are no windows.
 
     Args:
         corpus: the movement.
         count: windows per length.
     """
     pieces, out = _pieces(corpus), np.zeros(len(DECAY_CANDIDATES_S))
-    for window in (window for seconds in BRIEF_LENGTHS_S for window in _windows(corpus, pieces, seconds, count)):
+    for window in (window for seconds in WINDOW_LENGTHS_S[1:3] for window in _windows(corpus, pieces, seconds, count)):
         clip = corpus.clips[window.piece.clip]
         if clip.start < window.first and window.last < clip.stop - 1:
             out += _errors_in(corpus, clip, window)
@@ -240,7 +232,7 @@ def errors_of_lasting(corpus: Corpus, count: int) -> Floats:
 
 
 def _errors_in(corpus: Corpus, clip: Clip, window: _Window) -> Floats:
-    """Return mean distances of minimal movements from a clip's recording over a window's frames [n], for LASTS."""
+    """Return the mean distance of minimal movements from a clip's recording in a window, for each decay time [n]."""
     skeleton, frames = corpus.skeleton, corpus.detail.shape[1] + 1  # a move
     first, last = ((end - clip.start) * frames for end in (window.first, window.last))
     shown = corpus.recording(clip, first - frames, last + frames + 1)
@@ -253,15 +245,17 @@ def _errors_in(corpus: Corpus, clip: Clip, window: _Window) -> Floats:
     truly = rot.log(rot.inv_mul(minimal_movement(true[[0, -1]], times, None, None), true))
     even = rot.log(rot.inv_mul(true[0], true[-1])) / (times[-1] - times[0])
     out = np.empty(len(DECAY_CANDIDATES_S))
-    for k, lasts in enumerate(DECAY_CANDIDATES_S):
-        off = truly - departure(times, leaves.joints - even, arrives.joints - even, lasts=lasts)
+    for k, decay in enumerate(DECAY_CANDIDATES_S):
+        off = truly - departure(times, leaves.joints - even, arrives.joints - even, decay=decay)
         out[k] = np.sqrt(np.sum(off**2, axis=-1) @ _carried(skeleton)).mean()
     return out
 
 
 def _carried(skeleton: Skeleton) -> Floats:
-    """Return the number of joints that each joint carries, itself included [J]: its error recurs in their global
-    rotations."""
+    """Return the number of joints that each joint carries, itself included [J].
+
+    A joint's error recurs in the global rotations of all joints that it carries.
+    """
     out = np.ones(len(skeleton))
     for joint in range(len(skeleton) - 1, 0, -1):
         out[skeleton.parents[joint]] += out[joint]

@@ -71,8 +71,8 @@ def expect(
         stops: postures to pass exactly, keyed by the number of moves before each; increasing, first and last included.
         half_steps: times of the ends and middles of the moves [2 T + 1], seconds.
         path: orientations of the joints at the moves, which the walks follow [T + 1, J, 4]; None for all walks.
-        near: turn the body the short way whatever the walks do (`turn_with_walks`): for durations that the corpus
-            takes for the short way.
+        near: turn the body the short way whatever the walks do (`turn_with_walks`), for durations that are typical of
+            the short way.
     """
     moving = any(stop.rates is not None for stop in stops.values())
     rates = partial(moments_rates, corpus, carriage) if moving else None
@@ -87,15 +87,21 @@ def expect(
         facing = {move: stop.chains[-1] for move, stop in stops.items()}
         turned = carriage.turn[of]
         turn, spread = moves @ turned, moves @ turned**2
-        lasts = float(carriage.trust.lasts[0])
-        headings = turn_with_walks(turn, spread, walk.trust[:, 0], half_steps, facing, (ends[0], ends[1]), near, lasts)
+        decay = float(carriage.trust.lasts[0])
+        headings = turn_with_walks(turn, spread, walk.trust[:, 0], half_steps, facing, (ends[0], ends[1]), near, decay)
     else:
         headings = rot.heading(walk.poses[:, 0])
     return Expectation(half_steps, walk.poses, headings, walk.moments, moves, walk.trust, walk.of, of, walk.left_out)
 
 
 def _middles(moments: Ints | slice, count: int, moves: int) -> tuple[Ints | slice, Ints | slice]:
-    """Return which samples are middles of moves, and of which moves; the corpus has `count` samples."""
+    """Return the columns of samples that are middles of moves, and the indices of their moves.
+
+    Args:
+        moments: indices of the samples; a slice means all.
+        count: number of samples in the corpus.
+        moves: number of moves in the corpus; their middles are its last samples.
+    """
     if isinstance(moments, slice):
         return slice(count - moves, None), moments
     middles = np.flatnonzero(moments >= count - moves)

@@ -18,10 +18,10 @@ from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import postures_near
 from motionmind.walks.likelihood import squared_distances
 
-N_FRAME_NEIGHBORS = 8  # neighbours sought for each posture of a movement, in a large corpus
-N_POSTURES_BESIDE = 8  # postures taken before and after each neighbour, at least
-N_LEAVES_SEARCHED = 32  # tree leaves searched for the neighbours
-N_KNOTS_BEYOND = 4  # spline knots beyond each end of a stretch: farther ones change it by a hundredth
+N_FRAME_NEIGHBORS = 8  # of each posture of a movement, in a large corpus
+N_POSTURES_BESIDE = 8  # before and after each neighbour, at least
+N_LEAVES_SEARCHED = 32  # of the tree, for the neighbours
+N_KNOTS_BEYOND = 4  # of the spline, beyond each end of a stretch: farther knots change it by a hundredth
 
 
 class Frames(NamedTuple):
@@ -46,7 +46,7 @@ class Frames(NamedTuple):
 def all_frames(corpus: Corpus) -> Frames:
     """Return all of a corpus's recordings; splines join keyframes, such as those of a score."""
     starts = corpus.columns.starts
-    return _joined([_sample(corpus, int(a), int(b) - 1, (int(a), int(b))) for a, b in pairwise(starts)])
+    return _concatenate([_sample(corpus, int(a), int(b) - 1, (int(a), int(b))) for a, b in pairwise(starts)])
 
 
 def frames_near(corpus: Corpus, carriage: Carriage, poses: Floats, beside: int = N_POSTURES_BESIDE) -> Frames:
@@ -70,7 +70,7 @@ def frames_near(corpus: Corpus, carriage: Carriage, poses: Floats, beside: int =
             min(int(run[-1]) + N_KNOTS_BEYOND + 1, int(starts[clip + 1])),
         )
         parts.append(_sample(corpus, int(run[0]), int(run[-1]), known))
-    return _joined(parts)
+    return _concatenate(parts)
 
 
 def _sample(corpus: Corpus, first: int, last: int, known: tuple[int, int]) -> tuple[Floats, Ints, Floats]:
@@ -99,7 +99,7 @@ def _sample(corpus: Corpus, first: int, last: int, known: tuple[int, int]) -> tu
     return rot.normalise(corpus.to_chains(rotations)), postures, times
 
 
-def _joined(parts: Sequence[tuple[Floats, Ints, Floats]]) -> Frames:
+def _concatenate(parts: Sequence[tuple[Floats, Ints, Floats]]) -> Frames:
     """Concatenate stretches of frames."""
     chains, postures, times = (np.concatenate(found) for found in zip(*parts, strict=True))
     stretches = np.repeat(np.arange(len(parts)), [len(found) for found, _, _ in parts])
@@ -126,7 +126,7 @@ def frames_of(corpus: Corpus, clip: int, begin: float, end: float) -> Frames:
     times = corpus.times[first:stop]
     lower = first + max(int(np.searchsorted(times, begin, side="right")) - 1, 0)
     upper = first + min(int(np.searchsorted(times, end)), stop - first - 1)
-    return _joined(
+    return _concatenate(
         [
             _sample(
                 corpus,
@@ -138,7 +138,7 @@ def frames_of(corpus: Corpus, clip: int, begin: float, end: float) -> Frames:
     )
 
 
-def distances_of(recorded: Frames, poses: Floats) -> Floats:
+def frame_distances(recorded: Frames, poses: Floats) -> Floats:
     """Return squared distances between postures [K, J, 4] and all frames: means over joints [K, F], radians^2."""
     whole = np.zeros((poses.shape[1], 1), dtype=np.int64)  # one part: the whole body
     return np.asarray(squared_distances(recorded.chains, whole, 1, np.ascontiguousarray(poses))[0])

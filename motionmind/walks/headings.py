@@ -11,9 +11,8 @@ from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
 from motionmind.walks.minimal import END_VELOCITY_DECAY_S, departure
 
-HALF_TURN_FROM_RAD = np.radians(150.0)  # turns from here to 180 degrees may go either way
-SPIN_RADPS = 4.0  # rad/s: a body that turns faster at an end continues as the corpus does, even the long way round
-KEEPS_TURNING_S = 0.5  # seconds for which a turning body keeps turning
+SPIN_RADPS = 4.0  # a body that turns faster at an end continues as the corpus does, even the long way round
+TURN_PERSISTENCE_S = 0.5  # correlation time of turning
 
 
 def turn_with_walks(
@@ -24,18 +23,17 @@ def turn_with_walks(
     facing: Mapping[int, Floats],
     rates: tuple[float | None, float | None],
     near: bool = False,
-    lasts: float = END_VELOCITY_DECAY_S,
+    decay: float = END_VELOCITY_DECAY_S,
 ) -> Floats:
     """Return unwrapped headings [2 T + 1] of a body that turns as the walks do and meets the given facings.
 
     Walks that disagree about the direction turn the body less: a total turn M with variance V is scaled by
-    M^2 / (M^2 + V), the linear estimate of least mean square error. A turn lasts about RUN seconds, so V treats steps
-    within that time as correlated. The turn still missing to each facing is distributed over the steps in proportion
-    to their variance, as in the mean of normal variables given their sum. Facings are known up to whole turns: the
-    one nearest to the walks' turn is taken or, with `near` and for turns below NEARLY, the one nearest to the previous
-    facing. A body that SPINS at an end may go on by one whole turn more.
-    Where walks are not trusted, the body does not turn with them, and the missing turn is distributed evenly. Given
-    turning rates at the ends are met.
+    M^2 / (M^2 + V), the linear estimate of least mean square error. V treats steps within `TURN_PERSISTENCE_S` as
+    correlated. The turn still missing to each facing is distributed over the steps in proportion to their variance, as
+    in the mean of normal variables given their sum. Facings are known up to whole turns. Each is taken nearest to the
+    walks' turn or, with `near` and for turns below 150 degrees, nearest to the previous facing; a body that turns
+    faster than `SPIN_RADPS` at an end may add one whole turn. Where walks are not trusted, the body does not turn with
+    them, and the missing turn is distributed evenly. The result meets turning rates given at the ends.
 
     Args:
         turn: mean turn of the walks in each step [2 T], radians.
@@ -45,24 +43,24 @@ def turn_with_walks(
         facing: rotations [4] that the headings meet, keyed by the number of moves; first and last included.
         rates: turning rate at the first and the last, rad/s; None where unknown.
         near: turn the short way from each facing to the next.
-        lasts: seconds for which a turning rate at an end has effect, at most.
+        decay: seconds for which a turning rate at an end has effect, at most.
     """
     spins = [rate for rate in rates if rate is not None and abs(rate) >= SPIN_RADPS]
     varies = np.maximum(spread - turn**2, 1e-4)
-    variance = varies.sum() * KEEPS_TURNING_S * len(turn) / (half_steps[-1] - half_steps[0])
+    variance = varies.sum() * TURN_PERSISTENCE_S * len(turn) / (half_steps[-1] - half_steps[0])
     turn = trust * turn * (turn.sum() ** 2 / (turn.sum() ** 2 + variance))
     varies = trust * varies + (1.0 - trust) * varies.mean()
     out = np.concatenate([[0.0], np.cumsum(turn)]) + rot.heading(facing[0])
     for start, end in pairwise(2 * move for move in facing):
         missing = rot.heading(facing[end // 2]) - out[end]
-        way = rot.heading(facing[end // 2]) - rot.heading(facing[start // 2])
-        way -= 2.0 * np.pi * np.round(way / (2.0 * np.pi))
+        shortest = rot.heading(facing[end // 2]) - rot.heading(facing[start // 2])
+        shortest -= 2.0 * np.pi * np.round(shortest / (2.0 * np.pi))
         missing -= 2.0 * np.pi * np.round(missing / (2.0 * np.pi))
         if near:  # at most one extra turn, for a spin or a turn of nearly 180 degrees
-            either = abs(way) >= HALF_TURN_FROM_RAD
+            either = abs(shortest) >= np.radians(150.0)
             fewest = -int(either or any(rate < 0.0 for rate in spins))
             most = int(either or any(rate > 0.0 for rate in spins))
-            turns = np.round((out[end] + missing - out[start] - way) / (2.0 * np.pi))
+            turns = np.round((out[end] + missing - out[start] - shortest) / (2.0 * np.pi))
             missing += 2.0 * np.pi * (np.clip(turns, fewest, most) - turns)
         share = np.cumsum(varies[start:end]) / varies[start:end].sum()
         out[start + 1 : end + 1] += missing * share
@@ -73,7 +71,7 @@ def turn_with_walks(
     )
     moves = [*facing]
     until = half_steps[2 * moves[1]], half_steps[2 * moves[-2]]
-    return np.asarray(out + departure(half_steps, first, last, until, lasts))
+    return np.asarray(out + departure(half_steps, first, last, until, decay))
 
 
 def correct_headings(headings: Floats, centres: Floats, within: Floats) -> Floats:

@@ -21,19 +21,16 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Ints
 from motionmind.jit import jit, read_only
 
-# Standard deviation of a walk's ends about the given postures, radians per joint: END_SD_NEAREST_SHARE times the
-# distance of the corpus's nearest posture, clipped to END_SD_RAD. Where movement recurs, the nearest predict best.
-END_SD_RAD = 0.03, 0.09
-END_SD_NEAREST_SHARE = 0.75
-END_VELOCITY_SD_RADPS = 1.0  # standard deviation of its joint velocities about the given ones, rad/s per joint
-END_TURN_SD_RADPS = 1.0  # standard deviation of the body's turning rate, rad/s
-END_TRAVEL_SD_MPS = 0.5  # standard deviation of the travel velocity, m/s
-PATH_SD_RAD = 0.35  # standard deviation about a given path, radians per joint
-BODY_PART_WEIGHTS = (0.25, 0.25, 0.5)  # weights of walks of the whole body, a joint's half of it, and the joint's limb
-P_CONTINUE = 0.6  # probability that a walk continues in its clip after a step
+# Standard deviations (SD) of a walk's end about the given joint velocities, turning rate and travel velocity.
+END_VELOCITY_SD_RADPS = 1.0
+END_TURN_SD_RADPS = 1.0
+END_TRAVEL_SD_MPS = 0.5
+PATH_SD_RAD = 0.35  # per joint, about a given path
+BODY_PART_WEIGHTS = (0.25, 0.25, 0.5)  # walks of the whole body, of a joint's half of it, and of the joint's limb
+P_CONTINUE = 0.6  # a walk continues in its clip after a step
+P_TELEPORT = 0.006  # a walk jumps to any posture after a step, so some walk joins any two
 N_INTERLEAVED = 32  # samples read side by side, so that their memory latencies overlap
-_N_PER_BLOCK = 256  # samples measured at a time: their sums fit the processor's cache
-P_TELEPORT = 0.006  # probability of a jump to any posture after a step: some walk joins any two
+N_SAMPLES_PER_BLOCK = 256  # their sums fit the processor's cache
 
 
 def squared_distances(orientations: Floats, members: Ints, parts: int, postures: Floats) -> Floats:
@@ -55,11 +52,11 @@ def _sums_of_squares(orientations: Floats, members: Ints, parts: int, postures: 
     """Return the distances of `squared_distances` as sums over joints, not means [P, K, N]."""
     out, shown, own = (
         np.zeros((parts, len(postures), len(orientations))),
-        np.empty((4, _N_PER_BLOCK)),
-        np.empty(_N_PER_BLOCK),
+        np.empty((4, N_SAMPLES_PER_BLOCK)),
+        np.empty(N_SAMPLES_PER_BLOCK),
     )
-    for first in range(0, len(orientations), _N_PER_BLOCK):
-        count = min(_N_PER_BLOCK, len(orientations) - first)
+    for first in range(0, len(orientations), N_SAMPLES_PER_BLOCK):
+        count = min(N_SAMPLES_PER_BLOCK, len(orientations) - first)
         for joint in range(len(members)):
             for i in range(count):  # contiguous, for vector instructions
                 for c in range(4):
@@ -77,7 +74,7 @@ def _sums_of_squares(orientations: Floats, members: Ints, parts: int, postures: 
 
 
 @jit
-def show(orientations: Floats, moments: Ints, part: Ints) -> Floats:
+def gather_orientations(orientations: Floats, moments: Ints, part: Ints) -> Floats:
     """Gather the orientations of a body part's joints in some samples [m, n, 4].
 
     Args:
@@ -101,11 +98,11 @@ def show(orientations: Floats, moments: Ints, part: Ints) -> Floats:
 
 
 @jit
-def distances_of(shown: Floats, postures: Floats) -> Floats:
+def part_distances(shown: Floats, postures: Floats) -> Floats:
     """Return squared distances between samples and postures, means over a part's joints [K, n], radians^2.
 
     Args:
-        shown: orientations of the part's joints in the samples, from `show` [m, n, 4].
+        shown: orientations of the part's joints in the samples, from `gather_orientations` [m, n, 4].
         postures: of the part [K, m, 4].
     """
     joints, count, _ = shown.shape
@@ -125,24 +122,26 @@ def distances_of(shown: Floats, postures: Floats) -> Floats:
     return np.asarray(out / joints)
 
 
-def squared_differences(rates: Floats, rate: Floats) -> Floats:
+def squared_rate_differences(rates: Floats, rate: Floats) -> Floats:
     """Return squared differences between a part's angular velocities [N, m, 3] and `rate` [m, 3], means over joints
     [N]."""
     columns = ((rates - rate) ** 2).reshape(len(rates), -1).T
     return np.asarray(sum(columns, np.zeros(len(rates))) / len(rate))  # in a fixed order
 
 
-def variance_at_ends(nearest: float) -> float:
+def end_variance(nearest: float) -> float:
     """Return the variance of a walk's end about the given posture, radians^2.
+
+    The standard deviation is 0.75 times the distance of the nearest sample, between 0.03 and 0.09 radians per joint:
+    where movement recurs, the nearest samples predict best.
 
     Args:
         nearest: distance of the corpus's nearest sample from the posture, radians per joint.
     """
-    least, most = END_SD_RAD
-    return min(max(END_SD_NEAREST_SHARE * nearest, least), most) ** 2
+    return min(max(0.75 * nearest, 0.03), 0.09) ** 2
 
 
-def nearest_to_ends(off: Floats) -> tuple[float, float]:
+def nearest_distances(off: Floats) -> tuple[float, float]:
     """Return the distance of the nearest sample from each end, radians per joint.
 
     Args:
@@ -152,8 +151,8 @@ def nearest_to_ends(off: Floats) -> tuple[float, float]:
     return first, last
 
 
-def in_variances(off: Floats, of_first: float, of_last: float) -> Floats:
-    """Return squared distances of samples in units of their variances [K, n].
+def divide_by_variances(off: Floats, of_first: float, of_last: float) -> Floats:
+    """Divide squared distances of samples by their variances [K, n].
 
     Args:
         off: squared distances from the first posture, the last, and those of a path [K, n], radians^2.
@@ -175,8 +174,8 @@ def likelihoods(squares: Floats) -> Floats:
     return np.exp(exponents, out=exponents)
 
 
-def share_of_others(likely: Floats, near: tuple[Bools, Bools], weights: Floats) -> float:
-    """Return the share of walks that begin (or end) in a sample not near the given posture; the greater of both ends.
+def share_left_out(likely: Floats, near: tuple[Bools, Bools], weights: Floats) -> float:
+    """Return the share of walks that begin (or end, if that is more) in a sample not near the given posture.
 
     Args:
         likely: likelihoods [K, n]; row 0 is for the first posture, row 1 for the last.
@@ -192,7 +191,7 @@ def share_of_others(likely: Floats, near: tuple[Bools, Bools], weights: Floats) 
 
 
 @jit
-def by_step(likely: Floats, count: int) -> Floats:
+def arrange_by_step(likely: Floats, count: int) -> Floats:
     """Arrange likelihoods of samples by step end [S + 1, n]; 1 where no posture is given.
 
     Args:
@@ -202,6 +201,6 @@ def by_step(likely: Floats, count: int) -> Floats:
     out = np.ones((count, likely.shape[1]))
     for k in range(len(likely)):
         step = 2 * (k - 1) if k > 1 else k * (count - 1)
-        for i in range(likely.shape[1]):  # assigning whole rows takes seconds to compile, for an error message
+        for i in range(likely.shape[1]):  # a row assignment takes seconds to compile
             out[step, i] = likely[k, i]
     return out

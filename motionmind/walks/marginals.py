@@ -20,7 +20,7 @@ def posterior_marginals(
     """Return the probability that a walk is in each sample at each step [S + 1, N]; rows sum to 1.
 
     The probability of a walk is proportional to the product of the weight of its first sample, the shares of its
-    steps, the jump probability after each, and the likelihoods of its samples.
+    steps, the probability of the jump (or none) after each step, and the likelihoods of its samples.
 
     Args:
         begins: sample from which each of the corpus's steps leads [M].
@@ -113,7 +113,7 @@ def _pool(values: Floats, clusters: Int32s, pooled: Floats) -> float:
     for i in range(len(values)):
         pooled[i % 4, clusters[i]] += values[i]
     for k in range(1, 4):
-        for cluster in range(pooled.shape[1]):  # assigning whole rows takes seconds to compile, for an error message
+        for cluster in range(pooled.shape[1]):  # a row assignment takes seconds to compile
             pooled[0, cluster] += pooled[k, cluster]
     return float(pooled[0].sum())
 

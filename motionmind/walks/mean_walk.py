@@ -25,27 +25,24 @@ from motionmind.walks.likelihood import (
     END_TRAVEL_SD_MPS,
     END_TURN_SD_RADPS,
     END_VELOCITY_SD_RADPS,
-    by_step,
-    distances_of,
-    in_variances,
+    arrange_by_step,
+    divide_by_variances,
+    end_variance,
     likelihoods,
-    nearest_to_ends,
-    share_of_others,
-    squared_differences,
+    nearest_distances,
+    part_distances,
+    share_left_out,
     squared_distances,
-    variance_at_ends,
+    squared_rate_differences,
 )
 from motionmind.walks.marginals import posterior_marginals
-from motionmind.walks.means import counted, mean_of_parts, mean_rotations, that_count
+from motionmind.walks.means import mean_of_parts, mean_rotations, nonnegligible, scale_weights
 from motionmind.walks.minimal import departure, minimal_movement
-from motionmind.walks.sparse import Chosen, all_of, choose, merged, steps_on
+from motionmind.walks.sparse import Chosen, all_samples, choose, steps_from
 from motionmind.walks.stops import Rates, Stop
 
-RAD_PER_BODY_HEIGHT = (
-    0.5  # radians per joint that count as much as travelling one body height; chosen on cmu-05 and cmu-16
-)
 N_THREADS = min(4, os.cpu_count() or 1)  # one body part each at a time; results do not depend on the number
-MIN_SAMPLES_PER_THREAD = 4000  # samples per thread: with fewer, another thread costs more than it saves
+MIN_SAMPLES_PER_THREAD = 4000  # with fewer, another thread costs more than it saves
 
 _Item = TypeVar("_Item")
 _Made = TypeVar("_Made")
@@ -107,7 +104,7 @@ def mean_walk(
     for move, stop in stops.items():
         poses[2 * move] = stop.chains[:joints]
     left_out = max(walk.left_out for walk in segments.values())
-    return MeanWalk(poses, *_joined(segments, len(half_steps), len(carriage.weights)), trusted, left_out)
+    return MeanWalk(poses, *_join_segments(segments, len(half_steps), len(carriage.weights)), trusted, left_out)
 
 
 class Walk(NamedTuple):
@@ -118,7 +115,7 @@ class Walk(NamedTuple):
         departs: departure of the mean from it [S + 1, J, 3]: rotation vectors, radians, 0 at both stops.
         members: the body part of each of the three sizes that each joint belongs to [J, 3].
         nearest: distance of each stop from the nearest sample, by body part [P, 2], radians per joint.
-        ways: displacement of each part [P], radians per joint (`_way`).
+        displacements: displacement of each part [P], radians per joint (`_displacement`).
         moments: probabilities of samples [S + 1, n] and the indices of these samples, in walks of the whole body and
             of the part that carries it.
         left_out: as in `MeanWalk`.
@@ -128,14 +125,14 @@ class Walk(NamedTuple):
     departs: Floats
     members: Ints
     nearest: Floats
-    ways: Floats
+    displacements: Floats
     moments: tuple[tuple[Floats, Ints | slice], ...]
     left_out: float
 
     def trusted(self, trust: Trust) -> Floats:
         """Return the share of the departure that each joint keeps [J], from 0 to 1."""
         return np.asarray(
-            trust.shares(self.nearest.mean(axis=1), self.ways)[self.members] @ np.array(BODY_PART_WEIGHTS)
+            trust.shares(self.nearest.mean(axis=1), self.displacements)[self.members] @ np.array(BODY_PART_WEIGHTS)
         )
 
 
@@ -146,20 +143,20 @@ class _PartWalk(NamedTuple):
         chosen: the n samples in the sum over walks.
         shown: orientations of the part in these samples [n, p, 4]; without trees, all joint chains in all samples.
         marginals: probabilities of the samples [S + 1, n].
-        counts: with trees, the samples whose probability is not negligible in a mean.
-        counted: their probabilities times the weight of the part's size, in the form that `mean_of_parts` takes.
+        kept_samples: with trees, the samples whose probability is not negligible in a mean.
+        weights: their probabilities times the weight of the part's size, as `mean_of_parts` takes them.
         left_out: as in `MeanWalk`.
     """
 
     chosen: Chosen
     shown: Floats
     marginals: Floats
-    counts: Ints
-    counted: Floats
+    kept_samples: Ints
+    weights: Floats
     left_out: float
 
 
-def _joined(segments: Mapping[int, Walk], count: int, moments: int) -> tuple[Floats, Ints | slice]:
+def _join_segments(segments: Mapping[int, Walk], count: int, moments: int) -> tuple[Floats, Ints | slice]:
     """Return the probabilities of samples at each half step [2 T + 1, n], and the indices of these samples.
 
     Args:
@@ -168,7 +165,7 @@ def _joined(segments: Mapping[int, Walk], count: int, moments: int) -> tuple[Flo
         moments: N, the number of samples in the corpus.
     """
     kept = [of for walk in segments.values() for _, of in walk.moments if not isinstance(of, slice)]
-    chosen = reduce(merged, kept) if kept else slice(None)
+    chosen = reduce(np.union1d, kept) if kept else slice(None)
     out = np.zeros((count, moments if isinstance(chosen, slice) else len(chosen)))
     for start, walk in segments.items():
         rows = out[2 * start : 2 * start + len(walk.minimal)]
@@ -210,12 +207,12 @@ def walk_between(
     joints = max(int(part.max()) for part in parts) + 1
     orientations = np.stack([stop.chains[:joints] for stop in ends])
     leaving, arriving = (None if stop.rates is None else stop.rates.joints for stop in ends)
-    lasts = float(carriage.trust.lasts[0])
-    minimal = minimal_movement(orientations, times, leaving, arriving, lasts)
+    decay = float(carriage.trust.lasts[0])
+    minimal = minimal_movement(orientations, times, leaving, arriving, decay)
     poses, nearest = np.empty_like(minimal), np.empty((len(parts), 2))
 
     members, groups = _members(parts, joints)
-    ways = [_way(part, ends, float(times[-1] - times[0]), lasts) for part in parts]
+    displacements = [_displacement(part, ends, float(times[-1] - times[0]), decay) for part in parts]
     shown, trees = read_only(carriage.orientations), carriage.trees
 
     def off(postures: Floats) -> Floats:
@@ -226,20 +223,20 @@ def walk_between(
         distances = []
         if trees is None:
             passed = orientations if path is None else np.concatenate([orientations, path])
-            distances = _each(off, np.array_split(passed, threads), pool, threads)
+            distances = _map_in_threads(off, np.array_split(passed, threads), pool, threads)
 
         def walk(number: int) -> _PartWalk:
             part, here = parts[number], shown
             if trees is None:
-                chosen = all_of(carriage, number)
+                chosen = all_samples(carriage, number)
                 own = distances[0][number] if threads == 1 else np.concatenate([of[number] for of in distances])
             else:
                 chosen, seen, own = choose(carriage, number, orientations, len(times) - 1)
                 here = seen.transpose(1, 0, 2)
                 if path is not None:
-                    own = np.concatenate([own, distances_of(seen, np.ascontiguousarray(path[:, part]))])
-            likely, nearest[number], left_out = _likely(part, chosen, rates, ends, own)
-            begins, goals, shares = steps_on(chosen, likely[0])
+                    own = np.concatenate([own, part_distances(seen, np.ascontiguousarray(path[:, part]))])
+            likely, nearest[number], left_out = _likelihoods(part, chosen, rates, ends, own)
+            begins, goals, shares = steps_from(chosen, likely[0])
             steps = read_only(begins), read_only(goals), read_only(shares), chosen.clusters, read_only(chosen.weights)
             size = float(np.dot((members == number).any(axis=0), BODY_PART_WEIGHTS))
             found = _marginals(*steps, likely, len(times), size, trees is not None)
@@ -248,7 +245,7 @@ def walk_between(
         larger, limbs = {number for numbers in groups for number in numbers[:-1]}, {numbers[-1] for numbers in groups}
         # Without trees, arrays run over all samples and may be large: those of limbs are used at once, not kept.
         kept = sorted(larger if trees is None else larger | limbs)
-        walks = dict(zip(kept, _each(walk, kept, pool, threads), strict=True))
+        walks = dict(zip(kept, _map_in_threads(walk, kept, pool, threads), strict=True))
 
         def move(number: int) -> float:
             mine = walks[number] if number in walks else walk(number)
@@ -257,25 +254,27 @@ def walk_between(
                     continue
                 own, about = [*(walks[n] for n in numbers[:-1]), mine], np.ascontiguousarray(minimal[:, here])
                 if trees is None:
-                    weights = _mixed(*(one.marginals for one in own))
+                    weights = _mix_sizes(*(one.marginals for one in own))
                     poses[:, here] = mean_rotations(weights, shown, np.array(here), about)
                 else:
                     poses[:, here] = _mean_of_few(own, [parts[n] for n in numbers], here, about)
             return mine.left_out
 
-        lost = _each(move, sorted(limbs), pool, threads)
+        lost = _map_in_threads(move, sorted(limbs), pool, threads)
     departs = rot.log(rot.inv_mul(minimal, poses))
-    departs = _without_ends(departs, times, leaving is not None, arriving is not None, lasts)
+    departs = _without_ends(departs, times, leaving is not None, arriving is not None, decay)
     moments = tuple((one.marginals, one.chosen.moments) for one in (walks[0], walks[1]))
     left_out = max(*lost, *(one.left_out for one in walks.values()))
-    return Walk(minimal, departs, members, nearest, np.array(ways), moments, left_out)
+    return Walk(minimal, departs, members, nearest, np.array(displacements), moments, left_out)
 
 
-def _each(work: Callable[[_Item], _Made], items: Sequence[_Item], pool: Executor, threads: int) -> list[_Made]:
-    """Map `work` over items, which this thread and those of a pool take from one queue.
+def _map_in_threads(
+    work: Callable[[_Item], _Made], items: Sequence[_Item], pool: Executor, threads: int
+) -> list[_Made]:
+    """Map `work` over items in this thread and those of a pool, which share one queue.
 
     Body parts are independent, and compiled loops release the interpreter lock. Starting a thread and waiting for it
-    costs as much as one part, so the calling thread works, too.
+    costs as much as one part, so the calling thread works too.
     """
     left, made = iter(range(len(items))), dict[int, _Made]()
 
@@ -302,16 +301,16 @@ def _members(parts: tuple[Ints, ...], joints: int) -> tuple[Ints, dict[tuple[int
     return members, groups
 
 
-def _without_ends(off: Floats, times: Floats, leaving: bool, arriving: bool, lasts: float) -> Floats:
-    """Subtract from departures [S + 1, m, 3] their values at both ends and, where velocities are given, their rates."""
+def _without_ends(off: Floats, times: Floats, leaving: bool, arriving: bool, decay: float) -> Floats:
+    """Make departures [S + 1, m, 3] zero at both ends, and their rates too where velocities are given."""
     share = ((times - times[0]) / (times[-1] - times[0]))[:, None, None]
     off = off - (1.0 - share) * off[0] - share * off[-1]
     first = (off[1] - off[0]) / (times[1] - times[0]) if leaving else None
     last = (off[-1] - off[-2]) / (times[-1] - times[-2]) if arriving else None
-    return np.asarray(off - departure(times, first, last, lasts=lasts))
+    return np.asarray(off - departure(times, first, last, decay=decay))
 
 
-def _likely(
+def _likelihoods(
     part: Ints,
     chosen: Chosen,
     rates: Callable[[Ints | slice], Rates] | None,
@@ -324,14 +323,14 @@ def _likely(
     Arguments are those of `walk_between`, except `chosen`, the samples, and `off`, their squared distances in the part
     from the two ends and then from the postures of the path, if any [K, n], radians^2.
     """
-    nearest = nearest_to_ends(off)
-    squares = in_variances(off, *map(variance_at_ends, nearest))
+    nearest = nearest_distances(off)
+    squares = divide_by_variances(off, *map(end_variance, nearest))
     known = None if rates is None else rates(chosen.moments)
     for k, stop in enumerate(ends):
         for differences in _rate_terms(part, known, stop):
             squares[k] += differences
     likely = likelihoods(squares)
-    left_out = 0.0 if chosen.near is None else share_of_others(likely, chosen.near, chosen.weights)
+    left_out = 0.0 if chosen.near is None else share_left_out(likely, chosen.near, chosen.weights)
     return likely, nearest, left_out
 
 
@@ -348,32 +347,36 @@ def _marginals(
     few: bool,
 ) -> tuple[Floats, Ints, Floats]:
     """Return the posterior marginals [S + 1, n] of one body part's walks, the samples that are not negligible in a
-    mean, and their weights there, from `counted`.
+    mean, and their weights there, from `scale_weights`.
 
     Args:
         begins, goals, shares, clusters, weights: of `posterior_marginals`.
-        likely: likelihoods of the samples, in the form that `by_step` takes.
+        likely: likelihoods of the samples, in the form that `arrange_by_step` takes.
         count: S + 1.
         size: weight of the part.
         few: whether to compute the last two results.
     """
-    marginals = posterior_marginals(begins, goals, shares, clusters, weights, by_step(likely, count))
-    counts = that_count(marginals) if few else np.empty(0, np.int64)
-    return marginals, counts, counted(size, marginals, counts)
+    marginals = posterior_marginals(begins, goals, shares, clusters, weights, arrange_by_step(likely, count))
+    kept_samples = nonnegligible(marginals) if few else np.empty(0, np.int64)
+    return marginals, kept_samples, scale_weights(size, marginals, kept_samples)
 
 
-def _way(part: Ints, ends: tuple[Stop, Stop], seconds: float, lasts: float) -> float:
+def _displacement(part: Ints, ends: tuple[Stop, Stop], seconds: float, decay: float) -> float:
     """Return the displacement of a body part, RMS radians per joint.
 
-    It is the root of the sum of three squares: the turn from one end to the other; the distance that the part's end
-    speed covers while it decays as (1 - t / lasts)^2, faster in a shorter movement; and STRIDE per body height that
-    the root travels. So a cycle that returns to its first posture has a displacement if the body moves or travels.
+    It is the root of the sum of three squares:
+
+    - the turn from one end to the other;
+    - the distance that the end speed covers while it decays as (1 - t / decay)^2, faster in a shorter movement;
+    - the travel, at 0.5 radians per body height (chosen on cmu-05 and cmu-16).
+
+    So a cycle back to its first posture has a displacement if the body moves or travels.
     """
     turn = squared_distance(ends[0].chains[part], ends[1].chains[part]) / len(part)
     rates = [stop.rates.joints[part] for stop in ends if stop.rates is not None]
     speed = float(np.mean([np.sum(rate**2, axis=-1).mean() for rate in rates])) if rates else 0.0
     travel = float(np.sum((ends[1].place - ends[0].place) ** 2))
-    return float(np.sqrt(turn + (min(seconds, lasts) / 3.0) ** 2 * speed + RAD_PER_BODY_HEIGHT**2 * travel))
+    return float(np.sqrt(turn + (min(seconds, decay) / 3.0) ** 2 * speed + 0.5**2 * travel))
 
 
 def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
@@ -383,7 +386,7 @@ def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
     """
     if rates is None or stop.rates is None:
         return []
-    joints = squared_differences(np.ascontiguousarray(rates.joints[:, part]), stop.rates.joints[part])
+    joints = squared_rate_differences(np.ascontiguousarray(rates.joints[:, part]), stop.rates.joints[part])
     terms = [joints / END_VELOCITY_SD_RADPS**2]
     if part[0] == 0:
         terms.append((rates.turn - stop.rates.turn) ** 2 / END_TURN_SD_RADPS**2)
@@ -393,13 +396,13 @@ def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
 
 def _mean_of_few(walks: Sequence[_PartWalk], parts: Sequence[Ints], joints: Sequence[int], about: Floats) -> Floats:
     """Return `mean_rotations` of joints [m] over the walks of the three parts that they belong to."""
-    weights, counts, shown = zip(*((one.counted, one.counts, one.shown) for one in walks), strict=True)
+    weights, kept, shown = zip(*((one.weights, one.kept_samples, one.shown) for one in walks), strict=True)
     columns = np.array([[np.flatnonzero(part == joint)[0] for joint in joints] for part in parts])
-    return mean_of_parts(weights, counts, shown, columns, about)
+    return mean_of_parts(weights, kept, shown, columns, about)
 
 
 @jit
-def _mixed(whole: Floats, half: Floats, limb: Floats) -> Floats:
+def _mix_sizes(whole: Floats, half: Floats, limb: Floats) -> Floats:
     """Mix the probabilities of samples over walks of the three sizes [S + 1, N]."""
     out = np.empty_like(limb)
     for t in range(len(out)):

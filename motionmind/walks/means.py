@@ -7,8 +7,8 @@ import numpy as np
 from motionmind._typing import Floats, Ints
 from motionmind.jit import jit
 
-# A mean ignores orientations of less weight; from here to twice as much, the effective weight rises from 0 to its own.
-# At a sudden threshold, rounding would decide whether an orientation is in the mean.
+# A mean ignores smaller weights. From this weight to twice as much, the effective weight rises continuously from 0 to
+# the full one; at a sudden threshold, rounding would decide whether an orientation counts.
 NEGLIGIBLE_WEIGHT_RATIO = 1e-6
 
 
@@ -26,15 +26,15 @@ def mean_rotations(weights: Floats, orientations: Floats, joints: Ints, about: F
         about: orientations that set each quaternion's sign, and replace a mean of length 0 [S, m, 4].
     """
     sums = np.zeros((len(joints), 4, len(about)))
-    counts = np.arange(weights.shape[1])
-    add_rotations(sums, counted(1.0, weights, counts), counts, orientations, joints, about)
+    kept = np.arange(weights.shape[1])
+    add_rotations(sums, scale_weights(1.0, weights, kept), kept, orientations, joints, about)
     return means(sums, about)
 
 
 @jit
 def mean_of_parts(
     weights: tuple[Floats, Floats, Floats],
-    counts: tuple[Ints, Ints, Ints],
+    kept: tuple[Ints, Ints, Ints],
     shown: tuple[Floats, Floats, Floats],
     columns: Ints,
     about: Floats,
@@ -42,21 +42,21 @@ def mean_of_parts(
     """Return `mean_rotations` over the walks of three body parts together; each part has its own samples.
 
     Args:
-        weights: per part, from `counted` [m, S].
-        counts: per part, indices of the non-negligible samples [n].
+        weights: per part, from `scale_weights` [m, S].
+        kept: per part, indices of the non-negligible samples [n].
         shown: per part, orientations of its joints in its samples [N, p, 4].
         columns: indices of the joints within each part [3, m].
         about: as in `mean_rotations`.
     """
     sums = np.zeros((columns.shape[1], 4, len(about)))
     for k in range(3):
-        add_rotations(sums, weights[k], counts[k], shown[k], columns[k], about)
+        add_rotations(sums, weights[k], kept[k], shown[k], columns[k], about)
     return means(sums, about)
 
 
 @jit
-def that_count(weights: Floats) -> Ints:
-    """Return the indices [n] of orientations whose weight exceeds COUNTS in any of the means [S, N]."""
+def nonnegligible(weights: Floats) -> Ints:
+    """Return the indices [n] of orientations with a non-negligible weight in any of the means [S, N]."""
     most = weights[0].copy()
     for t in range(1, len(weights)):
         for i in range(len(most)):
@@ -65,7 +65,7 @@ def that_count(weights: Floats) -> Ints:
 
 
 @jit
-def counted(size: float, weights: Floats, counts: Ints) -> Floats:
+def scale_weights(size: float, weights: Floats, kept: Ints) -> Floats:
     """Scale the weights of orientations and arrange them for `add_rotations` [m, S].
 
     The weights of one orientation in all means are contiguous. `add_rotations` takes four orientations at a time, so
@@ -74,41 +74,39 @@ def counted(size: float, weights: Floats, counts: Ints) -> Floats:
     Args:
         size: the scale factor.
         weights: of the orientations in each mean [S, N].
-        counts: indices of the orientations to add [n].
+        kept: indices of the orientations to add [n].
     """
-    out = np.zeros((len(counts) + -len(counts) % 4, len(weights)))
-    for i in range(len(counts)):
+    out = np.zeros((len(kept) + -len(kept) % 4, len(weights)))
+    for i in range(len(kept)):
         for t in range(len(weights)):
-            weight = size * weights[t, counts[i]]
+            weight = size * weights[t, kept[i]]
             out[i, t] = max(min(weight, 2.0 * (weight - NEGLIGIBLE_WEIGHT_RATIO)), 0.0)
     return out
 
 
 @jit
-def add_rotations(
-    sums: Floats, weights: Floats, counts: Ints, orientations: Floats, joints: Ints, about: Floats
-) -> None:
+def add_rotations(sums: Floats, weights: Floats, kept: Ints, orientations: Floats, joints: Ints, about: Floats) -> None:
     """Add orientations, in the hemisphere of `about`, to the sums of all means [m, 4, S].
 
-    Arguments are those of `mean_rotations`, except `weights`, from `counted`, and `counts`, the indices of the
+    Arguments are those of `mean_rotations`, except `weights`, from `scale_weights`, and `kept`, the indices of the
     orientations to add [n].
     """
-    count, moments = len(about), len(counts)
+    count, moments = len(about), len(kept)
     near, signed, shown = np.empty((4, count)), np.empty((4, count)), np.empty((4, 4))
     for j in range(len(joints)):
-        for t in range(count):  # assigning the array takes seconds to compile, for an error message
+        for t in range(count):  # an array assignment takes seconds to compile
             for c in range(4):
                 near[c, t] = about[t, j, c]
         middle, added_up = about[count // 2, j], sums[j]
-        alike = _spread(near, middle)
+        radius = _radius(near, middle)
         for first in range(0, len(weights), 4):
             added, mixed = weights[first : first + 4], False
             for k in range(4):
-                x, y, z, w = orientations[counts[min(first + k, moments - 1)], joints[j]]
+                x, y, z, w = orientations[kept[min(first + k, moments - 1)], joints[j]]
                 cosine = middle[0] * x + middle[1] * y + middle[2] * z + middle[3] * w
-                sign = -1.0 if cosine < -alike else 1.0
+                sign = -1.0 if cosine < -radius else 1.0
                 shown[0, k], shown[1, k], shown[2, k], shown[3, k] = sign * x, sign * y, sign * z, sign * w
-                mixed = mixed or abs(cosine) <= alike
+                mixed = mixed or abs(cosine) <= radius
             if mixed:
                 for k in range(4):
                     x, y, z, w = shown[:, k]
@@ -137,9 +135,11 @@ def means(sums: Floats, about: Floats) -> Floats:
 
 
 @jit
-def _spread(near: Floats, middle: Floats) -> float:
-    """Return the greatest distance, as vectors, of orientations [4, S] from one of them [4]: a quaternion whose cosine
-    with that one is greater has a cosine of the same sign with all."""
+def _radius(near: Floats, middle: Floats) -> float:
+    """Return the greatest distance, as vectors, of orientations [4, S] from `middle` [4], one of them.
+
+    A quaternion whose cosine with `middle` exceeds it has a cosine of the same sign with all of them.
+    """
     farthest = 0.0
     for t in range(near.shape[1]):
         far = 0.0

@@ -1,7 +1,7 @@
 """The minimal movement between two postures.
 
-Each joint turns the short way, evenly. A velocity given at an end decays, or builds up, within LASTS seconds. Walks
-through a corpus add the rest (`motionmind.walks.mean_walk`).
+Each joint turns the short way, evenly. A velocity given at an end decays, or builds up, within a fraction of a second.
+Walks through a corpus add the rest (`motionmind.walks.mean_walk`).
 """
 
 from __future__ import annotations
@@ -11,9 +11,7 @@ import numpy as np
 from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
 
-END_VELOCITY_DECAY_S = (
-    0.45  # seconds for which a velocity at an end has effect, at most, unless a corpus shows otherwise
-)
+END_VELOCITY_DECAY_S = 0.45  # longest effect of a velocity at an end; the default where no corpus was fitted
 
 
 def departure(
@@ -21,7 +19,7 @@ def departure(
     leaving: Floats | None,
     arriving: Floats | None,
     until: tuple[float, float] | None = None,
-    lasts: float = END_VELOCITY_DECAY_S,
+    decay: float = END_VELOCITY_DECAY_S,
 ) -> Floats:
     """Return the cubic that is 0 at both ends and has the given rates there: [S + 1, ...].
 
@@ -31,21 +29,21 @@ def departure(
         arriving: rate at the last time.
         until: the time at which the effect of `leaving` ends, and that at which the effect of `arriving` begins; None
             for the last time and the first.
-        lasts: seconds for which each rate has effect, at most.
+        decay: seconds for which each rate has effect, at most.
     """
     over, begins = until or (times[-1], times[0])
     begin, end = (times - times[0], over - times[0]), (times[-1] - times, times[-1] - begins)
     out = np.zeros(1)
     for (since, most), rate, sign in ((begin, leaving, 1.0), (end, arriving, -1.0)):
         if rate is not None:
-            within = min(lasts, most)
+            within = min(decay, most)
             felt = sign * since * np.maximum(1.0 - since / within, 0.0) ** 2
             out = out + felt.reshape(-1, *(1,) * np.ndim(rate)) * rate
     return np.asarray(out)
 
 
 def minimal_movement(
-    ends: Floats, times: Floats, leaving: Floats | None, arriving: Floats | None, lasts: float = END_VELOCITY_DECAY_S
+    ends: Floats, times: Floats, leaving: Floats | None, arriving: Floats | None, decay: float = END_VELOCITY_DECAY_S
 ) -> Floats:
     """Return orientations [S + 1, m, 4] from ends[0] to ends[1].
 
@@ -54,7 +52,7 @@ def minimal_movement(
         times: increasing [S + 1], seconds.
         leaving: angular velocities at the first time [m, 3], rad/s, in the joints' own frames; None if unknown.
         arriving: angular velocities at the last time.
-        lasts: seconds for which each velocity has effect, at most.
+        decay: seconds for which each velocity has effect, at most.
     """
     length = times[-1] - times[0]
     straight = rot.slerp(ends[:1], ends[1:], ((times - times[0]) / length)[:, None])
@@ -62,4 +60,4 @@ def minimal_movement(
         return straight
     even = rot.log(rot.inv_mul(ends[0], ends[1])) / length
     first, last = (None if rate is None else rate - even for rate in (leaving, arriving))
-    return rot.mul(straight, rot.exp(departure(times, first, last, lasts=lasts)))
+    return rot.mul(straight, rot.exp(departure(times, first, last, decay=decay)))

@@ -1,4 +1,4 @@
-"""Modes: recorded passages that lead from one posture to another in quite different ways.
+"""Modes: recorded passages that lead from one posture to another along different trajectories.
 
 A mean of walks offers only perturbations of itself as alternatives. The likeliest passages that begin near A and end
 near B in about the given time offer other trajectories, tempi and support feet. Each mode is the passage farthest from
@@ -18,10 +18,10 @@ from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import Carriage
 from motionmind.walks.frames import Frames, frames_near
-from motionmind.walks.passages import MAX_TEMPO_RATIO, NODE_FRAMES, WARP_COST_RAD2, WARP_FRAMES, Place, distances
+from motionmind.walks.passages import MAX_TEMPO_RATIO, NODE_FRAMES, WARP_COST_RAD2, WARP_FRAMES, Place, node_distances
 from motionmind.walks.stops import Stop
 
-N_CANDIDATE_PASSAGES = 16  # passages to choose from
+N_CANDIDATE_PASSAGES = 16
 
 
 def find_modes(
@@ -59,7 +59,7 @@ def _likeliest(recorded: Frames, ends: tuple[Stop, Stop], poses: Floats, steps: 
 
     Two passages overlap by at most half of the shorter one.
     """
-    first, last = distances(recorded, poses, ends)
+    first, last = node_distances(recorded, poses, ends)
     total, begins = _from_start_to_end(recorded.stretches, first, steps)
     total = total + last
     found: list[tuple[int, int]] = []

@@ -25,24 +25,24 @@ from motionmind.geometry.splines import natural_spline
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.trust import ZERO_DISPLACEMENT_RAD
 from motionmind.walks.expectation import Expectation
-from motionmind.walks.frames import Frames, distances_of, frames_near, frames_of
+from motionmind.walks.frames import Frames, frame_distances, frames_near, frames_of
 from motionmind.walks.stops import Stop
 
-NODE_FRAMES = 3  # recorded frames between nodes of a passage at its own tempo: 0.1 s
-WARP_FRAMES = 2, 3, 4  # recorded frames allowed between nodes: up to a third faster or slower
-MAX_TEMPO_RATIO = WARP_FRAMES[-1] / NODE_FRAMES  # recorded seconds per second of movement, at most
-WARP_COST_RAD2 = 0.3  # radians^2 per frame more or less than NODE_FRAMES
-CHANGE_COST_RAD2 = 0.72  # radians^2 for a change to another passage: 0.6 radians a joint off, before and after
-GIVEN_POSTURE_WEIGHT = 20.0  # weight of the distance at a given posture
+NODE_FRAMES = 3  # of the recording, between nodes of a passage at its own tempo: 0.1 s
+WARP_FRAMES = 2, 3, 4  # allowed between nodes: up to a third faster or slower
+MAX_TEMPO_RATIO = WARP_FRAMES[-1] / NODE_FRAMES  # recorded seconds per second of movement
+WARP_COST_RAD2 = 0.3  # for each frame more or less than NODE_FRAMES between nodes
+CHANGE_COST_RAD2 = 0.72  # for a change to another stretch: 0.6 radians a joint off, before and after
+GIVEN_POSTURE_WEIGHT = 20.0  # of the distance at a given posture
 # Weight of the distance at other nodes. It is low because a mean is quiet, and so are the frames nearest to it. Chosen
 # on cmu-05: with 1, passages are a tenth slower and easier to tell from the dancer (AUC 0.77, not 0.74) at equal error.
-DISPLACEMENT_WEIGHT = 0.05
-END_VELOCITY_HORIZON_S = 0.2  # seconds: converts a difference of velocity at an end to a distance
-PASSAGE_BLEND_S = 0.2  # seconds in which the velocities of one passage blend into those of the next
-HALF_LIVELINESS_HZ = (
-    0.6  # cut-off at a liveliness of a half; chosen on cmu-05: lower ones cost more error for each point of AUC
-)
-N_HALF_LIVELINESS_PERIODS = 0.9  # least number of cut-off periods in a short movement, at a liveliness of a half
+FREE_POSTURE_WEIGHT = 0.05
+END_VELOCITY_HORIZON_S = 0.2  # converts a difference of velocity at an end to a distance
+PASSAGE_BLEND_S = 0.2  # in which the velocities of one stretch blend into those of the next
+# Cut-off at a liveliness of a half, and the least number of its periods in a short movement. Chosen on cmu-05: lower
+# cut-offs cost more error for each point of AUC.
+HALF_LIVELINESS_HZ = 0.6
+N_HALF_LIVELINESS_PERIODS = 0.9
 
 
 class Place(NamedTuple):
@@ -58,8 +58,8 @@ class Danced(NamedTuple):
     Attributes:
         passage: the passage.
         times: of the displacements [n + 1], seconds.
-        off: displacements of the joints from the mean, rotation vectors, radians [n + 1, J, 3]. The heading stays that
-            of the mean, since the passage faces elsewhere.
+        off: displacements of the joints from the mean, rotation vectors, radians [n + 1, J, 3]. The mean's heading
+            stays, since the passage faces elsewhere.
     """
 
     passage: Passage
@@ -107,9 +107,9 @@ def find_passage(recorded: Frames, poses: Floats, times: Floats, ends: tuple[Sto
         ends: the first and the last posture, with velocities if given.
         given: nodes whose postures are given, first and last included.
     """
-    weights = np.full(len(poses), DISPLACEMENT_WEIGHT)
+    weights = np.full(len(poses), FREE_POSTURE_WEIGHT)
     weights[given] = GIVEN_POSTURE_WEIGHT
-    costs = weights[:, None] * distances(recorded, poses, ends)
+    costs = weights[:, None] * node_distances(recorded, poses, ends)
     stretches, count = recorded.stretches, len(recorded.stretches)
     goes_on = {warp: np.flatnonzero(stretches[warp:] == stretches[:-warp]) for warp in WARP_FRAMES}
     total, came_from = costs[0], []
@@ -129,7 +129,7 @@ def find_passage(recorded: Frames, poses: Floats, times: Floats, ends: tuple[Sto
     return Passage(times, frames, recorded, _starts(frames, stretches))
 
 
-def distances(recorded: Frames, poses: Floats, ends: tuple[Stop, Stop]) -> Floats:
+def node_distances(recorded: Frames, poses: Floats, ends: tuple[Stop, Stop]) -> Floats:
     """Return squared distances between postures and all frames, including velocities at the ends [K, F], radians^2.
 
     Args:
@@ -137,7 +137,7 @@ def distances(recorded: Frames, poses: Floats, ends: tuple[Stop, Stop]) -> Float
         poses: orientations of the joints [K, J, 4].
         ends: the first and the last of the postures.
     """
-    out = distances_of(recorded, poses)
+    out = frame_distances(recorded, poses)
     for row, stop in zip((0, -1), ends, strict=True):
         if stop.rates is not None:
             off = recorded.rates[:, : poses.shape[1]] - stop.rates.joints
@@ -263,8 +263,8 @@ def dance(
     """
     (first, *_, last), passed = stops.values(), np.array([*stops])
     joints, length = walk.poses.shape[1], float(passed[-1])
-    way = np.sqrt(np.mean(rot.angle(first.chains[:joints], last.chains[:joints]) ** 2))
-    is_still = way < ZERO_DISPLACEMENT_RAD and len(stops) == 2 and first.rates is None and last.rates is None
+    displacement = np.sqrt(np.mean(rot.angle(first.chains[:joints], last.chains[:joints]) ** 2))
+    is_still = displacement < ZERO_DISPLACEMENT_RAD and len(stops) == 2 and first.rates is None and last.rates is None
     if liveliness == 0.0 or (is_still and place is None):
         return None
     nodes = np.linspace(0.0, length, max(1, round(length * RATE / NODE_FRAMES)) + 1)
@@ -275,16 +275,16 @@ def dance(
     else:
         recorded = frames_of(corpus, place.clip, place.seconds, place.seconds + MAX_TEMPO_RATIO * length)
     passage = find_passage(recorded, poses, nodes, (first, last), given)
-    times, rows = _grid(passed)
+    times, rows = _frame_times(passed)
     rates, base = velocities(passage, times)[:, :joints], walk.chains(corpus, times)[:, :joints]
-    off = displacements(base, times, rates, rows[[0, -1]], cutoff_of(liveliness, length))
-    return Danced(passage, times, _kept_from(off, times, rows))
+    off = displacements(base, times, rates, rows[[0, -1]], cutoff_frequency(liveliness, length))
+    return Danced(passage, times, _zero_at_stops(off, times, rows))
 
 
-def _kept_from(off: Floats, times: Floats, rows: Ints) -> Floats:
-    """Make displacements [n + 1, J, 3] zero at the given rows, by subtracting smooth bumps that end at the next ones.
+def _zero_at_stops(off: Floats, times: Floats, rows: Ints) -> Floats:
+    """Make displacements [n + 1, J, 3] zero at the given rows: subtract smooth bumps that reach to the rows beside.
 
-    A displacement simply constrained to 0 there would reverse at once, and the movement would falter.
+    A displacement constrained to 0 there would reverse at once, and the movement would falter.
 
     Args:
         off: displacements, 0 at the first row and the last.
@@ -301,7 +301,7 @@ def _kept_from(off: Floats, times: Floats, rows: Ints) -> Floats:
     return out
 
 
-def _grid(passed: Floats) -> tuple[Floats, Ints]:
+def _frame_times(passed: Floats) -> tuple[Floats, Ints]:
     """Return times about 1 / RATE apart, evenly spaced between consecutive stops, and the rows of the stops."""
     parts, rows = [passed[:1]], [0]
     for begin, end in pairwise(passed.tolist()):
@@ -311,10 +311,11 @@ def _grid(passed: Floats) -> tuple[Floats, Ints]:
     return np.concatenate(parts), np.array(rows)
 
 
-def cutoff_of(liveliness: float, seconds: float) -> float:
+def cutoff_frequency(liveliness: float, seconds: float) -> float:
     """Return the cut-off, hertz, for a liveliness above 0 and a movement of this duration.
 
-    It is 0 at a liveliness of 1. At a half it is HALF_HZ or, in a movement too short for that, HALF_CYCLES periods.
+    It is 0 at a liveliness of 1. At a half it is `HALF_LIVELINESS_HZ` or, in a movement too short for it,
+    `N_HALF_LIVELINESS_PERIODS` per movement.
     """
     return max(HALF_LIVELINESS_HZ, N_HALF_LIVELINESS_PERIODS / seconds) * (1.0 - liveliness) / liveliness
 

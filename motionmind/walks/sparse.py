@@ -27,16 +27,14 @@ from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import find_near
 from motionmind.learned.neighbours import Neighbours
-from motionmind.walks.likelihood import distances_of, show
+from motionmind.walks.likelihood import gather_orientations, part_distances
 from motionmind.walks.steps import follow, steps_at
 
-N_BALL_SPLITS = 384  # times that a ball is cut in two
-N_END_SAMPLES = 64  # samples chosen near each end, and then followed along their clips
-N_NEAREST_END_SAMPLES = 8  # the nearest of these; the others are evenly spaced ranks among
-N_END_NEIGHBORS = 1024  # neighbours: in a large corpus hundreds are about as near, and their continuations differ
-MAX_STEPS_ALONG_CLIP = 12  # steps for which to follow them, at most: 1.2 s in a corpus of five postures per second
-N_CACHED_LOOKUPS = 32  # cached look-ups: for a body of 16 parts, two pairs of stops
-NEGLIGIBLE_LIKELIHOOD_RATIO = 1e-200  # likelihood relative to the likeliest sample: sums of smaller ones might be 0
+# Near each end, N_END_SAMPLES are chosen and followed along their clips: the nearest, and others at evenly spaced ranks
+# among the neighbours. In a large corpus hundreds are about as near, and their continuations differ.
+N_END_SAMPLES = 64
+N_NEAREST_END_SAMPLES = 8
+N_END_NEIGHBORS = 1024
 
 
 class Chosen(NamedTuple):
@@ -49,8 +47,8 @@ class Chosen(NamedTuple):
         ends: position that it leads to [m].
         shares: probability of each step, given the sample that it leaves [m].
         clusters: cluster of each sample, numbered from 0 [n].
-        near: which of them are nearest to the first posture and to the last, and represent only themselves, [n] each;
-            None for all.
+        near: masks of the samples nearest to the first posture and to the last, which represent only themselves, [n]
+            each; None where all samples were chosen.
     """
 
     moments: Ints | slice
@@ -62,14 +60,14 @@ class Chosen(NamedTuple):
     near: tuple[Bools, Bools] | None
 
 
-def all_of(carriage: Carriage, number: int) -> Chosen:
+def all_samples(carriage: Carriage, number: int) -> Chosen:
     """Return all of the corpus's samples, for the walks of a part given by its index."""
     clusters = np.ascontiguousarray(carriage.clusters[:, number])
     steps = carriage.begins, carriage.ends, carriage.shares
     return Chosen(slice(None), carriage.weights, *steps, clusters, None)
 
 
-class Found(NamedTuple):
+class ChosenPart(NamedTuple):
     """The samples of one part's walks between two postures, and the part's orientations in them.
 
     Attributes:
@@ -90,34 +88,34 @@ def _chosen(carriage: Carriage, number: int, near: Ints, nearest: Ints, balls: _
         carriage: all samples.
         number: index of the part.
         near: samples near both ends, to follow along their clips [2, n].
-        nearest: those of them that represent only themselves [2, m].
+        nearest: the nearest of them, which represent only themselves [2, m].
         balls: of the part's tree.
         steps: number of steps to follow them.
     """
     chain = carriage.begins, carriage.ends, len(carriage.weights) - len(carriage.turn)
-    ways = [follow(near[k], k == 0, steps, *chain) for k in range(2)]
-    moments = np.unique(np.concatenate([near.ravel(), balls.middles, *ways]))
-    weights, stands = _shares(moments, nearest.ravel(), balls, carriage.weights)
+    followed = [follow(near[k], k == 0, steps, *chain) for k in range(2)]
+    moments = np.unique(np.concatenate([near.ravel(), balls.middles, *followed]))
+    weights, representatives = _share_weights(moments, nearest.ravel(), balls, carriage.weights)
     begins, leads, which = steps_at(moments, True, *chain)
     goals = np.minimum(np.searchsorted(moments, leads), len(moments) - 1)
     others = np.flatnonzero(moments[goals] != leads)  # steps to samples not chosen lead to their ball's representative
-    goals[others] = stands[_balls_of(leads[others], balls)]
+    goals[others] = representatives[_balls_of(leads[others], balls)]
     clusters = np.unique(carriage.clusters[moments, number], return_inverse=True)[1].astype(np.int32)
-    both = _among(moments, nearest[0]), _among(moments, nearest[1])
+    both = _mask_of(moments, nearest[0]), _mask_of(moments, nearest[1])
     return Chosen(moments, weights, begins, goals, carriage.shares[which], clusters, both)
 
 
-def steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
-    """Return the steps of walks for `posterior_marginals`; at least some leave the samples where walks begin.
+def steps_from(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
+    """Return the steps of walks for `posterior_marginals`, so that some step leaves the samples where walks begin.
 
-    In many performances of one dance, every sample near its last posture may end its clip. Then a walk stays at the
+    In many performances of one dance, every sample near its last posture may end its clip. Then let a walk stay at the
     end of a clip for one step, after which it may jump to another.
 
     Args:
         chosen: the samples, and the corpus's steps between them.
         near: likelihood that a walk begins in each sample [n].
     """
-    if near[chosen.begins].max(initial=0.0) > NEGLIGIBLE_LIKELIHOOD_RATIO:
+    if near[chosen.begins].max(initial=0.0) > 1e-200:  # sums of smaller likelihoods might be 0
         return chosen.begins, chosen.ends, chosen.shares
     leads = np.zeros(len(near), dtype=np.bool_)
     leads[chosen.begins] = True
@@ -126,29 +124,27 @@ def steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
     return begins, goals, np.concatenate([chosen.shares, np.ones(len(ends))])
 
 
-def merged(some: Ints, others: Ints) -> Ints:
-    """Return the sorted union of two increasing arrays of indices."""
-    return np.union1d(some, others)
-
-
 _Owner = TypeVar("_Owner")
 _Asked = ParamSpec("_Asked")
 _Found = TypeVar("_Found")
 
 
-class _Kept(Generic[_Owner, _Asked, _Found]):
-    """A function that caches its last results per first argument, for that argument's lifetime."""
+class _CachedPerOwner(Generic[_Owner, _Asked, _Found]):
+    """A function that caches its last 32 results per first argument, for that argument's lifetime.
+
+    For a body of 16 parts these are the choices for two pairs of stops.
+    """
 
     def __init__(self, function: Callable[Concatenate[_Owner, _Asked], _Found]) -> None:
         self._function = function
-        self._kept: WeakKeyDictionary[_Owner, Callable[_Asked, _Found]] = WeakKeyDictionary()
+        self._caches: WeakKeyDictionary[_Owner, Callable[_Asked, _Found]] = WeakKeyDictionary()
 
     def __call__(self, owner: _Owner, /, *asked: _Asked.args, **named: _Asked.kwargs) -> _Found:
-        if owner not in self._kept:
-            self._kept[owner] = self._keeping(ref(owner))
-        return self._kept[owner](*asked, **named)
+        if owner not in self._caches:
+            self._caches[owner] = self._cached_for(ref(owner))
+        return self._caches[owner](*asked, **named)
 
-    def _keeping(self, owner: ref[_Owner]) -> Callable[_Asked, _Found]:
+    def _cached_for(self, owner: ref[_Owner]) -> Callable[_Asked, _Found]:
         """Return the cached function for an owner, without keeping the owner alive."""
 
         def look(*asked: _Asked.args, **named: _Asked.kwargs) -> _Found:
@@ -156,14 +152,14 @@ class _Kept(Generic[_Owner, _Asked, _Found]):
             assert here is not None
             return self._function(here, *asked, **named)
 
-        kept: Callable[_Asked, _Found] = lru_cache(maxsize=N_CACHED_LOOKUPS)(look)  # type: ignore[assignment]
+        kept: Callable[_Asked, _Found] = lru_cache(maxsize=32)(look)  # type: ignore[assignment]
         return kept
 
     def cache_clear(self) -> None:
-        self._kept.clear()
+        self._caches.clear()
 
 
-def choose(carriage: Carriage, number: int, ends: Floats, steps: int) -> Found:
+def choose(carriage: Carriage, number: int, ends: Floats, steps: int) -> ChosenPart:
     """Choose samples for the walks of one body part, and measure their distances from the ends.
 
     Args:
@@ -172,11 +168,11 @@ def choose(carriage: Carriage, number: int, ends: Floats, steps: int) -> Found:
         ends: orientations of the joints in both given postures [2, J, 4].
         steps: number of steps in a walk.
     """
-    return _found(carriage, number, ends.tobytes(), min(steps, MAX_STEPS_ALONG_CLIP))
+    return _choose_cached(carriage, number, ends.tobytes(), min(steps, 12))  # 1.2 s at five postures per second
 
 
-@_Kept  # for all parts: the guide of a search and its motion need the same
-def _found(carriage: Carriage, number: int, ends: bytes, steps: int) -> Found:
+@_CachedPerOwner  # the guide of a search and its motion need the same samples
+def _choose_cached(carriage: Carriage, number: int, ends: bytes, steps: int) -> ChosenPart:
     """Implement `choose`, with hashable arguments; follow the samples near the ends for `steps` steps."""
     trees = carriage.trees
     assert trees is not None
@@ -193,8 +189,8 @@ def _found(carriage: Carriage, number: int, ends: bytes, steps: int) -> Found:
     )
     chosen = _chosen(carriage, number, near, nearest, balls, steps)
     assert isinstance(chosen.moments, np.ndarray)
-    shown = show(carriage.orientations, chosen.moments, part)
-    return Found(chosen, shown, distances_of(shown, np.ascontiguousarray(postures[:, part])))
+    shown = gather_orientations(carriage.orientations, chosen.moments, part)
+    return ChosenPart(chosen, shown, part_distances(shown, np.ascontiguousarray(postures[:, part])))
 
 
 class _Balls(NamedTuple):
@@ -213,42 +209,42 @@ class _Balls(NamedTuple):
     ranks: Int32s
 
 
-@_Kept
+@_CachedPerOwner
 def _balls(trees: Neighbours, number: int) -> _Balls:
     """Return the balls into which a part's tree is cut."""
-    nodes = _cut(trees.bounds, trees.radii[number], trees.weights[number])
+    nodes = _cut_tree(trees.bounds, trees.radii[number], trees.weights[number])
     starts, order = np.ascontiguousarray(trees.bounds[nodes, 0]), trees.order[number]
     middles = order[trees.bounds[nodes].sum(axis=1) // 2].astype(np.int64)
     return _Balls(starts, trees.weights[number][nodes], middles, trees.ranks[number])
 
 
-def _among(moments: Ints, some: Ints) -> Bools:
+def _mask_of(moments: Ints, some: Ints) -> Bools:
     """Return a mask over increasing `moments` of those in `some`, a subset [n]."""
     out = np.zeros(len(moments), np.bool_)
     out[np.searchsorted(moments, some)] = True
     return out
 
 
-def _shares(moments: Ints, singles: Ints, balls: _Balls, counts: Floats) -> tuple[Floats, Ints]:
+def _share_weights(moments: Ints, singles: Ints, balls: _Balls, counts: Floats) -> tuple[Floats, Ints]:
     """Return the weights of the chosen samples [n], and the position of the first that represents each ball [B].
 
     Args:
         moments: indices of the chosen samples, increasing [n].
-        singles: those of them that represent only themselves.
+        singles: the chosen samples that represent only themselves.
         balls: of the part's tree.
         counts: weights of all samples [N].
     """
-    ball, own, alone = _balls_of(moments, balls), counts[moments], _among(moments, singles)
+    ball, own, alone = _balls_of(moments, balls), counts[moments], _mask_of(moments, singles)
     shared = np.bincount(ball[~alone], own[~alone], len(balls.weights))
     # If only near samples were chosen from a ball, they represent the rest of it, too.
     alone &= shared[ball] > 0.0
     shared, rest = np.bincount(ball[~alone], own[~alone], len(balls.weights)), balls.weights.copy()
     np.subtract.at(rest, ball[alone], own[alone])
-    stand, here = np.flatnonzero(~alone), ball[~alone]
-    own[stand] *= rest[here] / shared[here]
-    stands = np.empty(len(balls.weights), np.int64)
-    stands[here[::-1]] = stand[::-1]
-    return own, stands
+    standing, here = np.flatnonzero(~alone), ball[~alone]
+    own[standing] *= rest[here] / shared[here]
+    representatives = np.empty(len(balls.weights), np.int64)
+    representatives[here[::-1]] = standing[::-1]
+    return own, representatives
 
 
 def _balls_of(moments: Ints, balls: _Balls) -> Ints:
@@ -256,14 +252,14 @@ def _balls_of(moments: Ints, balls: _Balls) -> Ints:
     return np.searchsorted(balls.starts, balls.ranks[moments], side="right") - 1
 
 
-def _cut(bounds: Int32s, radii: Floats, weights: Floats) -> Ints:
+def _cut_tree(bounds: Int32s, radii: Floats, weights: Floats) -> Ints:
     """Cut a tree into balls of similar width and weight; return their nodes in the tree's order [n].
 
     Args:
         bounds, radii, weights: of the nodes.
     """
     heap, nodes, keys = [(-1.0, 0)], [], (-weights * radii**2).tolist()
-    for _ in range(N_BALL_SPLITS):
+    for _ in range(384):  # splits
         if not heap:
             break
         _, node = heapq.heappop(heap)

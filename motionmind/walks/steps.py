@@ -16,33 +16,38 @@ from motionmind._typing import Ints
 
 
 def follow(moments: Ints, ahead: bool, steps: int, begins: Ints, ends: Ints, postures: int) -> Ints:
-    """Return the samples [n] that at most `steps` steps reach from `moments`, or, if not `ahead`, from which they reach
-    `moments`; samples may repeat."""
-    out, ways = [moments[:0]], _ways(ahead, begins, ends)
+    """Return the samples [n] that at most `steps` steps reach from `moments` or, if not `ahead`, that reach `moments`.
+
+    Samples may repeat.
+    """
+    out, ranges = [moments[:0]], _step_ranges(ahead, begins, ends)
     for _ in range(steps):
-        numbers = _steps(moments, ahead, begins, ends, postures, ways)
+        numbers = _steps(moments, ahead, begins, ends, postures, ranges)
         reached = (ends if ahead else begins)[numbers[numbers >= 0]]
-        moments = np.unique(reached) if len(reached) > len(moments) else reached  # they could double with each move
+        moments = np.unique(reached) if len(reached) > len(moments) else reached  # or they could double each move
         out.append(moments)
     return np.concatenate(out)
 
 
 def steps_at(moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int) -> tuple[Ints, Ints, Ints]:
-    """Return the steps that leave `moments`, or lead to them if not `ahead`: each step's position in `moments` [m], the
-    sample at its other end [m], and its index [m]."""
-    steps = _steps(moments, ahead, begins, ends, postures, _ways(ahead, begins, ends))
+    """Return the steps that leave `moments`, or lead to them if not `ahead`.
+
+    Returns:
+        The position in `moments` of each step [m], the sample at its other end [m], and its index [m].
+    """
+    steps = _steps(moments, ahead, begins, ends, postures, _step_ranges(ahead, begins, ends))
     at, numbers = np.flatnonzero(steps >= 0) // 2, steps[steps >= 0]
     return at, (ends if ahead else begins)[numbers], numbers
 
 
 def _steps(
-    moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int, ways: Sequence[tuple[int, int]]
+    moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int, ranges: Sequence[tuple[int, int]]
 ) -> Ints:
     """Return the steps at each sample [n, 2]: one forward in its clip and one backward; -1 for none."""
     leaves, moves = begins if ahead else ends, len(begins) // 2
     out = np.full((len(moments), 2), -1)
     out[:, 0] = np.where(moments >= postures, moments - postures + ahead * moves, -1)
-    for column, (start, stop) in enumerate(ways):
+    for column, (start, stop) in enumerate(ranges):
         places = start + leaves[start:stop].searchsorted(moments)
         found = np.flatnonzero(places < stop)
         found = found[leaves[places[found]] == moments[found]]
@@ -50,10 +55,12 @@ def _steps(
     return out
 
 
-def _ways(ahead: bool, begins: Ints, ends: Ints) -> list[tuple[int, int]]:
-    """Return the index ranges of the forward and the backward steps that leave postures, or lead to them if not
-    `ahead`; empty ranges are left out."""
+def _step_ranges(ahead: bool, begins: Ints, ends: Ints) -> list[tuple[int, int]]:
+    """Return the non-empty index ranges of the forward and the backward steps that leave postures.
+
+    If not `ahead`, return the ranges of the steps that lead to postures.
+    """
     moves = len(begins) // 2
     first = 0 if ahead else moves
     turns = bisect_left(range(moves), True, key=lambda move: ends[moves + move] <= begins[move])
-    return [way for way in ((first, first + turns), (first + turns, first + moves)) if way[0] < way[1]]
+    return [span for span in ((first, first + turns), (first + turns, first + moves)) if span[0] < span[1]]

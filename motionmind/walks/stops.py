@@ -16,9 +16,7 @@ from motionmind.learned.carriage import Carriage
 from motionmind.walks.steps import steps_at
 
 _EVERY = slice(None)
-_VELOCITY_STEP_S = (
-    1e-3  # finite-difference step that splits the body's velocity into those of its joint chains, seconds
-)
+_VELOCITY_STEP_S = 1e-3  # finite-difference step that splits the body's velocity into those of its joint chains
 
 
 class Rates(NamedTuple):

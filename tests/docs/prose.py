@@ -58,6 +58,7 @@ UNITS = (
         "S",
         "MS",
         "RAD",
+        "RAD2",
         "DEG",
         "MPS",
         "MPS2",

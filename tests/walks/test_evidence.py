@@ -19,10 +19,10 @@ from motionmind.learned.trust import PRIOR_TRUST, Squares, fit_table
 from motionmind.walks import evidence
 from motionmind.walks.evidence import (
     DECAY_CANDIDATES_S,
-    errors_of_lasting,
+    end_velocity_errors,
     gather_evidence,
     learn_trust,
-    of_pieces,
+    restrict,
     spread_of,
 )
 
@@ -103,19 +103,19 @@ def test_the_rest_of_a_corpus_is_as_if_it_had_been_gathered_alone(reverse: float
     clips = [clip(postures(FRAMES, seed), name) for seed, name in enumerate("abc")]
     corpus, alone = gather("all", clips, reverse=reverse), gather("all", clips[::2], reverse=reverse)
     pieces = [piece for piece in evidence._pieces(corpus) if piece.family[1] != "b"]
-    found, same = of_pieces(corpus, learn_carriage(corpus), pieces), learn_carriage(alone)
+    found, same = restrict(corpus, learn_carriage(corpus), pieces), learn_carriage(alone)
     for name in ("orientations", "weights", "begins", "ends", "shares", "turn", "travel"):
         np.testing.assert_allclose(getattr(found, name), getattr(same, name), atol=1e-12, err_msg=name)
 
 
 def test_of_a_large_corpus_some_pieces_are_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     corpus = straight()
-    monkeypatch.setattr(evidence, "N_POSTURES_TO_LEARN_FROM", 64)
+    monkeypatch.setattr(evidence, "N_POSTURES", 64)
     monkeypatch.setattr(evidence, "MIN_CLIPS", 4)
     pieces = evidence._pieces(corpus)
     assert 4 <= len(pieces) < len(corpus.clips)
     assert sum(piece.stop - piece.start for piece in pieces) <= 64
-    own = of_pieces(corpus, learn_carriage(corpus), pieces)
+    own = restrict(corpus, learn_carriage(corpus), pieces)
     left = np.unique(own.begins)
     np.testing.assert_allclose(np.bincount(own.begins, own.shares)[left], 1.0)
     assert len(gather_evidence(corpus, learn_carriage(corpus), 12)) > 1
@@ -133,7 +133,7 @@ def test_velocities_last_as_long_as_in_the_clips(slows: float) -> None:
         moved = angles[:, None, None] * pushes[(times // 1.5).astype(int)]
         motion = clip(rot.exp(moved), name)
         clips.append(replace(motion, times=times))
-    errors = errors_of_lasting(gather("pushed", clips, rate=10.0), 60)
+    errors = end_velocity_errors(gather("pushed", clips, rate=10.0), 60)
     best = DECAY_CANDIDATES_S[int(errors.argmin())]
     assert abs(np.log(best / slows)) <= np.log(1.6)
 

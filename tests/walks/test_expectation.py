@@ -194,8 +194,8 @@ def test_far_from_the_corpus_joints_go_on_as_they_move_at_the_ends(engine: Engin
         ends = [stop if moves else stop._replace(rates=None) for stop, moves in zip(both, (first, last), strict=True)]
         found = expected(engine, {0: ends[0], STEPS: ends[1]})
         rates = [None if end.rates is None else end.rates.joints for end in ends]
-        lasts = float(engine.carriage.trust.lasts[0])
-        wanted = minimal_movement(np.stack([end.chains[:joints] for end in ends]), found.half_steps, *rates, lasts)
+        decay = float(engine.carriage.trust.lasts[0])
+        wanted = minimal_movement(np.stack([end.chains[:joints] for end in ends]), found.half_steps, *rates, decay)
         still = minimal_movement(np.stack([end.chains[:joints] for end in ends]), found.half_steps, None, None)
         assert rot.angle(found.poses, wanted).max() < 0.15 * rot.angle(still, wanted).max()
 
@@ -249,7 +249,7 @@ def test_departures_end_in_nothing_and_where_velocities_are_given_without_one(mo
     rng = np.random.default_rng(7)
     times = np.linspace(0.0, 2.0, 2001)
     waves = np.sin(times[:, None, None] * rng.uniform(0.5, 3.0, (4, 3)) + rng.uniform(0.0, 6.0, (4, 3)))
-    out = _without_ends(waves, times, *moving, lasts=END_VELOCITY_DECAY_S)
+    out = _without_ends(waves, times, *moving, decay=END_VELOCITY_DECAY_S)
     np.testing.assert_allclose(out[[0, -1]], 0.0, atol=1e-12)
     rates = np.abs(np.diff(out, axis=0)[[0, -1]] / 0.001).max(axis=(1, 2))
     for rate, still in zip(rates, moving, strict=True):

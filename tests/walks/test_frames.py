@@ -24,7 +24,7 @@ from motionmind.walks.frames import (
     N_POSTURES_BESIDE,
     Frames,
     all_frames,
-    distances_of,
+    frame_distances,
     frames_near,
     frames_of,
 )
@@ -178,7 +178,7 @@ def test_frames_near_postures_are_whole_runs_with_these_in_them(ballet: Engine) 
         knots = slice(*corpus.columns.starts[number : number + 2])
         shown = rotation_spline(corpus.times[knots], corpus.rotations[knots], found.times[own])
         assert rot.angle(shown, found.chains[own]).max() < 5e-3
-    assert distances_of(found, poses).min(axis=1).max() < 1e-3  # the last posture is that of many clips' ends
+    assert frame_distances(found, poses).min(axis=1).max() < 1e-3  # the last posture is that of many clips' ends
     more = frames_near(corpus, replace(carriage, trees=trees), poses, 2 * N_POSTURES_BESIDE)
     inside = np.diff(found.stretches, append=-1) == 0
     assert set(found.postures[inside].tolist()) < set(more.postures.tolist())
@@ -190,5 +190,5 @@ def test_distances_are_means_over_the_joints() -> None:
     recorded = Frames(chains, np.zeros(7, dtype=np.int64), np.arange(7), np.arange(7.0), np.zeros((7, 4, 3)))
     angles = rot.angle(poses[:, None], chains[None, :, :3])
     expected = np.mean((2.0 * np.sin(0.5 * angles)) ** 2, axis=-1)
-    np.testing.assert_allclose(distances_of(recorded, poses), expected, atol=1e-12)
-    np.testing.assert_allclose(distances_of(recorded, -poses), expected, atol=1e-12)
+    np.testing.assert_allclose(frame_distances(recorded, poses), expected, atol=1e-12)
+    np.testing.assert_allclose(frame_distances(recorded, -poses), expected, atol=1e-12)

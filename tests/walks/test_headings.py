@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
-from motionmind.walks.headings import KEEPS_TURNING_S, correct_headings, travel_along, turn_with_walks
+from motionmind.walks.headings import TURN_PERSISTENCE_S, correct_headings, travel_along, turn_with_walks
 
 STILL = np.zeros(40), np.full(40, 0.01)  # walks that turn to neither side
 TIMES = np.linspace(0.0, 4.0, 41)
@@ -45,8 +45,8 @@ def test_walks_lead_the_far_way_by_the_estimate_of_least_square_error(steps: int
     """From 0 to -150 degrees it is the far way if the estimate of what walks turn, 200 degrees, is above 30."""
     mean, times = np.radians(200.0) / steps, np.linspace(0.0, 4.0, steps + 1)
     for share in (0.14, 0.16):
-        # share = M^2 / (M^2 + V), and V is the steps' variance times the steps in KEEPS_TURNING_S.
-        varies = np.radians(200.0) ** 2 * (1.0 / share - 1.0) / (steps * KEEPS_TURNING_S * steps / 4.0)
+        # share = M^2 / (M^2 + V), and V is the steps' variance times the steps in TURN_PERSISTENCE_S.
+        varies = np.radians(200.0) ** 2 * (1.0 / share - 1.0) / (steps * TURN_PERSISTENCE_S * steps / 4.0)
         turn, spread = np.full(steps, mean), np.full(steps, mean**2 + varies)
         ends = {0: rot.about_vertical(0.0), steps // 2: rot.about_vertical(np.radians(-150.0))}
         found = turn_with_walks(turn, spread, np.ones(steps), times, ends, (None, None))

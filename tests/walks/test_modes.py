@@ -14,7 +14,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.tween.engine import Engine
 from motionmind.walks.frames import Frames, all_frames
 from motionmind.walks.modes import N_CANDIDATE_PASSAGES, _from_start_to_end, _held_to_ends, _likeliest, find_modes
-from motionmind.walks.passages import NODE_FRAMES, WARP_COST_RAD2, WARP_FRAMES, Place, distances
+from motionmind.walks.passages import NODE_FRAMES, WARP_COST_RAD2, WARP_FRAMES, Place, node_distances
 from motionmind.walks.stops import Stop, stop_at
 
 COUNT = 11
@@ -70,7 +70,7 @@ def test_no_more_than_half_of_a_likely_passage_lies_in_another(seed: int) -> Non
     for (begin, end), (one, other) in combinations(found, 2):
         overlap = min(end, other) - max(begin, one)
         assert overlap <= 0.5 * min(end - begin, other - one)
-    first, last = distances(recorded, poses, stops)
+    first, last = node_distances(recorded, poses, stops)
     best = np.nanmin(_from_start_to_end(recorded.stretches, first, 5)[0] + last)
     begin, end = found[0]
     assert _from_start_to_end(recorded.stretches, first, 5)[0][end] + last[end] == best

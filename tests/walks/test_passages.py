@@ -17,8 +17,8 @@ from motionmind.walks.expectation import Expectation, expect
 from motionmind.walks.frames import Frames, all_frames
 from motionmind.walks.passages import (
     CHANGE_COST_RAD2,
-    DISPLACEMENT_WEIGHT,
     END_VELOCITY_HORIZON_S,
+    FREE_POSTURE_WEIGHT,
     GIVEN_POSTURE_WEIGHT,
     HALF_LIVELINESS_HZ,
     N_HALF_LIVELINESS_PERIODS,
@@ -28,11 +28,11 @@ from motionmind.walks.passages import (
     WARP_FRAMES,
     Passage,
     Place,
-    cutoff_of,
+    cutoff_frequency,
     dance,
     displacements,
-    distances,
     find_passage,
+    node_distances,
     velocities,
 )
 from motionmind.walks.stops import Rates, Stop, stop_at
@@ -74,7 +74,7 @@ def costs_of(recorded: Frames, shown: Ints, apart: Floats, given: Ints) -> Float
     for one, other in product(range(count), repeat=2):
         if recorded.stretches[one] == recorded.stretches[other] and other - one in WARP_FRAMES:
             leads[one, other] = min(WARP_COST_RAD2 * abs(other - one - NODE_FRAMES), CHANGE_COST_RAD2)
-    weights = np.where(np.isin(nodes, given), GIVEN_POSTURE_WEIGHT, DISPLACEMENT_WEIGHT)
+    weights = np.where(np.isin(nodes, given), GIVEN_POSTURE_WEIGHT, FREE_POSTURE_WEIGHT)
     costs: Floats = (weights * apart[nodes, shown]).sum(axis=1) + leads[shown[:, :-1], shown[:, 1:]].sum(axis=1)
     return costs
 
@@ -90,7 +90,7 @@ def test_no_passage_costs_less(seed: int) -> None:
     ends = stop(poses[0], rng.normal(0.0, 1.0, (2, 3))), stop(poses[-1])
     given = np.array([0, 3] if seed % 2 else [0, 1, 3])
     found = find_passage(recorded, poses, times, ends, given)
-    apart = distances(recorded, poses, ends)
+    apart = node_distances(recorded, poses, ends)
     of_all = costs_of(recorded, np.array([*product(range(10), repeat=4)]), apart, given)
     assert costs_of(recorded, found.frames[None], apart, given)[0] == pytest.approx(of_all.min())
     begins = [0]
@@ -104,8 +104,8 @@ def test_velocities_at_the_ends_count_as_where_they_lead_to() -> None:
     rng = np.random.default_rng(0)
     recorded = frames(rot.exp(rng.normal(size=(6, 3, 3))), (6,), rng.normal(size=(6, 3, 3)))
     poses, rates = rot.exp(rng.normal(size=(4, 2, 3))), rng.normal(size=(2, 3))
-    plain = distances(recorded, poses, at_rest(poses))
-    moving = distances(recorded, poses, (stop(poses[0]), stop(poses[-1], rates)))
+    plain = node_distances(recorded, poses, at_rest(poses))
+    moving = node_distances(recorded, poses, (stop(poses[0]), stop(poses[-1], rates)))
     np.testing.assert_array_equal(moving[:-1], plain[:-1])
     off = ((recorded.rates[:, :2] - rates) ** 2).sum(axis=(1, 2)) / 2
     np.testing.assert_allclose(moving[-1] - plain[-1], END_VELOCITY_HORIZON_S**2 * off)
@@ -135,7 +135,7 @@ def test_what_is_danced_faster_or_slower_is_found_too(cmu05: Engine, faster: flo
         found = find_passage(recorded, poses, 0.1 * np.arange(11.0), at_rest(poses), np.array([0, 10]))
         assert np.all(recorded.stretches[found.frames] == number)
         assert np.abs(found.frames - nodes).max() <= 8
-        apart = distances(recorded, poses, at_rest(poses))[[0, -1], found.frames[[0, -1]]]
+        apart = node_distances(recorded, poses, at_rest(poses))[[0, -1], found.frames[[0, -1]]]
         assert GIVEN_POSTURE_WEIGHT * apart.max() < CHANGE_COST_RAD2
 
 
@@ -260,10 +260,10 @@ def test_each_joint_is_displaced_on_its_own() -> None:
 
 
 def test_the_cutoff_falls_from_infinity_to_none() -> None:
-    assert cutoff_of(1.0, 3.0) == 0.0
-    assert cutoff_of(0.5, 100.0) == HALF_LIVELINESS_HZ
-    assert cutoff_of(0.5, 0.5) == N_HALF_LIVELINESS_PERIODS / 0.5
-    found = [cutoff_of(liveliness, 2.0) for liveliness in (1e-6, 0.1, 0.5, 0.9, 1.0)]
+    assert cutoff_frequency(1.0, 3.0) == 0.0
+    assert cutoff_frequency(0.5, 100.0) == HALF_LIVELINESS_HZ
+    assert cutoff_frequency(0.5, 0.5) == N_HALF_LIVELINESS_PERIODS / 0.5
+    found = [cutoff_frequency(liveliness, 2.0) for liveliness in (1e-6, 0.1, 0.5, 0.9, 1.0)]
     assert all(more > less for more, less in pairwise(found))
     assert found[0] > 1e5
 

@@ -54,10 +54,10 @@ def walk(engine: Engine, carriage: Carriage, start: int, path: bool) -> Expectat
 @pytest.fixture(autouse=True)
 def _nothing_kept() -> Iterator[None]:
     """Look-ups are kept by what is looked for; some tests change how much is looked up."""
-    for keeps in (sparse._found, sparse._balls):
+    for keeps in (sparse._choose_cached, sparse._balls):
         keeps.cache_clear()
     yield
-    for keeps in (sparse._found, sparse._balls):
+    for keeps in (sparse._choose_cached, sparse._balls):
         keeps.cache_clear()
 
 
