@@ -1,4 +1,4 @@
-"""Expert libraries as a discretization: states that an expert named."""
+"""Expert libraries as a discretization: the states that an expert named."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ class ExpertLibrary:
     An orientation belongs to the nearest state, however far. `StateSpace.distance` returns the angle; beyond the
     tolerance an orientation is not in the expert's vocabulary.
 
-    A joint that the library does not list gets the states of a learned codebook, without labels. A single state would
-    silently freeze the joint, and an error would demand names for thumbs before names for hips can be tried. This way
-    no movement is lost, and `StateSpace.labels` shows which joints still need names.
+    A joint that the library does not list gets the states of a learned codebook, without labels: a single state would
+    silently freeze the joint, and an error would demand names for thumbs before names for hips can be tried.
+    `StateSpace.labels` shows which joints still need names.
 
     Attributes:
         library: the states, by joint.
-        tolerance: degrees, 0.01 to 180, within which a named state stands for an orientation; also the tolerance of
-            the codebooks for joints that are not listed.
+        tolerance: degrees, 0.01 to 180, within which a named state represents an orientation; also the tolerance of the
+            codebooks for joints that are not listed.
         per_joint: degrees for single joints; "hip" means both hips.
     """
 

@@ -1,4 +1,4 @@
-"""Grids of states, in quaternion coefficients as in the papers or in Euler angles: those cells that occur."""
+"""Grids of states, in quaternion coefficients as in the papers or in Euler angles; only cells that occur are states."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from motionmind.discretize.states import StateSpace, distinct, nearest
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 
-# With a step above 1 a quaternion can round to zero; cells wider than a third of a turn overlap more than they divide.
-_MAX_STEP_RATIO = 0.9
-_MAX_CELL_DEG = 120.0
+_MAX_STEP_RATIO = 0.9  # with a step above 1, a quaternion can round to zero
+_MAX_CELL_DEG = 120.0  # wider cells overlap more than they divide
 
 
 @dataclass(frozen=True)
@@ -70,13 +69,13 @@ class QuaternionGrid:
 class EulerGrid:
     """A grid of Euler angles, which are rounded to multiples of `degrees`: "5-degree steps" is `EulerGrid(5)`.
 
-    A state is a cell that some orientation of the corpus falls into. An orientation belongs to the nearest state, by
-    the angle between the rotations, not between their Euler angles, which mean little near gimbal lock.
+    A state is a cell that some orientation of the corpus falls into. An orientation belongs to the nearest state by the
+    angle of rotation, not by its Euler angles, which mean little near gimbal lock.
 
-    With three errors of up to h = degrees / 2, the half angle between an orientation and its cell's centre has a cosine
-    of at least cos(h/2)^3 - sin(h/2)^2 (the first and last axis may coincide, the middle one is perpendicular to both).
-    So the angle is at most sqrt(5) h, and `degrees = tolerance * 2 / sqrt(5)` keeps every orientation of the corpus
-    within `tolerance` of its state.
+    Each of the three angles errs by at most h = degrees / 2. The first and last axis may coincide; the middle one is
+    perpendicular to both. So the cosine of half the angle between an orientation and its cell's centre is at least
+    cos(h/2)^3 - sin(h/2)^2. The angle is then at most sqrt(5) h, and `degrees = tolerance * 2 / sqrt(5)` keeps every
+    orientation of the corpus within `tolerance` of its state.
 
     Attributes:
         degrees: width of the cells, 0.001 to 120.
@@ -114,15 +113,15 @@ class EulerGrid:
         return {"kind": self.kind, "degrees": self.degrees, "order": self.order, "per_joint": dict(self.per_joint)}
 
     def _cells(self, q: Floats, width: float) -> Floats:
-        # The canonical one of q and -q: their angles are equal, but perhaps not to the last bit.
+        # Use the canonical sign: the angles of q and -q are equal, but perhaps not to the last bit.
         cells = np.unique(np.rint(rot.to_euler(self.order, rot.canonical(q)) / width), axis=0)
         return _occurring(q, rot.from_euler(self.order, cells * width))
 
 
 def _occurring(q: Floats, cells: Floats) -> Floats:
-    """Those of `cells` [S, 4] that are the nearest to some of `q` [N, 4]; the others would never be visited.
+    """Return the `cells` [S, 4] that are nearest to some orientation in `q` [N, 4].
 
-    Removing the others changes no sample's nearest state.
+    Removing the others, which are never visited, changes no nearest state.
     """
     cells = distinct(rot.canonical(cells))
     return cells[np.unique(nearest(q, cells)[0])]

@@ -38,9 +38,7 @@ from motionmind.geometry import rotations as rot
 
 LIBRARY_FORMAT = "motionmind-library"
 LIBRARY_VERSION = 1
-# Two states of a joint that are closer than this many degrees are one state with two names.
-SAME_STATE_DEG = 0.01
-
+SAME_STATE_DEG = 0.01  # closer states of a joint are one state with two names
 _TEXT_KEYS = ("title", "author", "licence", "skeleton")
 
 
@@ -55,7 +53,7 @@ class Library:
         author: its author.
         licence: its licence.
         skeleton: the skeleton whose rest posture the orientations start from.
-        path: the file that it was read from, for messages.
+        path: its file, for messages.
 
     >>> from motionmind.discretize import Library, read_library
     >>> isinstance(read_library("human23"), Library)
@@ -71,9 +69,9 @@ class Library:
     _rotations: dict[str, Floats] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Check everything; FormatError names the table and the entry at fault."""
+        """Check all tables; a FormatError names the table and the entry at fault."""
         if not self.tables:
-            raise FormatError("no joint has a table of states", path=self.path)
+            raise FormatError("a library needs at least one table of states", path=self.path)
         for text in (*(getattr(self, key) for key in _TEXT_KEYS), *self.tables):
             self._check_text(text)
         rotations = {table: self._read_table(table) for table in self.tables}
@@ -89,7 +87,7 @@ class Library:
         """Return the table of each joint in `names` that has one, by the joint's index.
 
         Raises:
-            FormatError: a table means none of the joints, or a joint is meant twice.
+            FormatError: a table matches no joint, or two tables match the same joint.
         """
         owner: dict[int, str] = {}
         for table in self.tables:
@@ -109,7 +107,7 @@ class Library:
         return rot.mirror(q) if table != joint and joint.startswith("right_") else q
 
     def _check_text(self, text: str) -> None:
-        """Refuse lone surrogates, which JSON can hold and a file in UTF-8 cannot."""
+        """Reject lone surrogates, which JSON allows and UTF-8 does not."""
         try:
             text.encode()
         except UnicodeEncodeError:
@@ -118,7 +116,7 @@ class Library:
     def _read_table(self, table: str) -> Floats:
         entries = self.tables[table]
         if not isinstance(entries, Mapping) or not entries:
-            raise FormatError(f"[{table}] must be a table of states, with one at least", path=self.path)
+            raise FormatError(f"[{table}] must be a table of at least one state", path=self.path)
         states = np.stack([self._read_entry(table, name, value) for name, value in entries.items()])
         names = list(entries)
         for n in range(1, len(states)):
@@ -126,8 +124,8 @@ class Library:
             if apart.min() < SAME_STATE_DEG:
                 twin = names[int(np.argmin(apart))]
                 raise FormatError(
-                    f'[{table}] "{names[n]}": the same orientation as "{twin}"; states must differ by '
-                    f"{SAME_STATE_DEG} degrees at least",
+                    f'[{table}] "{names[n]}": the same orientation as "{twin}"; states must differ by at least '
+                    f"{SAME_STATE_DEG} degrees",
                     path=self.path,
                 )
         return states
@@ -155,7 +153,7 @@ class Library:
         if not np.isfinite(q).all() or np.abs(q).max() > 1e100:
             raise FormatError(f"{where}a quaternion needs finite numbers", path=self.path)
         if not np.linalg.norm(q) > 1e-3:
-            raise FormatError(f"{where}a quaternion of length zero is no rotation", path=self.path)
+            raise FormatError(f"{where}a quaternion of length zero is not a rotation", path=self.path)
         return rot.normalise(q)
 
 
@@ -177,12 +175,12 @@ def parse_library(text: str, *, path: str = "library") -> Library:
 
 
 def library_from_mapping(data: Mapping[str, object], *, path: str = "library") -> Library:
-    """Make a library of `data`, the mapping that the TOML or JSON of a library gives; FormatError if it is not one."""
+    """Make a library from the mapping in its TOML or JSON; raise a FormatError if `data` is not a library."""
     if data.get("format") != LIBRARY_FORMAT:
-        raise FormatError(f'not a library of states: it must say format = "{LIBRARY_FORMAT}"', path=path)
+        raise FormatError(f'not a library of states: format must be "{LIBRARY_FORMAT}"', path=path)
     version = data.get("version")
     if type(version) is not int or version != LIBRARY_VERSION:
-        raise FormatError(f"version must be {LIBRARY_VERSION}, the one known here, not {version!r:.40}", path=path)
+        raise FormatError(f"version must be {LIBRARY_VERSION}, not {version!r:.40}", path=path)
     texts = {}
     for key in _TEXT_KEYS:
         value = data.get(key, "human23" if key == "skeleton" else "")
@@ -213,13 +211,13 @@ def library_path(name_or_path: FilePath) -> Path:
     """Return the path of a library file.
 
     Args:
-        name_or_path: a path that ends in .toml, which is returned as it is, or the name of a bundled library.
+        name_or_path: the name of a bundled library, or a path that ends in .toml, which is returned unchanged.
 
     Raises:
         FormatError: no bundled library has that name.
     """
     path = Path(name_or_path)
-    # A bare word is a name, even if a folder is called so.
+    # A bare word is a name, even if a folder has that name.
     if path.suffix == ".toml" or len(path.parts) != 1:
         return path
     folder = bundled("discretization")
@@ -250,9 +248,9 @@ def read_library(name_or_path: FilePath) -> Library:
 
 
 def write_library(path: FilePath, library: Library) -> None:
-    """Write a library as a person would: in turns where hundredths of a degree are exact, else in quaternions.
+    """Write a library: as turns where hundredths of a degree are exact, else as quaternions.
 
-    `read_library` reads the same states; the comments of a file that was read are not kept.
+    `read_library` reads the same states; comments of the original file are lost.
 
     >>> from pathlib import Path
     >>> text = '''title  Two bends of the knees
@@ -283,7 +281,7 @@ def format_library(library: Library) -> str:
         lines += ["", f"[{table if _bare(table) else _quoted(table)}]"]
         for (name, value), q in zip(entries.items(), library.rotations(table), strict=True):
             turns = value if isinstance(value, str) else format_turns(q)
-            # A quaternion as it was given: normalised at every reading and writing, it would drift.
+            # Write a quaternion as given: normalised at every reading and writing, it would drift.
             text = f"[{', '.join(repr(float(v)) for v in value)}]" if turns is None else _quoted(turns)
             lines.append(f"{_quoted(name)} = {text}")
     return "\n".join(lines) + "\n"
@@ -294,6 +292,6 @@ def _bare(key: str) -> bool:
 
 
 def _quoted(text: str) -> str:
-    """A TOML basic string."""
+    """Return the text as a TOML basic string."""
     escapes = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
     return '"' + "".join(escapes.get(c, c if c.isprintable() else f"\\U{ord(c):08X}") for c in text) + '"'

@@ -1,4 +1,4 @@
-"""Libraries of joint states made from scores: each state is named after the words that the score has for it.
+"""Libraries of joint states made from scores: each state takes its name from the words of the score.
 
 Such a library is a draft for an expert to edit.
 """
@@ -28,9 +28,9 @@ def name_states(
 ) -> Library:
     """Name states for all joints in the scores' clips; every posture is then near a state with a name.
 
-    From the most frequent on, each orientation becomes a state unless a state lies within the tolerance already (leader
-    clustering: Hartigan, "Clustering Algorithms", 1975, chapter 3). Orientations are rounded to whole degrees, so a
-    posture may be a degree further off than the tolerance.
+    In order of frequency, each orientation becomes a state unless a state already lies within the tolerance (leader
+    clustering: Hartigan, "Clustering Algorithms", 1975, chapter 3). States are rounded to whole degrees, so a posture
+    may exceed the tolerance by a degree.
 
     Args:
         scores: scores for the same body.
@@ -89,7 +89,7 @@ def name_states(
 
 
 def _orientations(score: Score, stage: bool) -> Iterable[tuple[str, str, Floats]]:
-    """Joint, name and rotation [4] of every joint in every posture; a right joint's rotation mirrored."""
+    """Yield the joint, name and rotation [4] of every joint in every posture; mirror those of right joints."""
     body = score.body
     layers = {joint: index for index, joints in enumerate(body.layers.values()) for joint in joints}
     for rows, motion in played(score):
@@ -108,7 +108,7 @@ def _orientations(score: Score, stage: bool) -> Iterable[tuple[str, str, Floats]
 
 
 def _leaders(named: _Named, width: float) -> _Named:
-    """Orientations of which no two lie within `width` radians, but all that are `named` within it of one of them."""
+    """Choose orientations more than `width` radians apart, so that each in `named` lies within it of a chosen one."""
     chosen: _Named = []
     for name, turned in named:
         if not chosen or rot.angle(np.stack([kept for _, kept in chosen]), turned).min() > width:
@@ -117,7 +117,7 @@ def _leaders(named: _Named, width: float) -> _Named:
 
 
 def _table(body: Anatomy, joint: str, named: _Named) -> dict[str, str]:
-    """A library's table: turns by name, where states of the same name are numbered."""
+    """Return a library's table: turns by name; states of the same name get numbers."""
     times, out = Counter[str](), dict[str, str]()
     for name, turned in named:
         turns = _turns(body.joints[joint], turned)
@@ -129,10 +129,10 @@ def _table(body: Anatomy, joint: str, named: _Named) -> dict[str, str]:
 
 
 def _turns(joint: Joint, turned: Floats) -> str:
-    """A rotation [4] as turns in whole degrees, the one about the bone last, or first if that axis is the outermost."""
+    """Return a rotation [4] as turns in whole degrees: that about the bone last, or first if its axis is outermost."""
     order = "yxz" if joint.outer else "xzy" if joint.long == "y" and not joint.rest else "yzx"
     first, middle, last = np.round(np.degrees(rot.to_euler(order, turned)))
-    # A rotation has two triples of Euler angles; the one that turns less is easier to read.
+    # A rotation has two triples of Euler angles; the smaller one is easier to read.
     triples = np.array([[first, middle, last], [first + 180.0, 180.0 - middle, last + 180.0]])
     triples = (triples + 179.0) % 360.0 - 179.0
     degrees = min(triples, key=lambda triple: np.abs(triple).sum())

@@ -20,8 +20,8 @@ SIDE_PREFIXES = ("left_", "right_")
 class Discretization(Protocol):
     """A way to divide each joint's orientations into states.
 
-    Packages add a kind by an entry point in `motionmind.discretizations`: what is called with `tolerance` and
-    `per_joint`, in degrees, or with what `to_spec` wrote, and makes one.
+    Packages add a kind by an entry point in `motionmind.discretizations`: a callable that makes one from `tolerance`
+    and `per_joint`, in degrees, or from the values that `to_spec` wrote.
 
     >>> from motionmind.discretize import Discretization, make_discretization
     >>> isinstance(make_discretization("codebook"), Discretization)
@@ -44,7 +44,7 @@ class Discretization(Protocol):
 
         Raises:
             MotionMindError: there are no postures or joints, or a quaternion is not a unit quaternion.
-            SkeletonError: a per-joint setting is for no joint of `names`.
+            SkeletonError: a per-joint setting names no joint of `names`.
         """
         ...
 
@@ -55,10 +55,10 @@ class Discretization(Protocol):
 
 @runtime_checkable
 class ByJoint(Discretization, Protocol):
-    """A discretization that divides the orientations of each joint by themselves, so that joints can be done apart."""
+    """A discretization that treats each joint by itself, so that joints can be fitted in parallel."""
 
     def fit_joint(self, names: Sequence[str], joint: int, rotations: Floats) -> StateSpace:
-        """Divide one joint's orientations into states: those that `fit` gives this joint.
+        """Divide one joint's orientations into the states that `fit` gives this joint.
 
         Args:
             names: names of all joints [J], for settings by joint.
@@ -66,25 +66,25 @@ class ByJoint(Discretization, Protocol):
             rotations: unit quaternions of the joint in a corpus's postures [N, 4].
 
         Raises:
-            SkeletonError: a per-joint setting is for no joint of `names`.
+            SkeletonError: a per-joint setting names no joint of `names`.
         """
         ...
 
 
 def fit_joints(discretization: ByJoint, names: Sequence[str], rotations: Floats) -> StateSpace:
     """Divide each joint's orientations [N, J, 4] into states, joint by joint; as `Discretization.fit`."""
-    rotations = samples(names, rotations)
+    rotations = _checked_samples(names, rotations)
     return StateSpace.joined([discretization.fit_joint(names, j, rotations[:, j]) for j in range(len(names))])
 
 
-def samples(names: Sequence[str], rotations: Floats) -> Floats:
+def _checked_samples(names: Sequence[str], rotations: Floats) -> Floats:
     """Check the arguments of `fit`, and return `rotations` as float64 [N, J, 4].
 
     Raises:
         MotionMindError: there are no postures or joints, or a quaternion is not a unit quaternion.
     """
     if len(names) == 0 or len(set(names)) != len(names):
-        raise MotionMindError("a discretization needs joints, each named once")
+        raise MotionMindError("a discretization needs at least one joint, and distinct joint names")
     rotations = checked_rotations(names, rotations)
     if len(rotations) == 0:
         raise MotionMindError("there are no postures to learn states from")
@@ -106,7 +106,7 @@ def per_joint_values(names: Sequence[str], value: float, per_joint: Mapping[str,
         per_joint: values by joint. A name without side means both sides, unless a side is named too.
 
     Raises:
-        SkeletonError: a name in `per_joint` means no joint; the message suggests the nearest one.
+        SkeletonError: a name in `per_joint` matches no joint; the message suggests the nearest one.
     """
     values = np.full(len(names), float(value))
     # Names without side first, so that a named side overrides them.
@@ -114,7 +114,7 @@ def per_joint_values(names: Sequence[str], value: float, per_joint: Mapping[str,
         for name, own in per_joint.items():
             joints = joints_meant(name, names)
             if not joints:
-                raise SkeletonError(f"no joint {name!r} to set a value for{suggest_joint(name, nameable(names))}")
+                raise SkeletonError(f"per_joint: no joint {name!r}{suggest_joint(name, nameable(names))}")
             if (name in names) is exact:
                 values[joints] = own
     return values

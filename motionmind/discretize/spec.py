@@ -20,7 +20,7 @@ _GROUP: plugins.Group = "motionmind.discretizations"
 
 KINDS = ("codebook", "quaternion", "euler")
 
-# The keys of each kind of specification besides "kind".
+# Keys of a specification besides "kind".
 _KEYS_OF_KIND = {
     "codebook": ("tolerance", "per_joint"),
     "quaternion": ("step", "per_joint"),
@@ -57,7 +57,7 @@ def make_discretization(
     kind, per_joint = os.fspath(kind), dict(per_joint or {})
     if kind == "codebook":
         return Codebook(tolerance, per_joint)
-    # Checked here, in degrees: a grid's message would be about a step that nobody wrote.
+    # Check in degrees: a grid's own message would be about a step that the caller did not write.
     checked = Codebook(tolerance, per_joint)
     if kind == "quaternion":
         step = QuaternionGrid.step_for
@@ -109,7 +109,7 @@ def from_spec(spec: str | Mapping[str, object]) -> Discretization:
     options = {str(key): value for key, value in spec.items() if key != "kind"}
     for key in options:
         if key not in _KEYS_OF_KIND[kind]:
-            raise FormatError(f"discretization: {kind} has {', '.join(_KEYS_OF_KIND[kind])}, no {key!r:.60}")
+            raise FormatError(f"discretization: {kind} has no key {key!r:.60}, only {', '.join(_KEYS_OF_KIND[kind])}")
     if not isinstance(options.get("per_joint", {}), Mapping):
         raise FormatError("discretization: per_joint must be an object of joints and numbers")
     try:
@@ -132,7 +132,7 @@ def _make_added(kind: str, options: Mapping[str, object]) -> Discretization:
     except Exception as error:
         raise FormatError(f"discretization: {plugins.failure(_GROUP, kind, error)}") from error
     if not isinstance(made, Discretization) or made.kind != kind:
-        raise plugins.unfit(_GROUP, kind, "what makes a Discretization of that kind")
+        raise plugins.unfit(_GROUP, kind, "a function that makes a Discretization of that kind")
     return made
 
 

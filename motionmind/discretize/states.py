@@ -15,15 +15,14 @@ from motionmind.display import displayed
 from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.geometry import rotations as rot
 
-# Orientations less than this many radians apart are one state.
-SAME_ROTATION_DEG = 1e-5
-# Cosines of half angles that differ by less than this are a tie. BLAS adds in an order of its own, and a score's
-# angles often lie exactly midway between two states: without a margin the last bit would decide. The margin is far
-# above rounding (1e-16) and below the difference between distinct states (1 - cos(SAME_ROTATION_DEG / 2) = 1.25e-11).
+SAME_ROTATION_RAD = 1e-5  # closer orientations are one state
+# Cosines of half angles that differ by less are a tie. BLAS adds in an unspecified order, and a score's angles often
+# lie exactly midway between two states, so the last bit would decide without a margin. The margin is far
+# above rounding (1e-16) and below the difference between distinct states (1 - cos(SAME_ROTATION_RAD / 2) = 1.25e-11).
 _TIE_RATIO = 1e-12
-# Doubles in the largest block of cosines: 1 MB, which stays in the processor's cache. It is the fastest of 1/8 to 8 MB,
+# Size of a block of cosines: 1 MB of doubles, which stays in the processor's cache. It is the fastest of 1/8 to 8 MB,
 # and 4 to 6 times as fast as 2 MB and more.
-_N_PER_BLOCK = 1 << 17
+_N_COSINES_PER_BLOCK = 1 << 17
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,9 +37,9 @@ class StateSpace:
         centres: unit quaternions x, y, z, w [S_0 + ... + S_(J-1), 4], canonical sign, joint after joint.
         starts: index of each joint's first state in `centres` [J + 1]; the last entry is the number of states.
         kind: the kind of discretization that made them, such as "codebook".
-        tolerances: greatest angle between an orientation and its state's centre [J], degrees. All kinds but the expert
-            library keep every orientation that they were fitted to within it; in an expert library, orientations
-            farther off are not in the vocabulary.
+        tolerances: greatest angle between an orientation and its state's centre [J], degrees. It holds for every
+            orientation that the states were fitted to, except for expert libraries: there, orientations farther off are
+            not in the vocabulary.
         labels: names of the states [S_j] of each joint [J]; empty for a joint whose states have no names.
 
     >>> import numpy as np
@@ -68,13 +67,13 @@ class StateSpace:
         labels = tuple(tuple(names) for names in self.labels) or ((),) * len(self.names)
         J = len(self.names)
         if J == 0 or len(set(self.names)) != J:
-            raise MotionMindError("a state space needs joints, each named once")
+            raise MotionMindError("a state space needs at least one joint, and distinct joint names")
         if starts.shape != (J + 1,) or starts[0] != 0 or np.any(np.diff(starts) < 1):
-            raise MotionMindError(f"state space: starts must rise from 0 in {J} steps, a state a joint at least")
+            raise MotionMindError(f"state space: starts must rise from 0 in {J} steps, by at least one state each")
         if centres.shape != (starts[-1], 4) or tolerances.shape != (J,) or len(labels) != J:
             raise MotionMindError(
-                f"state space: {J} joints with {starts[-1]} states need as many tolerances, labels and centres, "
-                f"not {tolerances.shape}, {len(labels)} and {centres.shape}"
+                f"state space: {J} joints with {starts[-1]} states need tolerances [{J}], {J} tuples of labels "
+                f"and centres [{starts[-1]}, 4], not {list(tolerances.shape)}, {len(labels)} and {list(centres.shape)}"
             )
         # Written so that a NaN fails too.
         if not np.all(np.abs(np.linalg.norm(centres, axis=-1) - 1.0) <= 1e-6):
@@ -203,7 +202,7 @@ class StateSpace:
         return np.degrees(rot.angle(rotations, centres))
 
 
-def nearest(rotations: Floats, centres: Floats, *, block: int = _N_PER_BLOCK) -> tuple[States, Floats]:
+def nearest(rotations: Floats, centres: Floats, *, block: int = _N_COSINES_PER_BLOCK) -> tuple[States, Floats]:
     """Find the nearest state of each orientation of one joint; ties go to the lowest index.
 
     The angle between unit quaternions a and b is 2 acos |a . b|, so the nearest centre has the largest |a . b|, which
@@ -233,10 +232,10 @@ def nearest(rotations: Floats, centres: Floats, *, block: int = _N_PER_BLOCK) ->
 
 
 def distinct(centres: Floats) -> Floats:
-    """Return `centres` [S, 4] without duplicates of an earlier one, up to sign and `SAME_ROTATION_DEG` radians."""
+    """Return `centres` [S, 4] without duplicates of an earlier one, up to sign and `SAME_ROTATION_RAD`."""
     keep = np.ones(len(centres), dtype=bool)
-    limit = np.cos(0.5 * SAME_ROTATION_DEG)
-    rows = max(1, _N_PER_BLOCK // max(1, len(centres)))
+    limit = np.cos(0.5 * SAME_ROTATION_RAD)
+    rows = max(1, _N_COSINES_PER_BLOCK // max(1, len(centres)))
     for start in range(0, len(centres), rows):
         same = np.abs(centres[start : start + rows] @ centres.T) >= limit
         for n, row in enumerate(same, start):

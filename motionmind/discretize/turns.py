@@ -1,4 +1,4 @@
-"""Orientations as people write them: turns about named axes, one after another."""
+"""Orientations as text: turns about named axes, one after another."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ _TURN = re.compile(r"([xyzXYZ])\s*([+-]?(?:\d+(?:\.\d*)?|\.\d+))", re.ASCII)
 def parse_turns(text: str) -> Floats:
     """Parse turns such as "x -90, y 45" into a unit quaternion [4].
 
-    Turns are in degrees, and intrinsic: each is about an axis of the frame as the turns before have left it. The empty
-    text is the identity.
+    Turns are in degrees and intrinsic: each turns about an axis of the frame that the turns before have rotated. The
+    empty text is the identity.
 
     Raises:
         ValueError: the text is not a list of turns, or a turn is by more than 360 degrees.
@@ -26,7 +26,7 @@ def parse_turns(text: str) -> Floats:
     for part in text.split(",") if text.strip() else []:
         match = _TURN.fullmatch(part.strip())
         if match is None:
-            raise ValueError(f"{part.strip()!r} is no turn; write an axis and degrees, such as 'x -90'")
+            raise ValueError(f"{part.strip()!r} is not a turn; write an axis and degrees, such as 'x -90'")
         angle = float(match[2])
         if not abs(angle) <= 360.0:
             raise ValueError(f"{part.strip()!r} turns by more than 360 degrees")
