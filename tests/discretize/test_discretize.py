@@ -146,7 +146,7 @@ class TestEveryKind:
         [np.zeros((3, 4, 4)), np.full((3, 4, 4), np.nan), np.zeros((3, 5, 4)), np.zeros(4)],
         ids=["zero", "nan", "joints", "shape"],
     )
-    def test_what_is_no_rotation_is_refused(self, kind: Discretization, q: np.ndarray) -> None:
+    def test_invalid_rotations_are_rejected(self, kind: Discretization, q: np.ndarray) -> None:
         with pytest.raises(MotionMindError):
             kind.fit(NAMES, q)
         with pytest.raises(MotionMindError):
@@ -289,7 +289,7 @@ class TestStateSpace:
             self.space.label("hip", 0)
 
     @pytest.mark.parametrize("states", [[[0, 3, 0, 0]], [[0, -1, 0, 0]], [[0.5, 0, 0, 0]], [0, 0, 0, 0], [[0]]])
-    def test_states_that_there_are_not(self, states: list[object]) -> None:
+    def test_unknown_states_are_rejected(self, states: list[object]) -> None:
         with pytest.raises(MotionMindError):
             self.space.decode(np.array(states))
 
@@ -314,7 +314,7 @@ class TestStateSpace:
         ],
         ids=str,
     )
-    def test_what_does_not_fit_together_is_refused(self, change: dict[str, object]) -> None:
+    def test_mismatched_arguments_are_rejected(self, change: dict[str, object]) -> None:
         good = {
             "names": ("a", "b"),
             "centres": np.ones((2, 4)) / 2,
@@ -342,7 +342,7 @@ class TestMake:
 
     @pytest.mark.parametrize("kind", ["codebook", "quaternion", "euler", "human23"])
     @pytest.mark.parametrize("tolerance", [0.0, -1.0, 181.0, float("nan"), float("inf"), "15", True, None])
-    def test_what_is_no_tolerance_is_refused_in_degrees(self, kind: str, tolerance: object) -> None:
+    def test_invalid_tolerances_are_rejected_in_degrees(self, kind: str, tolerance: object) -> None:
         with pytest.raises(MotionMindError, match="degrees"):
             make_discretization(kind, tolerance)  # type: ignore[arg-type]
         with pytest.raises(MotionMindError, match="left_hip"):
@@ -385,7 +385,7 @@ class TestMake:
         ],
         ids=lambda spec: str(spec)[:60],
     )
-    def test_a_spec_that_says_something_else(self, spec: object) -> None:
+    def test_invalid_specs_are_rejected(self, spec: object) -> None:
         with pytest.raises(MotionMindError):
             from_spec(spec)  # type: ignore[arg-type]
 
@@ -507,7 +507,7 @@ class TestLibrary:
             read_library(path)
         assert str(caught.value).startswith(f"{path}: ")
 
-    def test_files_that_are_none(self, tmp_path: Path) -> None:
+    def test_other_files_are_rejected(self, tmp_path: Path) -> None:
         (tmp_path / "latin.toml").write_bytes(b'title = "\xe9"')
         (tmp_path / "deep.toml").write_text("a = " + "[" * 100_000)
         (tmp_path / "folder.toml").mkdir()

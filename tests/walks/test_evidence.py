@@ -108,7 +108,7 @@ def test_the_rest_of_a_corpus_is_as_if_it_had_been_gathered_alone(reverse: float
         np.testing.assert_allclose(getattr(found, name), getattr(same, name), atol=1e-12, err_msg=name)
 
 
-def test_of_a_large_corpus_some_pieces_are_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_large_corpora_are_sampled_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     corpus = straight()
     monkeypatch.setattr(evidence, "N_POSTURES", 64)
     monkeypatch.setattr(evidence, "MIN_CLIPS", 4)

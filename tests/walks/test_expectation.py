@@ -102,7 +102,7 @@ def test_far_from_the_corpus_joints_turn_the_short_way(engine: Engine, size: flo
     assert rot.angle(found.poses, straight).max() < 0.05 * size
 
 
-def test_without_a_way_to_go_no_joint_moves(engine: Engine) -> None:
+def test_without_displacement_no_joint_moves(engine: Engine) -> None:
     joints = len(engine.corpus.skeleton)
     for posture in (clip_of(engine).posture(5), far_off(engine, 4)):
         stop = stop_at(engine.corpus, posture)
@@ -111,7 +111,7 @@ def test_without_a_way_to_go_no_joint_moves(engine: Engine) -> None:
 
 
 @pytest.mark.parametrize("goes", ["elsewhere", "on"])
-def test_in_one_posture_of_a_cycle_there_is_a_way_to_go_for_a_body_that_goes(engine: Engine, goes: str) -> None:
+def test_a_travelling_cycle_has_a_displacement(engine: Engine, goes: str) -> None:
     """It travels, or moves at its ends: what the corpus knows of such movement is trusted, as it is not at rest."""
     a = clip_of(engine).posture(5)
     off = np.random.default_rng(6).normal(size=(len(a.skeleton), 3))
@@ -200,7 +200,7 @@ def test_far_from_the_corpus_joints_go_on_as_they_move_at_the_ends(engine: Engin
         assert rot.angle(found.poses, wanted).max() < 0.15 * rot.angle(still, wanted).max()
 
 
-def test_walks_are_told_both_velocities(engine: Engine) -> None:
+def test_walks_use_both_end_velocities(engine: Engine) -> None:
     """Each changes how likely moments are there, beside the other too."""
     clip = clip_of(engine)
     a, b = spinning(engine, clip.posture(3), 0.7, 8), spinning(engine, clip.posture(9), -1.3, 9)
@@ -245,7 +245,7 @@ def test_velocities_of_moments_are_those_of_the_chains(engine: Engine) -> None:
 
 
 @pytest.mark.parametrize("moving", [(False, False), (True, False), (False, True), (True, True)])
-def test_departures_end_in_nothing_and_where_velocities_are_given_without_one(moving: tuple[bool, bool]) -> None:
+def test_departures_and_given_rates_are_zero_at_the_ends(moving: tuple[bool, bool]) -> None:
     rng = np.random.default_rng(7)
     times = np.linspace(0.0, 2.0, 2001)
     waves = np.sin(times[:, None, None] * rng.uniform(0.5, 3.0, (4, 3)) + rng.uniform(0.0, 6.0, (4, 3)))

@@ -97,7 +97,7 @@ def test_keyframes_are_joined_by_splines(facing: str, ballet: Engine) -> None:
         assert corpus.times[knots][-1] - found.times[own][-1] < 1.0 / RATE
 
 
-def test_what_turns_evenly_has_that_velocity() -> None:
+def test_even_turning_has_constant_velocity() -> None:
     found = all_frames(turning((4, 7)))
     np.testing.assert_allclose(found.rates[:, 1:23], np.broadcast_to(SPEED, (len(found.rates), 22, 3)), atol=1e-6)
     np.testing.assert_allclose(found.rates[:, [0, 23]], 0.0, atol=1e-9)

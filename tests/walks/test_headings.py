@@ -53,7 +53,7 @@ def test_walks_lead_the_far_way_by_the_estimate_of_least_square_error(steps: int
         assert np.degrees(found[-1]) == pytest.approx(210.0 if share > 0.15 else -150.0)
 
 
-def test_what_is_missing_is_turned_where_walks_are_least_certain() -> None:
+def test_the_missing_turn_goes_where_walks_are_least_certain() -> None:
     varies = np.linspace(0.001, 0.02, 40)
     found = turn_with_walks(np.zeros(40), varies, SURE, TIMES, facings(0.0, 120.0), (None, None))
     np.testing.assert_allclose(np.diff(np.degrees(found)), 120.0 * varies / varies.sum(), atol=1e-9)

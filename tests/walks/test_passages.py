@@ -126,7 +126,7 @@ def test_a_piece_of_a_recording_is_found_again(cmu05: Engine, number: int) -> No
 
 
 @pytest.mark.parametrize("faster", [0.8, 1.25])
-def test_what_is_danced_faster_or_slower_is_found_too(cmu05: Engine, faster: float) -> None:
+def test_passages_are_found_at_other_tempi(cmu05: Engine, faster: float) -> None:
     recorded = all_frames(cmu05.corpus)
     for number in (3, 9, 17):
         own = np.flatnonzero(recorded.stretches == number)
@@ -336,7 +336,7 @@ def test_the_liveliest_moves_nearly_as_the_passage_does(
     assert departs(danced.move(chains, danced.times)) < 0.25 * departs(chains)
 
 
-def test_who_ends_as_they_began_holds_still_unless_more_is_known() -> None:
+def test_equal_ends_without_velocities_hold_still() -> None:
     ballet = Engine.load("ballet")
     expected, stops = walk(ballet, {0: 40, 8: 40})
     call = partial(dance, ballet.corpus, ballet.carriage, expected)

@@ -115,7 +115,7 @@ def test_walks_begin_and_end_in_moments_that_stand_for_others(
     assert np.mean(apart) < 0.25  # 0.31 where walks begin and end only in what is near
 
 
-def test_what_is_chosen_near_an_end_is_spread_from_near_to_far(carriage: Carriage) -> None:
+def test_samples_near_an_end_are_spread_from_near_to_far(carriage: Carriage) -> None:
     trees = carriage.trees
     assert trees is not None
     for number, part in enumerate(trees.parts):
@@ -132,7 +132,7 @@ def test_what_is_chosen_near_an_end_is_spread_from_near_to_far(carriage: Carriag
             assert np.diff(ranks).max() <= len(ranked) / (sparse.N_END_SAMPLES - sparse.N_NEAREST_END_SAMPLES) + 1
 
 
-def test_what_is_chosen_stands_for_the_whole_corpus(engine: Engine, carriage: Carriage) -> None:
+def test_chosen_samples_represent_the_whole_corpus(engine: Engine, carriage: Carriage) -> None:
     trees = carriage.trees
     assert trees is not None
     joints = len(engine.corpus.skeleton)
