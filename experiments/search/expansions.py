@@ -20,10 +20,10 @@ from heuristics import learn
 
 from motionmind import Engine, Posture, TweenRequest
 from motionmind.search import astar, bounding
-from motionmind.search.apart import solve_apart
-from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
+from motionmind.search.diverse import solve_diverse
 from motionmind.search.problem import Problem
 from motionmind.search.solve import Certificate, feasible, solve
+from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS
 from motionmind.tween.ends import bring_ends
 from motionmind.tween.formulate import formulate
 
@@ -134,7 +134,7 @@ class Posed(NamedTuple):
 
     def solve(self, expansions: int) -> Certificate:
         problem = replace(self.problem, rules=replace(self.problem.rules, node_budget=expansions))
-        return solve_apart(problem, [self.other.path], self.differ) if self.other else solve(problem)
+        return solve_diverse(problem, [self.other.path], self.differ) if self.other else solve(problem)
 
 
 def posed(case: Case, engine: Engine, pairs: int, seed: int) -> Iterator[Posed]:
@@ -247,7 +247,7 @@ def tell_expansions(cases: list[Case], engine: Callable[[str], Engine], pairs: i
             continue
         moves, ratios = [row.moves for row in rows], [row.ratio for row in rows]
         peak, gaps = max(row.peak_nodes for row in rows), [row.gap for row in rows if not row.proven]
-        megabytes = peak / astar.nodes_in(1_000_000, rows[0].chains)
+        megabytes = peak / astar.node_capacity(1_000_000, rows[0].chains)
         print(f"| {case.corpus}: {case.name} | {len(rows)}, {min(moves)} to {max(moves)}", end=" | ")
         print(f"{sum(row.more for row in rows)} | {np.median(ratios):,.1f}, {max(ratios):,.1f}", end=" | ")
         print(f"{peak:,}, {megabytes:.1f} MB | {sum(row.proven_by_bounds for row in rows)}", end=" | ")

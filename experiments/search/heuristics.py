@@ -17,9 +17,10 @@ from bench import RULES, Ends, joinable, moves_of
 from motionmind import Engine, own_skeleton, read_motion
 from motionmind._typing import Floats
 from motionmind.discretize import make_discretization
-from motionmind.search import astar, bounding, heuristic, pair_chains, solve, trws
+from motionmind.search import astar, heuristic, pair_chains, solve, trws
 from motionmind.search.heuristic import Heuristic
 from motionmind.search.problem import Model, Problem, costs_to_go, with_waits
+from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS, SAME_COST_NATS
 from motionmind.search.trellis import Trellis, build_trellis
 from motionmind.tween.problem import build_model
 
@@ -89,14 +90,10 @@ def weaken(model: Model, pairs: list[Ends], expansions: int) -> None:
         optimum = answer.cost - RULES.per_move * moves
         for name, estimate in heuristics(trellis):
             path = np.zeros(len(trellis.dom_ptr) - 1, np.int64)
-            found = astar.search(trellis, estimate, np.inf, astar.SAME_COST_RATIO, path, expansions, expansions, ON)
-            assert (
-                found.lower_bound
-                <= optimum + bounding.OPTIMAL_WITHIN_NATS
-                <= found.cost + 2 * bounding.OPTIMAL_WITHIN_NATS
-            )
+            found = astar.search(trellis, estimate, np.inf, SAME_COST_NATS, path, expansions, expansions, ON)
+            assert found.lower_bound <= optimum + OPTIMAL_WITHIN_NATS <= found.cost + 2 * OPTIMAL_WITHIN_NATS
             short = max(1.0 - heuristic.from_start(estimate) / optimum, 0.0) if optimum else 0.0
-            proved = found.lower_bound > found.cost - bounding.OPTIMAL_WITHIN_NATS
+            proved = found.lower_bound > found.cost - OPTIMAL_WITHIN_NATS
             rows.setdefault(name, []).append((short, found.expansions, proved))
     for name, row in rows.items():
         short, expanded, proved = zip(*row, strict=True)

@@ -21,6 +21,7 @@ from motionmind.discretize import make_discretization
 from motionmind.search import astar, pair_chains, trws
 from motionmind.search.heuristic import Heuristic
 from motionmind.search.problem import costs_to_go, with_waits
+from motionmind.search.tolerances import SAME_COST_NATS
 from motionmind.search.trellis import build_trellis
 from motionmind.tween.problem import build_model
 
@@ -41,7 +42,7 @@ def grown(folder: Path, budget: int) -> tuple[int, int, int]:
 
     def search(nodes: int) -> int:
         path, on = np.zeros(len(trellis.dom_ptr) - 1, dtype=np.int64), np.zeros(1, dtype=bool)
-        return astar.search(trellis, heuristic, np.inf, astar.SAME_COST_RATIO, path, nodes, nodes // 2, on).peak_nodes
+        return astar.search(trellis, heuristic, np.inf, SAME_COST_NATS, path, nodes, nodes // 2, on).peak_nodes
 
     search(100)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -59,7 +60,7 @@ def main() -> None:
     if options.budget:
         print(*grown(options.folder, options.budget))
         return
-    a_node = 1e6 / astar.nodes_in(1_000_000, 24)
+    a_node = 1e6 / astar.node_capacity(1_000_000, 24)
     print("| budget, nodes | held at most | reckoned | grown | grown / reckoned | an expansion |")
     print("|---|---|---|---|---|---|")
     for budget in BUDGETS:

@@ -332,12 +332,13 @@ def seek() -> None:
     from motionmind.search.pieces import Pieces
     from motionmind.search.segments import Piece
     from motionmind.search.solve import solve
+    from motionmind.search.tolerances import SAME_COST_NATS
 
     problem = _problem()
     trellis = Pieces(problem).trellis(Piece(0, 0, problem.rules.longest), np.inf)
     chosen = np.zeros(len(trellis.dom_ptr) - 1, dtype=np.int64)
     bound = Heuristic.of_messages(trws.no_messages(trellis))
-    astar.search(trellis, bound, np.inf, astar.SAME_COST_RATIO, chosen, 1000, 1, np.zeros(1, dtype=np.bool_))
+    astar.search(trellis, bound, np.inf, SAME_COST_NATS, chosen, 1000, 1, np.zeros(1, dtype=np.bool_))
     moves = problem.rules.longest
     solve(replace(problem, rules=replace(problem.rules, shortest=moves, sweeps=0), tolls=None))
 

@@ -1,4 +1,4 @@
-"""Bridges: unattested moves between states that lie close together on SO(3), for corpora that have no path."""
+"""Bridges: unattested moves between nearby orientations, for searches without a path of attested moves."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from motionmind.executors.here import this_process
 from motionmind.executors.team import Team
 from motionmind.grammar.transitions import Transitions
 
-N_BRIDGES_PER_STATE = 3  # nearest states to which bridges lead from each state
-MAX_BRIDGE_DEG = 45.0  # degrees that such a bridge spans at most
-MAX_STATES_COMPARED = 1024  # states of a chain that are all compared in pairs: 8 MB a table
+N_BRIDGES_PER_STATE = 3  # to its nearest states
+MAX_BRIDGE_DEG = 45.0  # does not apply to bridges of the spanning tree
+MAX_STATES_COMPARED = 1024  # in a full table of angles, 8 MB; larger chains use a k-d tree
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,14 +45,14 @@ def find_bridges(centres: Floats, transitions: Transitions, team: Team | None = 
     Args:
         centres: orientation of each state of each chain [G, 4].
         transitions: the joint graphs.
-        team: threads, for which each chain is a job; None for this one.
+        team: threads, one job per chain; None for the current thread.
     """
     sizes = transitions.sizes()
 
     def find(chain: int) -> tuple[Ints, Int32s, Floats]:
         first, size = transitions.starts[chain], sizes[chain]
         own = centres[first : first + size]
-        keys, angles = _of_all_pairs(own) if size <= MAX_STATES_COMPARED else _of_near_pairs(own)
+        keys, angles = _bridges_of_all_pairs(own) if size <= MAX_STATES_COMPARED else _bridges_of_near_pairs(own)
         rows = transitions.indptr[first : first + size + 1]
         attested = np.repeat(np.arange(size), np.diff(rows)) * size + transitions.targets[rows[0] : rows[-1]]
         new = ~np.isin(keys, attested)
@@ -64,24 +64,27 @@ def find_bridges(centres: Floats, transitions: Transitions, team: Team | None = 
     return Bridges(np.concatenate([[0], np.cumsum(leaving)]), targets, degrees)
 
 
-def _of_all_pairs(centres: Floats) -> tuple[Ints, Floats]:
-    """Return the bridges between states [S, 4], attested or not: s * S + s' for s -> s', increasing [B], and their
-    angles in degrees [B]."""
+def _bridges_of_all_pairs(centres: Floats) -> tuple[Ints, Floats]:
+    """Return the bridges between states [S, 4], attested or not.
+
+    Returns:
+        Keys s * S + s' of the bridges s -> s', increasing [B], and their angles in degrees [B].
+    """
     # Rounded: the order of equally near states must not depend on the last bit.
     angles = np.asarray(np.degrees(_angles(centres)).round(9), dtype=np.float64)
     keys = np.flatnonzero(_nearest(angles) | _spanning_tree(angles))
     return keys, angles.ravel()[keys]
 
 
-def _of_near_pairs(centres: Floats) -> tuple[Ints, Floats]:
-    """Return the same as `_of_all_pairs` but for the order of equal angles, from pairs that a k-d tree finds near."""
+def _bridges_of_near_pairs(centres: Floats) -> tuple[Ints, Floats]:
+    """Return the result of `_bridges_of_all_pairs`, up to the order of equal angles, by means of a k-d tree."""
     size, tree = len(centres), _Neighbours(centres)
     source, target, angle = tree.of(np.arange(size), 0, 2 * (N_BRIDGES_PER_STATE + 1))
     order = np.lexsort((target, angle, source))
     source, target, angle = source[order], target[order], angle[order]
     rank = np.arange(len(source)) - np.searchsorted(source, source)
     near = (rank < N_BRIDGES_PER_STATE) & (angle <= MAX_BRIDGE_DEG)
-    one, other = _least_spanning_edges(tree, size)
+    one, other = _spanning_edges(tree, size)
     keys = np.unique(np.concatenate([source[near] * size + target[near], one * size + other, other * size + one]))
     return keys, tree.angles(keys // size, keys % size)
 
@@ -96,8 +99,13 @@ class _Neighbours:
         self._tree = cKDTree(np.concatenate([centres, -centres]))
 
     def of(self, states: Ints, known: int, count: int) -> tuple[Ints, Ints, Floats]:
-        """Return pairs of some states with their neighbours from the `known`th on to the `count`th: states, other
-        states, and angles in degrees, each [P]. A state is twice a neighbour, and never its own."""
+        """Return pairs of states with their neighbours of the ranks `known` + 1 to `count`.
+
+        A state may be a neighbour twice, but is never its own.
+
+        Returns:
+            The states, the other states, and the angles in degrees, each [P].
+        """
         count = min(count, 2 * len(self._centres))
         _, near = self._tree.query(self._centres[states], k=np.arange(known + 1, count + 1))
         source, target = np.repeat(states, near.shape[1]), near.ravel() % len(self._centres)
@@ -105,16 +113,16 @@ class _Neighbours:
         return source[others], target[others], self.angles(source[others], target[others])
 
     def angles(self, one: Ints, other: Ints) -> Floats:
-        """Return the angles between states and others, degrees [P]."""
+        """Return the angles between pairs of states, degrees [P]."""
         cosines = np.abs(np.sum(self._centres[one] * self._centres[other], axis=1))
         return np.asarray(np.degrees(2.0 * np.arccos(np.clip(cosines, 0.0, 1.0))).round(9))
 
 
-def _least_spanning_edges(tree: _Neighbours, size: int) -> tuple[Ints, Ints]:
+def _spanning_edges(tree: _Neighbours, size: int) -> tuple[Ints, Ints]:
     """Return the ends of the edges [S - 1] of a minimum spanning tree by angle.
 
-    Of each component the least edge that leaves it is in the tree, round by round. Source: Boruvka's algorithm, as in
-    March, Ram and Gray, "Fast Euclidean minimum spanning tree", KDD (2010), but for their bounds on whole subtrees.
+    In each round, add the least edge that leaves each component. Source: Boruvka's algorithm, as in March, Ram and
+    Gray, "Fast Euclidean minimum spanning tree", KDD (2010), without their bounds on whole subtrees.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -137,7 +145,7 @@ def _least_spanning_edges(tree: _Neighbours, size: int) -> tuple[Ints, Ints]:
             left = left[~done[left] & (farthest[left] <= best[component[left]]) & (most < 2 * size)]
             known, most = most, 4 * most
         source, target, angle = map(np.concatenate, zip(*found, strict=True))
-        # Equal angles in one order for all components: so the edges close no cycle.
+        # Break ties of equal angles in one order for all components, so that the edges close no cycle.
         order = np.lexsort((np.maximum(source, target), np.minimum(source, target), angle, component[source]))
         first = np.unique(component[source[order]], return_index=True)[1]
         chosen = order[first]
@@ -149,12 +157,12 @@ def _least_spanning_edges(tree: _Neighbours, size: int) -> tuple[Ints, Ints]:
 
 
 def _angles(centres: Floats) -> Floats:
-    """Angles between all pairs of orientations [S, S], radians; arccos is accurate enough for states degrees apart."""
+    """Return the angles between all pairs of orientations [S, S], radians."""
     return np.asarray(2.0 * np.arccos(np.clip(np.abs(centres @ centres.T), 0.0, 1.0)))
 
 
 def _nearest(angles: Floats) -> Bools:
-    """Return whether a state is among the nearest of another, given the angles between them in degrees [S, S]."""
+    """Return whether each state is among the nearest of another [S, S], given all angles in degrees [S, S]."""
     near = np.zeros(angles.shape, dtype=bool)
     others = angles + np.where(np.eye(len(angles), dtype=bool), np.inf, 0.0)
     order = np.argsort(others, axis=1, kind="stable")[:, :N_BRIDGES_PER_STATE]
@@ -163,9 +171,9 @@ def _nearest(angles: Floats) -> Bools:
 
 
 def _spanning_tree(angles: Floats) -> Bools:
-    """The adjacency matrix of a minimum spanning tree by angle [S, S], symmetric."""
+    """Return the symmetric adjacency matrix [S, S] of a minimum spanning tree by angle."""
     from scipy.sparse.csgraph import minimum_spanning_tree
 
-    # The offset keeps edges of zero length, which a sparse matrix would drop, and leaves the tree what it is.
+    # The offset keeps edges of zero length, which a sparse matrix would drop, and does not change the tree.
     tree = minimum_spanning_tree(angles + 1.0).toarray() > 0.0
     return np.asarray(tree | tree.T)

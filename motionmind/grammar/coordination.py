@@ -1,7 +1,7 @@
 """Coordination of joints: a Bayesian network over the joint tree, P(state of a joint | state of its parent).
 
 Stuart and Bradley, "Learning the grammar of dance", ICML (1998), coordinate joints by such a network. A joint's
-conditional distribution is estimated from the corpus's postures with a Dirichlet prior of `PRIOR_POSTURES` virtual
+conditional distribution is estimated from the corpus's postures with a Dirichlet prior of `PRIOR_WEIGHT` virtual
 postures that are distributed as the joint's marginal. So a pair that was never seen together is expensive, but
 possible. For states c of the joint and p of its parent, with N the corpus's counts (each posture by its weight), m the
 marginal and a the pseudo-count,
@@ -24,20 +24,20 @@ from motionmind._typing import Floats, Int32s, Ints, States
 from motionmind.errors import CorpusError
 from motionmind.executors.here import this_process
 from motionmind.executors.team import Team
-from motionmind.grammar.rows import insertion_points
+from motionmind.grammar.rows import searchsorted_rows
 
 if TYPE_CHECKING:
     from pgmpy.factors.discrete import TabularCPD
     from pgmpy.models import DiscreteBayesianNetwork
 
 
-PRIOR_POSTURES = 1.0  # virtual postures in the Dirichlet prior
-MAX_NETWORK_CELLS = 100_000_000  # in the dense tables of a network: 0.8 GB
+PRIOR_WEIGHT = 1.0  # of the Dirichlet prior, in virtual postures
+MAX_NETWORK_CELLS = 100_000_000  # of dense tables: 0.8 GB
 
 
 @dataclass(frozen=True, eq=False)
 class Coordination:
-    """-log P(state | parent's state) in nats for all chains, flat; G states, V pair rows, Q pairs seen.
+    """-log P(state | parent's state) in nats, for all chains in flat arrays; G states, V pair rows, Q pairs seen.
 
     A chain has one pair row for each state of its parent, `pair_starts[chain] + parent's state`; chains without a
     parent have none. A pair that is not listed costs `child_costs` of the state + `parent_costs` of the pair row.
@@ -73,7 +73,7 @@ class Coordination:
         unseen = self.child_costs[starts[chain] + state] + self.parent_costs[row]
         if not len(self.pair_states):
             return np.asarray(unseen)
-        at = insertion_points(self.pair_ptr, self.pair_states, row, state)
+        at = searchsorted_rows(self.pair_ptr, self.pair_states, row, state)
         nearest = np.minimum(at, len(self.pair_states) - 1)
         is_listed = (at < self.pair_ptr[row + 1]) & (self.pair_states[nearest] == state)
         return np.where(is_listed, self.pair_costs[nearest], unseen)
@@ -103,7 +103,7 @@ def learn_coordination(
 ) -> Coordination:
     """Learn how joints coordinate: fit the network, and read the search's costs out of its tables.
 
-    A network of more than MOST_CELLS cells is not built; the same formula then gives the costs of the pairs seen.
+    A network of more than `MAX_NETWORK_CELLS` cells is not built; the same formula then gives the costs of the pairs.
 
     Args:
         names: names of the joints, which are the first J of L chains; other chains get no coordination.
@@ -111,19 +111,21 @@ def learn_coordination(
         states: state of each chain in each posture [N, L].
         sizes: number of states of each chain [L].
         weights: weight of each posture [N]; None for 1.
-        team: threads, for which each joint is a job; None for this one.
+        team: threads, one job per joint; None for the current thread.
     """
     coupled = np.where(np.arange(len(parents)) < len(names), parents, -1).astype(np.int64)
     counted = _count(parents[: len(names)], states, sizes, weights, team)
-    is_dense = _cells(parents[: len(names)], sizes) <= MAX_NETWORK_CELLS
-    network = _network(names, parents, sizes, counted) if is_dense else None
+    is_dense = _count_cells(parents[: len(names)], sizes) <= MAX_NETWORK_CELLS
+    network = _build_network(names, parents, sizes, counted) if is_dense else None
 
     starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     child_costs, parent_costs = np.zeros(starts[-1]), [np.zeros(0)]
     pair_counts, pair_states, pair_costs = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
     for j in np.flatnonzero(coupled >= 0):
         pairs = counted[j]
-        likely, normaliser = _read(network.get_cpds(names[j]), pairs) if network else (pairs.likely(), pairs.normaliser)
+        likely, normaliser = (
+            _read_table(network.get_cpds(names[j]), pairs) if network else (pairs.likely(), pairs.normaliser)
+        )
         child_costs[starts[j] : starts[j + 1]] = -np.log(pairs.prior)
         parent_costs.append(np.log(normaliser))
         pair_counts.append(np.bincount(pairs.above, minlength=len(pairs.visits)))
@@ -159,22 +161,22 @@ def fit_network(
         states: state of each joint in each posture [N, J].
         sizes: number of states of each joint [J].
         weights: weight of each posture [N]; None for 1.
-        team: threads, for which each joint is a job; None for this one.
+        team: threads, one job per joint; None for the current thread.
 
     Raises:
-        CorpusError: the network's tables would have more than MOST_CELLS cells.
+        CorpusError: the network's tables would have more than `MAX_NETWORK_CELLS` cells.
     """
-    cells = _cells(parents, sizes)
+    cells = _count_cells(parents, sizes)
     if cells > MAX_NETWORK_CELLS:
         raise CorpusError(
             f"a network over these states needs {cells:,} cells, more than {MAX_NETWORK_CELLS:,}: learn with a coarser "
             "tolerance, or read the coordination's lists of pairs"
         )
-    return _network(names, parents, sizes, _count(parents, states, sizes, weights, team))
+    return _build_network(names, parents, sizes, _count(parents, states, sizes, weights, team))
 
 
-class _Pairs(NamedTuple):
-    """A joint's C states counted beside its parent's P states, of which Q pairs were seen; a root has one "parent".
+class _PairCounts(NamedTuple):
+    """Counts of Q pairs: one of a joint's C states with one of its parent's P states. A root has one "parent" state.
 
     Attributes:
         above: the parent's state p in each pair, not decreasing [Q].
@@ -193,7 +195,7 @@ class _Pairs(NamedTuple):
     @property
     def normaliser(self) -> Floats:
         """N(p) + a [P]."""
-        return self.visits + PRIOR_POSTURES
+        return self.visits + PRIOR_WEIGHT
 
     def likely(self) -> Floats:
         """Return P(c | p) of each pair [Q]."""
@@ -206,31 +208,33 @@ class _Pairs(NamedTuple):
         return table
 
 
-def _count(parents: Ints, states: Int32s, sizes: Ints, weights: Floats | None, team: Team | None) -> tuple[_Pairs, ...]:
-    """Count each joint's states beside its parent's; arguments as of `fit_network`."""
+def _count(
+    parents: Ints, states: Int32s, sizes: Ints, weights: Floats | None, team: Team | None
+) -> tuple[_PairCounts, ...]:
+    """Count the pairs of each joint; arguments as for `fit_network`."""
     weights = np.ones(len(states)) if weights is None else np.asarray(weights)
 
-    def count(j: int) -> _Pairs:
+    def count(j: int) -> _PairCounts:
         above = states[:, parents[j]].astype(np.int64) if parents[j] >= 0 else np.zeros(len(states), dtype=np.int64)
         most = sizes[parents[j]] if parents[j] >= 0 else 1
         visits = np.asarray(np.bincount(above, weights, most), dtype=np.float64)
         keys, which = np.unique(above * sizes[j] + states[:, j], return_inverse=True)
         together = np.asarray(np.bincount(which, weights, len(keys)), dtype=np.float64)
-        prior = PRIOR_POSTURES * np.bincount(states[:, j], weights, sizes[j]) / weights.sum()
-        return _Pairs(keys // sizes[j], keys % sizes[j], together, visits, prior)
+        prior = PRIOR_WEIGHT * np.bincount(states[:, j], weights, sizes[j]) / weights.sum()
+        return _PairCounts(keys // sizes[j], keys % sizes[j], together, visits, prior)
 
     return tuple((team or this_process()).map(count, range(len(parents))))
 
 
-def _cells(parents: Ints, sizes: Ints) -> int:
-    """Return how many cells the tables of joints with parents have."""
+def _count_cells(parents: Ints, sizes: Ints) -> int:
+    """Return the number of cells in the tables of joints with parents."""
     return sum(int(sizes[j]) * int(sizes[p]) for j, p in enumerate(parents) if p >= 0)
 
 
-def _network(
-    names: tuple[str, ...], parents: Ints, sizes: Ints, counted: tuple[_Pairs, ...]
+def _build_network(
+    names: tuple[str, ...], parents: Ints, sizes: Ints, counted: tuple[_PairCounts, ...]
 ) -> DiscreteBayesianNetwork:
-    """Return the network of joints whose states are counted, checked by pgmpy; other arguments as of `fit_network`."""
+    """Build the network from the counts of each joint and let pgmpy check it; other arguments as for `fit_network`."""
     from pgmpy.factors.discrete import TabularCPD
     from pgmpy.models import DiscreteBayesianNetwork
 
@@ -254,12 +258,12 @@ def _network(
     return network
 
 
-def _read(cpd: TabularCPD, pairs: _Pairs) -> tuple[Floats, Floats]:
-    """Read out of a joint's table P(c | p) of the pairs seen [Q], and N(p) + a for each state of the parent [P]."""
+def _read_table(cpd: TabularCPD, pairs: _PairCounts) -> tuple[Floats, Floats]:
+    """Return P(c | p) of the pairs seen [Q] and N(p) + a of each parent's state [P], read from a joint's table."""
     table = np.asarray(cpd.get_values(), dtype=np.float64)
     seen = np.zeros(table.shape, dtype=np.bool_)
     seen[pairs.below, pairs.above] = True
     unseen, columns = np.argmin(seen, axis=0), np.arange(table.shape[1])
-    # An unseen pair's probability is a m(c) / (N(p) + a); a column without one has no use for its normaliser.
+    # An unseen pair has the probability a m(c) / (N(p) + a); a column without unseen pairs needs no normaliser.
     normaliser = np.where(seen.all(axis=0), pairs.normaliser, pairs.prior[unseen] / table[unseen, columns])
     return table[pairs.below, pairs.above], normaliser

@@ -1,4 +1,4 @@
-"""The grammar of a corpus: all that is learned from it, in the flat arrays from which searches build their costs."""
+"""The grammar of a corpus, in the flat arrays from which searches build their costs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from motionmind.grammar.transitions import Transitions, count_transitions
 
 @dataclass(frozen=True, eq=False)
 class Grammar:
-    """The moves of each chain, the bridges between its states, and the coordination of chains.
+    """The transitions of each chain, the bridges between its states, and the coordination of chains.
 
     Attributes:
         chains: names [L]: the skeleton's joints, then "facing" if the body's heading is a chain of its own.
@@ -59,7 +59,7 @@ def learn(
         ends: the posture that each move leads to [M]; None for the next one.
         weights: weight of each move [M]; None for 1.
         posture_weights: weight of each posture [N]; None for 1.
-        team: threads, for which each chain is a job; None for this one.
+        team: threads, one job per chain; None for the current thread.
     """
     team = team or this_process()
     joints = len(chains) - (chains[-1] == "facing")

@@ -1,9 +1,9 @@
 """Progressions: P(where a joint goes | where it is, and the move that its parent makes).
 
-The tables are those of Bradley and Stuart, "Using chaos to generate variations on movement sequences", Chaos 8:800
-(1998): the Bayesian network of the two postures of a move has x_j(t+1) given x_j(t), x_parent(t) and x_parent(t+1). In
-full they would hold the square of a joint's states by the square of its parent's. So they are stored sparsely, by
-*moves*: m = (s, s') of the joint and n of its parent. With C the corpus's counts, each move by its weight,
+Source: Bradley and Stuart, "Using chaos to generate variations on movement sequences", Chaos 8:800 (1998). Their
+Bayesian network of the two postures of a move has x_j(t+1) given x_j(t), x_parent(t) and x_parent(t+1). Full tables
+would hold the square of a joint's states by the square of its parent's. These are sparse, indexed by *moves*:
+m = (s, s') of the joint and n of its parent. With C the corpus's counts, each move by its weight,
 
     P(m | s, n) = (C(m, n) + a P(m | s)) / (C(s, n) + a),   C(s, n) the sum of C(m, n) over the moves m that leave s
     P(m | s) = C(m) / (C(s) + a),  and a / (C(s) + a) for any move that the corpus does not attest
@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
-from motionmind.grammar.coordination import PRIOR_POSTURES, Coordination
+from motionmind.grammar.coordination import PRIOR_WEIGHT, Coordination
 
 
 def fit_progression(
@@ -51,7 +51,7 @@ def fit_progression(
     shifted = starts + first_moves  # rows of the chains where states are moves
     sources = np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))
     keys = sources * (1 + np.max(sizes, initial=0)) + targets
-    made = {}  # by chain, the move of the joint graph that each of the corpus's moves is
+    made = {}  # by chain: index in the joint graph of each of the corpus's moves
     for chain in {*range(len(parents))} - {*np.flatnonzero(parents < 0)} | {*parents[parents >= 0]}:
         rows = starts[chain] + states[begins, chain].astype(np.int64)
         made[chain] = np.searchsorted(keys, rows * (1 + np.max(sizes)) + states[ends, chain])
@@ -67,7 +67,7 @@ def fit_progression(
         source = sources[first:last] - starts[chain]
         alone = _own_probabilities(source, stood, below, weights)
         child_costs[shifted[chain] + stood : shifted[chain + 1]] = -np.log(alone)
-        move, beside, costs = _pairs(
+        move, beside, costs = _pair_costs(
             source, indptr[starts[chain] : starts[chain + 1] + 1], alone, above, below, weights
         )
 
@@ -88,7 +88,9 @@ def fit_progression(
 
 
 def _own_probabilities(source: Ints, size: int, below: Ints, weights: Floats) -> Floats:
-    """P(m | s) of each move m of a chain with `size` states [E_j]; of an unattested move, that of all of them.
+    """Return P(m | s) of each move m of a chain with `size` states [E_j].
+
+    For an unattested move, this is the probability of all unattested moves together.
 
     Args:
         source: state that each move of the chain leaves [E_j].
@@ -97,15 +99,15 @@ def _own_probabilities(source: Ints, size: int, below: Ints, weights: Floats) ->
         weights: weight of each of the corpus's moves [M].
     """
     seen = np.bincount(below, weights, len(source))
-    alone = np.where(seen > 0.0, seen, PRIOR_POSTURES)
-    alone /= np.bincount(source, seen, size)[source] + PRIOR_POSTURES
+    alone = np.where(seen > 0.0, seen, PRIOR_WEIGHT)
+    alone /= np.bincount(source, seen, size)[source] + PRIOR_WEIGHT
     return alone
 
 
-def _pairs(
+def _pair_costs(
     source: Ints, rows: Ints, alone: Floats, above: Ints, below: Ints, weights: Floats
 ) -> tuple[Ints, Ints, Floats]:
-    """-log P(m | s, n), nats, of all moves m that leave a state s in which the chain was seen during a move n.
+    """Return -log P(m | s, n), nats, of all moves m from s, for each pair of n and s in the corpus.
 
     Args:
         source: state that each move of the chain leaves [E_j].
@@ -128,5 +130,5 @@ def _pairs(
     move = begin[context] + within
     together = np.zeros(len(context))
     np.add.at(together, (np.cumsum(count) - count)[which] + below - begin[which], weights)
-    costs = np.log(seen[context] + PRIOR_POSTURES) - np.log(together + PRIOR_POSTURES * alone[move])
+    costs = np.log(seen[context] + PRIOR_WEIGHT) - np.log(together + PRIOR_WEIGHT * alone[move])
     return move, (contexts // size)[context], costs

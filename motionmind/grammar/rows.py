@@ -1,4 +1,4 @@
-"""Rows of numbers, one after another: those of row r lie at `ptr[r]` to `ptr[r + 1]`, rising."""
+"""Search in sorted rows stored one after another: row r holds `numbers[ptr[r] : ptr[r + 1]]`, increasing."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ import numpy as np
 from motionmind._typing import Int32s, Ints, States
 
 
-def insertion_points(ptr: Ints, numbers: Int32s, rows: Ints, wanted: int | States) -> Ints:
-    """Return the index of the first number of each row that is not below the one wanted; the row's end if none is.
+def searchsorted_rows(ptr: Ints, numbers: Int32s, rows: Ints, wanted: int | States) -> Ints:
+    """Return the index of the first number in each row that is not below the wanted one; the row's end if none is.
 
-    All rows are halved together, for to look at one at a time takes NumPy several microseconds.
+    Bisect all rows together: NumPy takes several microseconds for a row by itself.
 
     Args:
         ptr: rows of the numbers [R + 1].
         numbers: the numbers of all rows [E].
-        rows: the rows to look in, of any shape.
-        wanted: what to look for in each.
+        rows: the rows to search, of any shape.
+        wanted: the number to search for, or one for each row.
     """
     first, last = ptr[rows], ptr[rows + 1]
     while np.any(first < last):

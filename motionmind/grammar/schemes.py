@@ -1,4 +1,4 @@
-"""The schemes by which a grammar's counts become costs, by name; light to import, for the command line names them."""
+"""Names of the schemes that turn a grammar's counts into costs; light to import, for the command line."""
 
 from __future__ import annotations
 

@@ -31,11 +31,11 @@ class Transitions:
         starts: first row of each chain [L + 1].
         indptr: transitions of each state [G + 1].
         targets: the state that each transition leads to, increasing within a row [E].
-        counts: how often it was made, each time by the weight of the move [E].
-        visits: the number of postures in each state, each by its weight [G].
-        attests: index of the first posture from which it was made [E].
+        counts: total weight of the corpus's moves that made each transition [E].
+        visits: total weight of the postures in each state [G].
+        attests: index of the first posture from which each transition was made [E].
         arrives: index of the posture that it led to from there [E].
-        seconds: its mean duration, by the same weights [E].
+        seconds: its mean duration, weighted alike [E].
     """
 
     starts: Ints
@@ -47,7 +47,7 @@ class Transitions:
     arrives: Int32s
     seconds: Floats
 
-    # Cached for all tweens: it takes time in proportion to all transitions.
+    # Cached for all tweens: each takes time in proportion to the number of transitions.
 
     @cached_property
     def sources(self) -> Ints:
@@ -67,7 +67,7 @@ class Transitions:
 
     @property
     def _width(self) -> int:
-        """A number greater than that of the states in any chain."""
+        """A number greater than that of any chain's states."""
         return int(self.sizes().max()) + 1
 
     def graph(self, chain: int) -> nx.DiGraph:
@@ -80,7 +80,7 @@ class Transitions:
         edges = slice(self.indptr[first], self.indptr[last])
         return _graph(
             self.visits[first:last],
-            _Counted(
+            _ChainTransitions(
                 self.sources[edges] - first,
                 self.targets[edges],
                 self.counts[edges],
@@ -133,7 +133,7 @@ class Transitions:
         return at if at < last and self.targets[at] == target else -1
 
     def edges(self, path: Int32s) -> Ints:
-        """Return the indices of all chains' transitions in a path [T, L]; -1 for those that are not attested.
+        """Return the indices of all chains' transitions in a path [T, L]; -1 for unattested ones.
 
         Args:
             path: states [T + 1, L].
@@ -141,7 +141,7 @@ class Transitions:
         return self.find(self.starts[:-1] + path[:-1], path[1:])
 
     def find(self, rows: Ints, targets: Ints | Int32s) -> Ints:
-        """Return the indices of transitions; -1 for those that are not attested.
+        """Return the indices of transitions; -1 for unattested ones.
 
         Args:
             rows: row of the state that each leaves, of any shape.
@@ -201,13 +201,13 @@ def flatten(graphs: Iterable[nx.DiGraph]) -> Transitions:
     Args:
         graphs: a graph for each chain, with its nodes, and the edges of each, in increasing order.
     """
-    visits, leaving, counted = list[Floats](), list[Ints](), [_Counted.none()]
+    visits, leaving, counted = list[Floats](), list[Ints](), [_ChainTransitions.none()]
     for graph in graphs:
         visits.append(np.array([visited for _, visited in graph.nodes(data="visits")], dtype=np.float64))
         leaving.append(np.array([degree for _, degree in graph.out_degree()], dtype=np.int64))
         edges = graph.edges(data=True)
         columns = zip(*((s, t, *(values[key] for key in _EDGE_ATTRIBUTES)) for s, t, values in edges), strict=True)
-        counted.append(_Counted(*map(np.array, columns)) if edges else _Counted.none())
+        counted.append(_ChainTransitions(*map(np.array, columns)) if edges else _ChainTransitions.none())
     _, targets, counts, seconds, attests, arrives = map(np.concatenate, zip(*counted, strict=True))
     return Transitions(
         np.cumsum([0, *map(len, visits)], dtype=np.int64),
@@ -221,10 +221,10 @@ def flatten(graphs: Iterable[nx.DiGraph]) -> Transitions:
     )
 
 
-_EDGE_ATTRIBUTES = ("count", "seconds", "attests", "arrives")  # attributes of an edge that `_Counted` has
+_EDGE_ATTRIBUTES = ("count", "seconds", "attests", "arrives")  # in the order of the fields of `_ChainTransitions`
 
 
-class _Counted(NamedTuple):
+class _ChainTransitions(NamedTuple):
     """The transitions of one chain, in the order of sources, then targets, each [E_j]; fields as in `Transitions`."""
 
     sources: Ints
@@ -235,26 +235,26 @@ class _Counted(NamedTuple):
     arrives: Ints | Int32s
 
     @classmethod
-    def none(cls) -> _Counted:
+    def none(cls) -> _ChainTransitions:
         whole, real = np.zeros(0, np.int64), np.zeros(0)
         return cls(whole, whole, real, real, whole, whole)
 
 
 def _count(
     sources: Ints, targets: Ints, size: int, begins: Ints, ends: Ints, seconds: Floats, weights: Floats
-) -> _Counted:
+) -> _ChainTransitions:
     """Count the transitions that a chain of `size` states makes in the moves [M] from `sources` to `targets`."""
     keys, first, which = np.unique(sources * size + targets, return_index=True, return_inverse=True)
     counts = np.asarray(np.bincount(which, weights=weights, minlength=len(keys)), dtype=np.float64)
     mean = np.bincount(which, weights=weights * seconds, minlength=len(keys)) / counts
-    return _Counted(keys // size, keys % size, counts, mean, begins[first], ends[first])
+    return _ChainTransitions(keys // size, keys % size, counts, mean, begins[first], ends[first])
 
 
-def _pool(turns: _Counted, size: int) -> _Counted:
+def _pool(turns: _ChainTransitions, size: int) -> _ChainTransitions:
     """Copy the transitions from state 0 of a circle of `size` states to every state."""
     targets = (np.arange(size)[:, None] + turns.targets[None, :]) % size
     order = np.argsort(targets, axis=1)
-    return _Counted(
+    return _ChainTransitions(
         np.repeat(np.arange(size), len(turns.targets)),
         np.take_along_axis(targets, order, 1).ravel(),
         turns.counts[order].ravel(),
@@ -264,7 +264,7 @@ def _pool(turns: _Counted, size: int) -> _Counted:
     )
 
 
-def _graph(visits: Floats, counted: _Counted) -> nx.DiGraph:
+def _graph(visits: Floats, counted: _ChainTransitions) -> nx.DiGraph:
     """Return the joint graph of a chain; its states' visits are [S]."""
     import networkx as nx
 

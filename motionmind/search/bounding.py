@@ -1,8 +1,8 @@
-"""Bound a trellis from both sides, until the lower bound meets the cost of the best path found, or hardly moves.
+"""Bound a trellis from both sides, until the lower bound meets the cost of the best path found or stalls.
 
-Rounds of sweeps raise the lower bound; each round also finds and polishes a path, and prunes from the trellis the
-positions that no path as cheap as the best goes through. A* starts from the result: the last bound is its heuristic,
-the best path its incumbent, and the remaining trellis, which contains the best path, its problem.
+Rounds of sweeps raise the lower bound. Each round also finds and polishes a path, and prunes the positions that only
+costlier paths than the best go through. A* starts from the result: the last bound is its heuristic, the best path its
+incumbent, and the remaining trellis, which contains the best path, its problem.
 """
 
 from __future__ import annotations
@@ -11,24 +11,18 @@ import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.search import heuristic, pair_chains, trws
-from motionmind.search.attention import Attention
 from motionmind.search.costs import path_cost
 from motionmind.search.heuristic import Heuristic
 from motionmind.search.pair_chain_tables import count_pairs
 from motionmind.search.polish import polish
+from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS, ROUNDING_NATS
 from motionmind.search.trellis import Trellis, states_of
+from motionmind.search.watcher import Watcher
 
-N_SWEEPS_PER_ROUND = 2  # few, since pruning pays at once: 2 is fastest of 1 to 8 on real ballet
-N_FIRST_SWEEPS = 3  # of the whole trellis, where one more sweep is worth more than polishing the path
-STALLED_GAIN_RATIO = (
-    0.9  # message sweeps that leave more than this share of the gap, and of the positions, give way to pair chains
-)
-MAX_PAIR_CHAIN_SWEEPS = 100  # at most, for each number of moves
-PAIR_CHAINS_STALLED_RATIO = 0.98  # as STALLED_GAIN_RATIO; then A* takes over
-POLISH_WITHIN_SHARE = 0.1  # paths that cost more than this share above the best are not polished
-MAX_STATE_PAIRS = 1 << 23  # pairs of states in pair chains, 32 bytes each; more are not built, nor kept for A*
-OPTIMAL_WITHIN_NATS = 1e-6  # nats: a path within this of its lower bound is reported as optimal
-ROUNDING_NATS = 1e-8  # nats: more than the rounding of a path's cost, less than any precision of interest
+N_SWEEPS_PER_ROUND = 2  # few, since pruning pays at once: on ballet 2 is the fastest of 1 to 8
+N_FIRST_SWEEPS = 3  # in the first round, on the whole trellis: one more is worth more than polishing the path
+MAX_PAIR_CHAIN_SWEEPS = 100  # for each number of moves
+MAX_STATE_PAIRS = 1 << 23  # in pair chains, 32 bytes each; larger ones are neither built nor kept for A*
 
 
 class Bounded:
@@ -63,7 +57,7 @@ class Bounded:
         return self.cost + ROUNDING_NATS if self.found else self.cost - ROUNDING_NATS
 
     def update(self, lower_bound: float, chosen: Ints, through: Floats | None) -> None:
-        """Take in a bound and a path of positions [n]; polish the path if it is near the best.
+        """Update the bounds with a lower bound and a path of positions [n]; polish a path within 10 % of the best.
 
         Args:
             lower_bound: bound on all paths, nats.
@@ -72,26 +66,26 @@ class Bounded:
                 it is.
         """
         cost = path_cost(self.trellis, chosen)
-        if through is not None and cost <= self.cost + POLISH_WITHIN_SHARE * abs(self.cost):
+        if through is not None and cost <= self.cost + 0.1 * abs(self.cost):
             cost = polish(self.trellis, chosen, through)
         if cost < self.cost:
             self.cost, self.states = cost, states_of(self.trellis, chosen)
         self.lower_bound = min(max(self.lower_bound, lower_bound), self.cost)
 
-    def take(self, cost: float, states: Int32s, lower_bound: float) -> None:
-        """Take in a bound, and a path [T + 1, L] at least as good, up to rounding, as the best known."""
+    def accept(self, cost: float, states: Int32s, lower_bound: float) -> None:
+        """Update the bounds with a lower bound and, if it costs at most `limit`, a path of states [T + 1, L]."""
         if cost <= self.limit:
             self.cost, self.states = cost, states
         self.lower_bound = min(max(self.lower_bound, lower_bound), self.cost)
 
     def undercut(self, below: float) -> None:
-        """Look only for paths cheaper than `below` nats from now on."""
+        """Restrict the search to paths cheaper than `below` nats."""
         if below < self.cost:
             self.cost, self.states = below, self.states[:0]
             self.lower_bound = min(self.lower_bound, below)
 
     def replace(self, trellis: Trellis, heuristic: Heuristic) -> None:
-        """Continue with a pruned trellis; an empty domain means that no path below the limit is left."""
+        """Replace the trellis by a pruned one; an empty domain means that no path below the limit is left."""
         if np.any(np.diff(trellis.dom_ptr) == 0):
             self.lower_bound = self.cost
         else:
@@ -102,18 +96,18 @@ class Bounded:
         return self.cost - self.lower_bound > share * gap and len(self.trellis.dom) > share * size
 
 
-def tighten(state: Bounded, sweeps: int, attention: Attention) -> None:
+def tighten(state: Bounded, sweeps: int, watcher: Watcher) -> None:
     """Tighten the bounds of a trellis by at most `sweeps` pairs of message sweeps; then, if needed, by pair chains."""
-    _tighten_by_messages(state, sweeps, attention)
+    _tighten_by_messages(state, sweeps, watcher)
     several = state.trellis.chains > 1
-    if not (state.closed or attention.ends()) and several and count_pairs(state.trellis) <= MAX_STATE_PAIRS:
+    if not (state.closed or watcher.wants_stop()) and several and count_pairs(state.trellis) <= MAX_STATE_PAIRS:
         tables = pair_chains.build(state.trellis, state.heuristic.messages)
         state.heuristic = Heuristic.of_pair_chains(tables)
-        tighten_by_pair_chains(state, attention)
+        tighten_by_pair_chains(state, watcher)
 
 
-def _tighten_by_messages(state: Bounded, sweeps: int, attention: Attention) -> None:
-    """Tighten by messages until bound and path meet, the gap hardly shrinks, or the watcher ends the search."""
+def _tighten_by_messages(state: Bounded, sweeps: int, watcher: Watcher) -> None:
+    """Tighten by messages until bound and path meet, they stall, or the watcher stops the search."""
     messages, done = trws.no_messages(state.trellis), 0
     while done < sweeps:
         first, gap, size = done == 0, state.cost - state.lower_bound, len(state.trellis.dom)
@@ -121,20 +115,20 @@ def _tighten_by_messages(state: Bounded, sweeps: int, attention: Attention) -> N
         chosen = np.zeros(len(state.trellis.dom_ptr) - 1, dtype=np.int64)
         lower_bound, _ = trws.tighten(state.trellis, messages, chosen, at_once, state.cost)
         done += at_once
-        last = done >= sweeps or attention.ends()
+        last = done >= sweeps or watcher.wants_stop()
         # The first path only serves to prune; polish it only if no other will follow.
         state.update(lower_bound, chosen, messages.through if last or not first else None)
         if state.closed and not state.found:
             break
-        # Prune the whole trellis in place, as much of it is left; later copy the little that is left, to free memory.
+        # Prune the whole trellis in place, as most of it is left; later copy the small rest, to free memory.
         trellis, messages = trws.prune(state.trellis, messages, state.limit, first)
         state.replace(trellis, Heuristic.of_messages(messages))
-        if state.closed or last or (not first and state.stalls(gap, size, STALLED_GAIN_RATIO)):
+        if state.closed or last or (not first and state.stalls(gap, size, 0.9)):
             break
 
 
-def tighten_by_pair_chains(state: Bounded, attention: Attention) -> None:
-    """Tighten further by the heuristic's pair chains, in the same way."""
+def tighten_by_pair_chains(state: Bounded, watcher: Watcher) -> None:
+    """Tighten by the heuristic's pair chains, in the same way."""
     state.lower_bound = max(state.lower_bound, min(pair_chains.lower_bound(state.heuristic.tables), state.cost))
     for done in range(MAX_PAIR_CHAIN_SWEEPS):
         if state.closed:
@@ -148,5 +142,5 @@ def tighten_by_pair_chains(state: Bounded, attention: Attention) -> None:
         if state.found or not state.closed:
             trellis, tables = pair_chains.prune(state.trellis, tables, through, state.limit)
             state.replace(trellis, Heuristic.of_pair_chains(tables))
-        if attention.ends() or (done and state.stalls(gap, size, PAIR_CHAINS_STALLED_RATIO)):
+        if watcher.wants_stop() or (done and state.stalls(gap, size, 0.98)):
             break

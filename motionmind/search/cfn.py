@@ -1,10 +1,10 @@
 """Write the problem of a fixed number of moves in toulbar2's cfn format, so that anyone can check an optimum.
 
-The format: "cost function network", JSON with `problem`, `variables` and `functions`
-(toulbar2's documentation, "User guide: file formats, cfn format"). A cost at or above `mustbe` forbids.
+The format: "cost function network", JSON with `problem`, `variables` and `functions` (toulbar2's documentation, "User
+guide: file formats, cfn format"). A cost at or above `mustbe` forbids.
 
-A path costs the sum of all functions. Each ingredient of the cost has its own, named after the variable chain_t, the
-state of a chain after move t:
+The cost of a path is the sum of all functions. The variable chain_t is the state of a chain after move t. Each
+ingredient of the cost has its own functions:
 
     moves                   the price of all moves
     allowed_chain_t         lists the edges into chain_t, at no cost, and forbids all others
@@ -12,10 +12,10 @@ state of a chain after move t:
     network_chain_t         corrects the coupling to the parent chain for pairs of states
     network_chain_t_child   the separable part of the coupling: what the chain's state costs
     network_chain_t_parent  and what the parent's state costs
-    guide_chain_t           what the state costs at this move alone
+    guide_chain_t           the guide's cost of the state at this move
 
-The word before the first underscore names the ingredient. A kind without edges has no function, nor has a network or
-guide that is 0 throughout.
+The word before the first underscore names the ingredient. A kind without edges has no function; nor has a network or
+a guide that is 0 throughout.
 """
 
 from __future__ import annotations
@@ -31,17 +31,15 @@ from motionmind._typing import Floats, Int32s, Ints
 from motionmind.search.problem import Model, Problem
 from motionmind.search.trellis import Trellis, segment_trellises
 
-N_COST_DECIMALS = 6
-
 
 class Ingredients(NamedTuple):
-    """The ingredients of a model's costs that the model itself does not separate.
+    """The ingredients of a model's costs, which the model itself adds up.
 
     Attributes:
         kinds: names of the kinds of edges [K], without underscores.
         kind: the kind of each edge of the problem's model with waits, from 0 to K - 1 [E].
-        child: the share of `Model.unary` that each state owes to the coupling of its chain to the parent, nats [G].
-        parent: the share that a parent's state owes to the coupling, for each pair row of the model, nats [sum].
+        child: the part of `Model.unary` that comes from the coupling of each state's chain to its parent, nats [G].
+        parent: the part that comes from the parent's state in the coupling, for each pair row of the model, nats [sum].
     """
 
     kinds: Sequence[str]
@@ -51,14 +49,14 @@ class Ingredients(NamedTuple):
 
 
 class _Function(NamedTuple):
-    """A cost function.
+    """A cost function of two variables, of one, or of none.
 
     Attributes:
         name: its name.
-        scope: its variables.
-        costs: nats of the listed pairs; without pairs, of each value, or of all paths where there is no variable [n].
-        pairs: values of two variables [n, 2], or None.
-        forbids: whether other pairs are forbidden; else they cost 0.
+        scope: names of its variables.
+        costs: nats [n], of the listed pairs; for one variable, of each value; for none, of every path (n = 1).
+        pairs: the listed pairs of values of two variables [n, 2]; else None.
+        forbids: whether other pairs are forbidden; otherwise they cost 0.
     """
 
     name: str
@@ -71,9 +69,9 @@ class _Function(NamedTuple):
 def cfn(problem: Problem, moves: int, names: Sequence[str], ingredients: Ingredients) -> str:
     """Write the problem of exactly `moves` moves, with the costs that the search minimises.
 
-    Variables are named chain_t, and their values after the chain's states, such as "s12". Where states are moves, they
-    are named after the places that they join, such as "s7_s12", and chains go on from a via as variables chain_t_on,
-    with values such as "s12". The optimum is the cost that a certificate states, the price of the moves included.
+    Variables are named chain_t, and their values after the chain's states, such as "s12". A state that is a move is
+    named after the places that it joins, such as "s7_s12"; a chain then continues from a via as a variable chain_t_on
+    with values such as "s12". The optimum is the cost in a certificate, including the price of the moves.
 
     Args:
         problem: the problem; each via names the move at which it is passed.
@@ -82,12 +80,12 @@ def cfn(problem: Problem, moves: int, names: Sequence[str], ingredients: Ingredi
         ingredients: the ingredients of its costs.
 
     Raises:
-        ValueError: a via names no move.
+        ValueError: a via has no move.
     """
     stops = [0]
     for number, via in enumerate(problem.vias, start=1):
         if via.move is None:
-            raise ValueError(f"via {number} names no move; cfn writes the problem with vias at given moves")
+            raise ValueError(f"via {number} has no move; cfn needs the move of each via")
         stops.append(via.move)
     model, timed = problem.model_with_waits(), problem.timed_costs(moves)
     words = _value_names(model)
@@ -148,7 +146,7 @@ def _segment(
     for i, domain in enumerate(domains):
         name = f"{chains[i % trellis.chains]}_{first + i // trellis.chains}"
         values = [words[row] for row in rows[domain]]
-        # A segment starts where the one before ends: in the same states, unless these are moves.
+        # A segment starts in the states in which the previous one ends, unless states are moves.
         names.append(name if variables.setdefault(name, values) == values else f"{name}_on")
         variables[names[-1]] = values
     return _Segment(trellis, names, domains, rows)
@@ -205,14 +203,14 @@ def _guide(segment: _Segment, i: int, costs: Floats) -> Iterator[_Function]:
 
 
 def _entries(ptr: Ints, columns: Int32s, first: int, last: int, start: int) -> tuple[Ints, slice]:
-    """Return entries of a matrix as pairs of values [n, 2], and where they lie.
+    """Return entries of a matrix as pairs of values [n, 2], and the slice that they occupy.
 
     Args:
         ptr: entries of each row.
         columns: their columns, which are positions.
         first: first row to return.
-        last: row after the last one to return.
-        start: the first position of the columns' variable.
+        last: the row after the last one to return.
+        start: first position of the variable that the columns belong to.
     """
     listed = slice(int(ptr[first]), int(ptr[last]))
     values = np.repeat(np.arange(last - first), np.diff(ptr[first : last + 1]))
@@ -220,7 +218,7 @@ def _entries(ptr: Ints, columns: Int32s, first: int, last: int, start: int) -> t
 
 
 def _model_edges(model: Model, segment: _Segment) -> Ints:
-    """Return the number of each edge of a segment [R] among those of the model."""
+    """Return the index in the model of each edge of a segment [R]."""
     trellis, width = segment.trellis, int(np.diff(model.starts).max())
     keys = np.repeat(np.arange(len(model.place)) * width, np.diff(model.indptr)) + model.targets
     wanted = np.repeat(segment.rows * width, np.diff(trellis.row_ptr)) + trellis.dom[trellis.row_to]
@@ -231,9 +229,9 @@ def _model_edges(model: Model, segment: _Segment) -> Ints:
 
 
 def _write(title: str, variables: dict[str, list[str]], functions: Sequence[_Function]) -> str:
-    """Return the text of a network."""
-    # More than any path can cost: the sum of the greatest costs of all functions.
-    forbidden = f"{1.0 + sum(np.abs(one.costs).max(initial=0.0) for one in functions):.{N_COST_DECIMALS}f}"
+    """Return the text of a network; costs have six decimals."""
+    # More than any path can cost: above the sum of the greatest costs of all functions.
+    forbidden = f"{1.0 + sum(np.abs(one.costs).max(initial=0.0) for one in functions):.6f}"
     header = {"name": title, "mustbe": f"<{forbidden}"}
     values = (f"{json.dumps(name)}: {json.dumps(states)}" for name, states in variables.items())
     return (
@@ -247,8 +245,8 @@ def _write(title: str, variables: dict[str, list[str]], functions: Sequence[_Fun
 
 def _line(function: _Function, forbidden: str) -> str:
     """Format a function without exponents: toulbar2 does not read numbers such as 2e-06, although JSON does."""
-    rounded = np.round(function.costs, N_COST_DECIMALS).tolist()
-    costs, default = [f"{cost:.{N_COST_DECIMALS}f}" if cost else "0" for cost in rounded], ""
+    rounded = np.round(function.costs, 6).tolist()
+    costs, default = [f"{cost:.6f}" if cost else "0" for cost in rounded], ""
     if function.pairs is not None:
         costs = [f"{a}, {b}, {cost}" for (a, b), cost in zip(function.pairs.tolist(), costs, strict=True)]
         default = f'"defaultcost": {forbidden if function.forbids else 0}, '

@@ -1,4 +1,4 @@
-"""Compressed sparse rows: entries of row r lie at `ptr[r]` to `ptr[r + 1]`, their columns increasing."""
+"""Matrices in compressed sparse rows: row r has the entries `ptr[r]` to `ptr[r + 1]`, with increasing columns."""
 
 from __future__ import annotations
 
@@ -8,24 +8,18 @@ from motionmind._typing import Floats, Int32s, Ints
 from motionmind.jit import jit, read_only
 
 
-def insertion_point(ptr: Ints, columns: Int32s, row: int, column: int) -> int:
-    """Return the index of the first entry of a row whose column is not less than `column`; the row's end if none is."""
-    first, last = ptr[row], ptr[row + 1]
-    return int(first + np.searchsorted(columns[first:last], column))
-
-
 def select_entries(
     ptr: Ints, columns: Int32s, costs: Floats, rows: Ints, numbers: Int32s, shifts: Ints
 ) -> tuple[Ints, Int32s, Floats]:
-    """Build a matrix from some rows of another, keeping the columns that have a number and renumbering them.
+    """Build a matrix from rows of another: keep the columns that have a new number, and renumber them.
 
     Args:
         ptr: rows of the other matrix [R + 1].
         columns: its columns [E].
         costs: its entries [E].
         rows: the row that each row of the new matrix is taken from [N].
-        numbers: new column of each old one, -1 where it is left out.
-        shifts: where in `numbers` the old columns of each new row begin [N].
+        numbers: new number of each old column; -1 to leave it out.
+        shifts: offset in `numbers` of the old columns of each new row [N].
 
     Returns:
         Row pointers [N + 1], columns [M] and entries [M] of the new matrix.
@@ -59,7 +53,7 @@ def _write_entries(
     out_costs: Floats,
 ) -> Ints:
     """Write the columns and entries of `select_entries`, and return its row pointers [N + 1]."""
-    # Write every entry, and overwrite one to leave out with the next: a branch would be mispredicted.
+    # Write every entry, and let the next overwrite one that is left out: a branch would be mispredicted.
     out_ptr, at = np.zeros(len(rows) + 1, np.int64), np.uint64(0)
     for k in range(len(rows)):
         for e in range(np.uint64(ptr[rows[k]]), np.uint64(ptr[rows[k] + 1])):

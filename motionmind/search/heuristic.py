@@ -23,7 +23,7 @@ _NO_PAIR_CHAINS = PairChains(
 
 
 class Heuristic(NamedTuple):
-    """Messages after a backward sweep, or pair chains; the unused ones have no entries."""
+    """The messages after a backward sweep, or the pair chains; the arrays of the other are empty."""
 
     messages: Messages
     tables: PairChains
@@ -77,7 +77,7 @@ def step(trellis: Trellis, heuristic: Heuristic, i: int, frontier: NDArray[np.ui
 
 @jit
 def descend(trellis: Trellis, heuristic: Heuristic, path: Ints) -> None:
-    """Write to `path` [n] the path of positions with the least growth of f at each variable."""
+    """Write to `path` [n] the positions with the least growth of f at each variable (greedy descent)."""
     chains = trellis.chains
     frontier = np.zeros(chains, np.uint16)
     for chain in range(chains):

@@ -1,8 +1,8 @@
 """The choice of an open number of moves, by tolls and by the haste of the chains.
 
-A path's energy says little about its length: once nothing hurries, each further move costs about as much as the last.
-But it reveals which lengths are too short. The chains' *haste* in n moves is the extra cost of starting where they do:
-with V[n, s] the least cost of a chain on its own from state s to the goal in exactly n moves,
+A path's cost says little about its length: from some length on, each further move costs about as much as the last. But
+it reveals which lengths are too short. The chains' *haste* in n moves is the extra cost of starting where they do: with
+V[n, s] the least cost of a chain on its own from state s to the goal in exactly n moves,
 
     haste(n) = sum over chains of  V[n, start] - min over s of V[n, s].
 
@@ -58,9 +58,9 @@ def choose_length(problem: Problem) -> LengthChoice:
     tolls, rules, shape = problem.tolls, problem.rules, (len(problem.stops) - 1, problem.rules.longest + 1)
     if tolls is None or tolls.shape != shape or not np.isfinite(tolls).all():
         raise ValueError(f"there must be finite tolls of the shape {shape}")
-    hastes = _hastes(problem) if problem.vias else _hastes_that_matter(problem, tolls[0])
+    hastes = _hastes(problem) if problem.vias else _relevant_hastes(problem, tolls[0])
     costs = hastes + tolls
-    so_far = _so_far(problem, costs)
+    so_far = _least_costs(problem, costs)
     so_far[-1][: rules.shortest] = np.inf
     ends = [int(so_far[-1].argmin())]
     if not np.isfinite(so_far[-1][ends[0]]):
@@ -75,13 +75,13 @@ def choose_length(problem: Problem) -> LengthChoice:
 def fewest_moves(problem: Problem) -> int | None:
     """Return the least number of moves within the rules for which a path exists; None if there is none."""
     rules = problem.rules
-    found = _so_far(problem, _hastes(problem))[-1]
+    found = _least_costs(problem, _hastes(problem))[-1]
     possible = np.flatnonzero(np.isfinite(found[rules.shortest :]))
     return rules.shortest + int(possible[0]) if len(possible) else None
 
 
-def _so_far(problem: Problem, costs: Floats) -> list[Floats]:
-    """Return the least total cost of the first 0, 1, ... segments, by the move after which they end [N + 1].
+def _least_costs(problem: Problem, costs: Floats) -> list[Floats]:
+    """Return the least total cost of the first 0, 1, ..., K segments, by the move after which they end [N + 1].
 
     Args:
         problem: the problem.
@@ -112,10 +112,10 @@ def _hastes(problem: Problem) -> Floats:
     return out
 
 
-def _hastes_that_matter(problem: Problem, tolls: Floats) -> Floats:
-    """Return `_hastes` of a problem without vias [1, N + 1], as far as they can matter; infinite beyond.
+def _relevant_hastes(problem: Problem, tolls: Floats) -> Floats:
+    """Return `_hastes` of a problem without vias [1, N + 1] for the numbers of moves that may be best; infinite beyond.
 
-    No haste is negative, so stop where the tolls [N + 1] alone cost as much as the second best number of moves.
+    No haste is negative, so stop where the tolls [N + 1] alone cost more than the second best number of moves.
     """
     model, rules = problem.model_with_waits(), problem.rules
     out, to_go = np.full((1, len(tolls)), np.inf), None

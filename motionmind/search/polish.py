@@ -1,7 +1,7 @@
 """Improve a path: minimise one chain or one move exactly, with the rest fixed, until nothing improves.
 
-Dynamic programming solves both: along a chain backwards in time, at a move up the tree. It skips positions that no path
-as cheap as the present one goes through: this loses nothing better, and saves half of a large trellis.
+Dynamic programming solves both: along a chain backwards in time, at a move up the tree. It skips positions that only
+costlier paths go through: half of a large trellis.
 """
 
 from __future__ import annotations
@@ -11,9 +11,8 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Ints
 from motionmind.jit import jit
 from motionmind.search.costs import edge_cost, path_cost
+from motionmind.search.tolerances import SAME_COST_NATS
 from motionmind.search.trellis import Trellis, correction
-
-_BOUND_ROUNDING_NATS = 1e-6  # nats: more than bounds are off by
 
 
 @jit
@@ -28,52 +27,52 @@ def polish(trellis: Trellis, path: Ints, through: Floats) -> float:
         through: a lower bound on the cost of every path through each position, nats [P].
     """
     chains, cost = trellis.chains, path_cost(trellis, path)
-    kept = _of_use(path, through, cost)
-    chain_waits, moment_waits = np.ones(chains, np.bool_), np.ones(trellis.moves + 2, np.bool_)
+    kept = _useful_positions(path, through, cost)
+    chain_pending, move_pending = np.ones(chains, np.bool_), np.ones(trellis.moves + 2, np.bool_)
     while True:
         for chain in range(chains):
-            if chain_waits[chain]:
+            if chain_pending[chain]:
                 before, moved = path.copy(), False
                 minimise_chain(trellis, path, chain, kept)
-                chain_waits[chain] = False
+                chain_pending[chain] = False
                 for t in range(1, trellis.moves + 1):
                     if path[t * chains + chain] != before[t * chains + chain]:
-                        moved = moment_waits[t - 1] = moment_waits[t] = moment_waits[t + 1] = True
+                        moved = move_pending[t - 1] = move_pending[t] = move_pending[t + 1] = True
                 if moved:
-                    _wake_neighbours(trellis, chain, chain_waits)
-                    kept = _of_use(path, through, path_cost(trellis, path))
+                    _mark_neighbours(trellis, chain, chain_pending)
+                    kept = _useful_positions(path, through, path_cost(trellis, path))
         for t in range(1, trellis.moves + 1):
-            if moment_waits[t]:
+            if move_pending[t]:
                 before = path.copy()
-                minimise_moment(trellis, path, t, kept)
-                moment_waits[t] = False
+                minimise_move(trellis, path, t, kept)
+                move_pending[t] = False
                 for chain in range(chains):
                     if path[t * chains + chain] != before[t * chains + chain]:
-                        moment_waits[t - 1] = moment_waits[t + 1] = chain_waits[chain] = True
-                        _wake_neighbours(trellis, chain, chain_waits)
+                        move_pending[t - 1] = move_pending[t + 1] = chain_pending[chain] = True
+                        _mark_neighbours(trellis, chain, chain_pending)
         better = path_cost(trellis, path)
-        if not better < cost - 1e-9:
+        if not better < cost - SAME_COST_NATS:
             return min(better, cost)
         cost = better
 
 
 @jit
-def _of_use(path: Ints, through: Floats, cost: float) -> Bools:
-    """Return which positions [P] a path that costs at most `cost` may go through, including those of `path`."""
-    kept = through <= cost + _BOUND_ROUNDING_NATS
+def _useful_positions(path: Ints, through: Floats, cost: float) -> Bools:
+    """Return a mask of the positions [P] of `path` and of all that paths of at most `cost` nats may go through."""
+    kept = through <= cost + 1e-6  # nats, more than the rounding of bounds
     for p in path:
         kept[p] = True
     return kept
 
 
 @jit
-def _wake_neighbours(trellis: Trellis, chain: int, waits: Bools) -> None:
+def _mark_neighbours(trellis: Trellis, chain: int, pending: Bools) -> None:
     """Mark a changed chain's parent and children for minimisation."""
     if trellis.parents[chain] >= 0:
-        waits[trellis.parents[chain]] = True
+        pending[trellis.parents[chain]] = True
     for child in range(chain + 1, trellis.chains):
         if trellis.parents[child] == chain:
-            waits[child] = True
+            pending[child] = True
 
 
 @jit
@@ -113,7 +112,7 @@ def minimise_chain(trellis: Trellis, path: Ints, chain: int, kept: Bools) -> Non
 
 
 @jit
-def minimise_moment(trellis: Trellis, path: Ints, t: int, kept: Bools) -> None:
+def minimise_move(trellis: Trellis, path: Ints, t: int, kept: Bools) -> None:
     """Replace all positions at move t by the cheapest of the kept ones [P], given the other moves.
 
     value[p] is the least cost of a chain with position p and of the chains below it in the tree.

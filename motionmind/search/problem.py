@@ -4,7 +4,6 @@ A chain walks on one joint's joint graph (or on the facing's). For T moves there
 t = 0 .. T, whose domain holds the states that lie on some walk of exactly T moves from the chain's start to its goal.
 The chain's edges couple consecutive variables (an absent edge is forbidden); at every t >= 1 the tree couples each
 chain to its parent. For a path of a given number of moves, a guide may add costs of states that depend on the move.
-The search knows nothing else about bodies.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.jit import jit
-from motionmind.search.csr import insert_entries, insertion_point
+from motionmind.search.csr import insert_entries
 
 
 class Model(NamedTuple):
@@ -40,8 +39,7 @@ class Model(NamedTuple):
         targets: state that an edge leads to [E], increasing within a row.
         costs: cost of the edge, nats [E].
         unary: cost of being in a state at any t >= 1, nats [G].
-        alone: a lower bound on a state's share of the couplings when nothing is known of the other chains, nats [G]:
-            the least that the coupling to its parent can cost.
+        alone: the least that the coupling to its parent can cost a state, whatever the parent's state, nats [G].
         pair_starts: first pair row of each chain [L + 1]; a chain has one pair row for each state of its parent.
         pair_ptr: pairs of each pair row [sum + 1].
         pair_states: the chain's state in a listed pair [Q], increasing within a pair row.
@@ -104,11 +102,11 @@ class Problem:
         rules: numbers of moves, their costs, and the effort allowed.
         vias: states to pass through, in this order; they divide the path into segments.
         guide: returns, for a path of T moves, the cost of being in each state after moves 1 to T - 1, nats [T - 1, G];
-            finite, of either sign. It determines where to be when, not how many moves to make: `solve` compares numbers
-            of moves by the costs of paths without it.
+            finite, of either sign. It affects the path, not the number of moves: `solve` compares numbers of moves by
+            the costs of paths without it.
         tolls: nats for a number of moves, for each segment from stop to stop and each number up to the greatest
-            [K, N + 1]; finite, of either sign. They serve only to choose the number of moves
-            (`motionmind.search.length`), and are not part of a path's cost. None for no tolls.
+            [K, N + 1]; finite, of either sign. They only choose the number of moves (`motionmind.search.length`), and
+            are not part of a path's cost. None for no tolls.
     """
 
     model: Model
@@ -148,7 +146,7 @@ class Problem:
 
 
 def with_waits(model: Model, goal: Ints, wait: float) -> Model:
-    """Let every chain wait at its goal for `wait` nats a move, or hold there for less if the model has that edge.
+    """Let every chain wait at its goal for `wait` nats a move, or less if the model has a cheaper edge there.
 
     Args:
         model: the costs.
@@ -162,7 +160,10 @@ def with_waits(model: Model, goal: Ints, wait: float) -> Model:
         return model
     rows = model.starts[:-1] + goal
     at = np.array(
-        [insertion_point(model.indptr, model.targets, row, state) for row, state in zip(rows, goal, strict=True)],
+        [
+            first + np.searchsorted(model.targets[first:last], state)
+            for first, last, state in zip(model.indptr[rows], model.indptr[rows + 1], goal, strict=True)
+        ],
         dtype=np.int64,
     )
     held = np.zeros(len(rows), dtype=bool)
@@ -189,8 +190,8 @@ def costs_to_go(
         V[0, s at goal] = 0
         V[k, s] = min over edges s -> s' of  cost(s, s') + alone(s') + timed[T - k + 1, s'] + V[k - 1, s']
 
-    over the allowed states s', and for the last move over those at the goal. Summed over chains, V bounds the cost of
-    exactly k moves from below, since each coupling counts once, at the least that it can cost its chain.
+    over the allowed states s' or, for the last move, the states at the goal. Summed over chains, V bounds the cost
+    of exactly k moves from below, since each coupling counts once, at the least that it can cost its chain.
 
     Args:
         model: the costs, waits included.

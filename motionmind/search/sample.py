@@ -2,9 +2,9 @@
 
 Blocked Gibbs sampling: each chain given the other chains is a chain in time, each move given those before and after it
 is a tree, and both can be sampled exactly. No coupling is infinite, so a chain can reach each of its paths whatever the
-others do, and the rounds converge to the distribution from any path. A finite number of rounds only approximates it;
-for uncoupled chains, one round samples exactly. On real ballet, from 5 Hz and 15 degrees to 10 Hz
-and 5 degrees, costs of paths 10 rounds apart are uncorrelated (0.04 and less).
+others do, and the rounds converge to the distribution from any path. A hundred rounds only approximate it; for
+uncoupled chains, one round samples exactly. On ballet, at 5 Hz and 15 degrees as at 10 Hz and 5 degrees, costs of paths
+10 rounds apart are uncorrelated (0.04 and less).
 
 Sources: Carter and Kohn, "On Gibbs sampling for state space models", Biometrika 81(3), 1994 (forward filtering,
 backward sampling; here in the other direction of time); Jensen, Kjaerulff and Kong, "Blocking Gibbs sampling in very
@@ -25,8 +25,6 @@ from motionmind.search.problem import Problem
 from motionmind.search.solve import Certificate
 from motionmind.search.trellis import Trellis, correction, locate, segment_trellises, states_of
 
-N_SAMPLING_ROUNDS = 100  # each samples every chain and every move once
-
 
 def sample_path(problem: Problem, certificate: Certificate, seed: int) -> Certificate:
     """Sample a path in place of the best one.
@@ -45,7 +43,7 @@ def sample_path(problem: Problem, certificate: Certificate, seed: int) -> Certif
     for trellis, (first, last) in zip(segment_trellises(problem, moves), pairwise(moves), strict=True):
         chosen = locate(trellis, path[first : last + 1])
         chosen[: trellis.chains] = trellis.dom_ptr[: trellis.chains]  # a via, at which the segment before may arrive
-        cost += float(gibbs_sample(trellis, chosen, N_SAMPLING_ROUNDS, rng))
+        cost += float(gibbs_sample(trellis, chosen, 100, rng))
         path[first + 1 : last + 1] = states_of(trellis, chosen)[1:]
     return replace(certificate, path=path, cost=cost + problem.rules.per_move * (len(path) - 1), status="sampled")
 
@@ -55,7 +53,7 @@ def gibbs_sample(trellis: Trellis, path: Ints, rounds: int, rng: np.random.Gener
     """Resample a path [n] of positions in place, `rounds` times, and return its cost in nats."""
     for _ in range(rounds):
         for t in range(1, trellis.moves + 1):
-            _sample_moment(trellis, path, t, rng)
+            _sample_move(trellis, path, t, rng)
         for chain in range(trellis.chains):
             _sample_chain(trellis, path, chain, rng)
     return path_cost(trellis, path)
@@ -86,7 +84,7 @@ def _sample_chain(trellis: Trellis, path: Ints, chain: int, rng: np.random.Gener
 
 
 @jit
-def _sample_moment(trellis: Trellis, path: Ints, t: int, rng: np.random.Generator) -> None:
+def _sample_move(trellis: Trellis, path: Ints, t: int, rng: np.random.Generator) -> None:
     """Resample all positions at move t given the other moves.
 
     value[p] is -log of the sum of exp(-cost) over the choices at this move of the chains below p's in the tree.

@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Floats, States
-
-SAME_COST_NATS = 1e-9  # nats: closer costs differ by rounding only
+from motionmind.search.tolerances import SAME_COST_NATS
 
 
 class Piece(NamedTuple):
@@ -57,15 +56,15 @@ class Segments:
     @property
     def moves(self) -> int:
         """The number of moves of the best path."""
-        return int(self._so_far(self._cost)[-1].argmin())
+        return int(self._least_costs(self._cost)[-1].argmin())
 
     def lower_bound(self) -> float:
         """Return a lower bound on the cost of every whole path, in nats."""
-        return min(float(self._so_far(self.lower)[-1].min()), self.best)
+        return min(float(self._least_costs(self.lower)[-1].min()), self.best)
 
     def lower_bound_elsewhere(self) -> float:
         """Return a lower bound on the cost of every whole path of another number of moves than the best's, in nats."""
-        return float(np.delete(self._so_far(self.lower)[-1], self.moves).min(initial=np.inf))
+        return float(np.delete(self._least_costs(self.lower)[-1], self.moves).min(initial=np.inf))
 
     def most_promising(self) -> tuple[Piece, float, float]:
         """Return the unseen piece that may be part of the cheapest path.
@@ -73,7 +72,7 @@ class Segments:
         Also return the lower bound on such a path, and the cost below which the piece improves on its own best and on
         the best whole path, both in nats.
         """
-        others = self._others(self.lower)
+        others = self._costs_of_others(self.lower)
         through = np.where(self._unseen, self.lower + others, np.inf)
         piece = Piece(*map(int, np.unravel_index(through.argmin(), through.shape)))
         return piece, float(through[piece]), min(self.best - float(others[piece]), float(self._cost[piece]))
@@ -83,15 +82,15 @@ class Segments:
         self._unseen = np.isfinite(self.lower)
 
     def update(self, piece: Piece, lower: float, cost: float, path: States) -> None:
-        """Take in a piece's bound, and a path of it [n + 1, L] with its cost, or an empty one; mark it as seen.
+        """Update a piece's lower bound and, unless `path` [n + 1, L] is empty, its best path; mark the piece as seen.
 
-        Of two paths with the same cost up to rounding, keep the later.
+        Of two paths with the same cost up to rounding, keep the later one.
         """
         self._unseen[piece] = False
         self.lower[piece] = max(self.lower[piece], lower)
         if len(path) > 0 and cost <= self._cost[piece] + SAME_COST_NATS:
             self._cost[piece], self._paths[piece] = cost, path
-            self.best = float(self._so_far(self._cost)[-1].min())
+            self.best = float(self._least_costs(self._cost)[-1].min())
 
     def cost(self, piece: Piece) -> float:
         """Return the least known cost of a piece's paths, nats."""
@@ -100,7 +99,7 @@ class Segments:
     def best_pieces(self) -> list[Piece]:
         """Return the pieces of the best path, from the start on; none before there is one."""
         pieces: list[Piece] = []
-        so_far = self._so_far(self._cost)
+        so_far = self._least_costs(self._cost)
         if not np.isfinite(self.best):
             return pieces
         last = int(so_far[-1].argmin())
@@ -118,7 +117,7 @@ class Segments:
         paths, stops = [self._paths[piece] for piece in pieces], np.cumsum([piece.moves for piece in pieces[:-1]])
         return np.concatenate([paths[0], *(path[1:] for path in paths[1:])]), tuple(map(int, stops))
 
-    def _so_far(self, table: Floats) -> list[Floats]:
+    def _least_costs(self, table: Floats) -> list[Floats]:
         """Return the least cost from the start to each of the K + 1 stops, by the move it is passed at [N + 1]."""
         out = [self._open[0]]
         for costs, passing in zip(table, self._open[1:], strict=True):
@@ -129,9 +128,9 @@ class Segments:
             out.append(least + passing)
         return out
 
-    def _others(self, table: Floats) -> Floats:
+    def _costs_of_others(self, table: Floats) -> Floats:
         """Return the least cost of all other segments together, for each piece [K, F, N + 1]."""
-        so_far, to_go, out = self._so_far(table), self._open[-1], np.full_like(table, np.inf)
+        so_far, to_go, out = self._least_costs(table), self._open[-1], np.full_like(table, np.inf)
         for segment in range(len(table) - 1, -1, -1):
             costs, other, least = table[segment], out[segment], np.full(len(to_go), np.inf)
             for first in np.flatnonzero(np.isfinite(so_far[segment])):

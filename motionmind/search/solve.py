@@ -11,15 +11,16 @@ import numpy as np
 from motionmind._typing import Int32s
 from motionmind.errors import InfeasibleError
 from motionmind.search import bounding, parts, trws
-from motionmind.search.attention import Attention, Clock
-from motionmind.search.bounding import OPTIMAL_WITHIN_NATS, ROUNDING_NATS, Bounded, tighten
+from motionmind.search.bounding import Bounded, tighten
 from motionmind.search.heuristic import Heuristic
 from motionmind.search.length import LengthChoice, choose_length
 from motionmind.search.pieces import Pieces
 from motionmind.search.problem import Problem, Rules, Via
 from motionmind.search.segments import Piece, Segments
+from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS, ROUNDING_NATS
+from motionmind.search.watcher import Stopwatch, Watcher
 
-MAX_CHAIN_STATES = 1 << 16  # A* numbers the states of a chain in 16 bits
+MAX_CHAIN_STATES = 1 << 16  # A* stores the states of a chain in 16 bits
 
 Status = Literal["optimal", "bounded", "interrupted", "sampled"]
 
@@ -72,9 +73,9 @@ class Certificate:
 def solve(problem: Problem, watch: Watch | None = None) -> Certificate:
     """Find the cheapest path over all numbers of moves, and bound its optimality gap.
 
-    First bound the numbers of moves in order of the chains' independent costs, while those are below the cost of the
-    best path found. A* then searches the undecided numbers of moves, and in any case that of the best path; its result
-    is the answer, unless its nodes run out. The least of all bounds is the proven one.
+    First bound the numbers of moves in order of the chains' independent costs, as long as these are below the cost of
+    the best path found. A* then searches the undecided numbers of moves, and always that of the best path; its result
+    is the answer, unless its nodes run out. The proven lower bound is the least of all bounds.
 
     Vias divide the path into segments of at least one move. Then the numbers of moves apply to a segment, and each is
     searched only below the best path's cost minus the lower bounds of the other segments.
@@ -85,8 +86,8 @@ def solve(problem: Problem, watch: Watch | None = None) -> Certificate:
 
     Args:
         problem: what to solve.
-        watch: called with the progress between pieces of work; if it returns True the search ends as soon as any path
-            is known, with what is proven by then. While the number of moves is chosen, costs are those without a guide.
+        watch: called with the progress about every 0.1 s; if it returns True, the search stops as soon as it knows any
+            path, with the bound proven by then. While the number of moves is chosen, costs are those without a guide.
 
     Raises:
         InfeasibleError: no path satisfies the problem.
@@ -121,14 +122,14 @@ class _Solver:
     rules: Rules
     pieces: Pieces
     segments: Segments
-    kept: dict[Piece, Bounded]  # what A* may have to search
+    kept: dict[Piece, Bounded]  # bounded pieces that A* may have to search
     searched: set[Piece]
     expansions: int
     peak_nodes: int
 
     def __init__(self, watch: Watch | None) -> None:
-        self.clock = Clock("problem", "bound", "search")
-        self.attention = Attention(None if watch is None else lambda: bool(watch(self.progress())))
+        self.stopwatch = Stopwatch("problem", "bound", "search")
+        self.watcher = Watcher(None if watch is None else lambda: bool(watch(self.progress())))
 
     def start(self, problem: Problem) -> None:
         """Begin with a problem."""
@@ -136,7 +137,7 @@ class _Solver:
         self.kept, self.searched = {}, set()
         self.pieces = Pieces(problem)
         self.segments = self.pieces.segments()
-        self.clock.lap("problem")
+        self.stopwatch.lap("problem")
 
     def progress(self) -> Progress:
         return Progress(self.segments.best, self.segments.lower_bound(), self.expansions)
@@ -170,7 +171,7 @@ class _Solver:
             piece, least, below = self.segments.most_promising()
             if not least < self.segments.best - OPTIMAL_WITHIN_NATS or enough():
                 return
-            if self.attention.ends() and np.isfinite(self.segments.best):
+            if self.watcher.wants_stop() and np.isfinite(self.segments.best):
                 return
             state = self._bounded(piece, below)
             more = len(state.heuristic.tables.pair_cost)
@@ -178,15 +179,15 @@ class _Solver:
                 self.kept[piece] = state
                 pairs += more
             self._update(piece, state)
-            self.clock.lap("bound")
+            self.stopwatch.lap("bound")
 
     def _bounded(self, piece: Piece, below: float) -> Bounded:
         """Return bounds on a piece, restricted to paths cheaper than `below` nats."""
         below -= self.rules.per_move * piece.moves
         trellis = self.pieces.trellis(piece, below)
         state = Bounded(trellis, Heuristic.of_messages(trws.no_messages(trellis)), below)
-        self.clock.lap("problem")
-        tighten(state, self.rules.sweeps, self.attention)
+        self.stopwatch.lap("problem")
+        tighten(state, self.rules.sweeps, self.watcher)
         return state
 
     def _search(self, enough: Callable[[], bool]) -> None:
@@ -195,7 +196,7 @@ class _Solver:
         while True:
             piece, least, below = self.segments.most_promising()
             spent = self.expansions >= self.rules.node_budget
-            if not least < self.segments.best - OPTIMAL_WITHIN_NATS or enough() or spent or self.attention.ends():
+            if not least < self.segments.best - OPTIMAL_WITHIN_NATS or enough() or spent or self.watcher.wants_stop():
                 return
             self._search_piece(piece, below)
 
@@ -204,12 +205,12 @@ class _Solver:
         state = self.kept.pop(piece, None) or self._bounded(piece, below)
         state.undercut(below - self.rules.per_move * piece.moves)
         nodes = self.rules.node_budget
-        effort = parts.search(state, nodes, nodes - self.expansions, self.attention)
+        effort = parts.search(state, nodes, nodes - self.expansions, self.watcher)
         self._update(piece, state)
         self.searched.add(piece)
         self.expansions += effort.expansions
         self.peak_nodes = max(self.peak_nodes, effort.peak_nodes)
-        self.clock.lap("search")
+        self.stopwatch.lap("search")
 
     def _update(self, piece: Piece, state: Bounded) -> None:
         toll = self.rules.per_move * piece.moves
@@ -221,10 +222,10 @@ class _Solver:
         status: Status = "bounded"
         if cost - lower_bound <= OPTIMAL_WITHIN_NATS:
             status = "optimal"
-        elif self.attention.ended[0]:
+        elif self.watcher.stopped[0]:
             status = "interrupted"
         return Certificate(
-            path, cost, lower_bound, status, self.expansions, self.peak_nodes, self.clock.seconds, passed, length
+            path, cost, lower_bound, status, self.expansions, self.peak_nodes, self.stopwatch.seconds, passed, length
         )
 
     def _result(self) -> tuple[float, float]:

@@ -23,10 +23,10 @@ for any forward messages.
 In other words, the energy is shared among chains that run along the order, whose least costs add up to the bound.
 Theta is the sum, over the chains through a variable, of each chain's excess over its least cost with a given value.
 So when the backward sweep reaches a variable, theta plus the current bound bounds all paths *through* each position.
-That bound is the sum of the constants of the forward sweep before the variable, the minima of theta from it on, and the
-constants of the messages sent back so far; for messages to earlier variables the forward sweep's constants count
-instead. If it is at least the cost of a known path, the position can leave its domain, which tightens the next bounds:
-reduced-cost fixing, as in linear programming.
+The current bound adds up the forward sweep's constants before the variable, the minima of theta from it on, and the
+constants of the messages sent back so far. For messages to earlier variables the forward sweep's constants count
+instead. If the bound through a position is at least the cost of a known path, the position can leave its domain, which
+tightens the next bounds: reduced-cost fixing, as in linear programming.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ import numpy as np
 
 from motionmind._typing import Floats, Ints
 from motionmind.jit import jit
+from motionmind.search.tolerances import SAME_COST_NATS
 from motionmind.search.trellis import Trellis, correction, coupling_rows, reachable, subset
 
 
@@ -82,7 +83,7 @@ def no_messages(trellis: Trellis) -> Messages:
 
 @jit
 def _ahead(trellis: Trellis, messages: Messages, i: int) -> None:
-    """Write the own cost of each position of a variable, plus all messages from later variables, to `ahead`."""
+    """Write to `ahead` the cost of each position of variable i plus all messages to it from later variables."""
     chains, chain = trellis.chains, i % trellis.chains
     first, last = trellis.dom_ptr[i], trellis.dom_ptr[i + 1]
     for p in range(first, last):
@@ -97,7 +98,7 @@ def _ahead(trellis: Trellis, messages: Messages, i: int) -> None:
 
 @jit
 def _theta(trellis: Trellis, messages: Messages, i: int) -> Floats:
-    """Return the variable's own cost plus all messages to it, less their minimum, which becomes its constant."""
+    """Return theta of variable i: its cost plus all messages to it, less their minimum, which becomes its constant."""
     first, last = trellis.dom_ptr[i], trellis.dom_ptr[i + 1]
     _ahead(trellis, messages, i)
     theta, least = np.empty(last - first), np.inf
@@ -142,10 +143,9 @@ def forward(trellis: Trellis, messages: Messages) -> None:
 
 @jit
 def _send_ahead(trellis: Trellis, messages: Messages, i: int, theta: Floats) -> float:
-    """Send from variable i, whose share is theta, to its chain's next move; return what is subtracted.
+    """Send from variable i, whose share is theta, to its chain's next move; return the constant subtracted.
 
-    Here and below positions are unsigned, so Numba omits the check for negative indices: half of the innermost loops'
-    time.
+    Unsigned positions, here and below, spare Numba the check for negative indices: half the time of the inner loops.
     """
     first, begin, end = trellis.dom_ptr[i], trellis.dom_ptr[i + trellis.chains], trellis.dom_ptr[i + trellis.chains + 1]
     messages.down_row[begin:end] = np.inf
@@ -159,13 +159,13 @@ def _send_ahead(trellis: Trellis, messages: Messages, i: int, theta: Floats) -> 
 
 @jit
 def _send_down(trellis: Trellis, messages: Messages, child: int, theta: Floats) -> float:
-    """Send to variable `child` from its parent, whose share is theta; return what is subtracted."""
+    """Send to variable `child` from its parent, whose share is theta; return the constant subtracted."""
     begin, end, base = trellis.dom_ptr[child], trellis.dom_ptr[child + 1], trellis.up_ptr[child]
     values = theta - messages.up_col[base : base + len(theta)]
     best = np.argmin(values)
     messages.down_col[begin:end] = values[best]
     for q in range(trellis.col_ptr[base + best], trellis.col_ptr[base + best + 1]):
-        if trellis.col_cost[q] > 0.0:  # the best of all costs more here: others may do better
+        if trellis.col_cost[q] > 0.0:  # the overall best costs more here, so others may do better
             x, least = trellis.col_to[q], np.inf
             for k in range(len(values)):
                 if values[k] < least:
@@ -209,7 +209,7 @@ def backward(trellis: Trellis, messages: Messages) -> float:
 
 @jit
 def _send_back(trellis: Trellis, messages: Messages, i: int, theta: Floats) -> float:
-    """Send from variable i, whose share is theta, to its chain's move before; return what is subtracted."""
+    """Send from variable i, whose share is theta, to its chain's move before; return the constant subtracted."""
     first, begin, end = (
         np.uint64(trellis.dom_ptr[i]), trellis.dom_ptr[i - trellis.chains], trellis.dom_ptr[i - trellis.chains + 1],
     )  # fmt: skip
@@ -224,12 +224,12 @@ def _send_back(trellis: Trellis, messages: Messages, i: int, theta: Floats) -> f
 
 @jit
 def _send_up(trellis: Trellis, messages: Messages, i: int, theta: Floats) -> float:
-    """Send from variable i, whose share is theta, to its parent; return what is subtracted."""
+    """Send from variable i, whose share is theta, to its parent; return the constant subtracted."""
     first, begin, end = np.uint64(trellis.dom_ptr[i]), trellis.up_ptr[i], trellis.up_ptr[i + 1]
     values = theta - messages.down_col[trellis.dom_ptr[i] : trellis.dom_ptr[i + 1]]
     best = np.uint64(np.argmin(values))
     for u in range(begin, end):
-        least, more = np.inf, 0.0  # what the best of all costs more here
+        least, more = np.inf, 0.0  # the correction for the overall best
         for q in range(np.uint64(trellis.col_ptr[u]), np.uint64(trellis.col_ptr[u + 1])):
             k = np.uint64(trellis.col_to[q]) - first
             least = min(least, values[k] + trellis.col_cost[q])
@@ -317,7 +317,7 @@ def _least_step(trellis: Trellis, messages: Messages, i: int, before: int, above
     for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
         x = trellis.row_to[e]
         grown = float(trellis.row_cost[e] + messages.ahead[x] - messages.up_row[before])
-        while q < last and trellis.col_to[q] < x:  # both rise: no search for each
+        while q < last and trellis.col_to[q] < x:  # merge: both lists are sorted
             q += 1
         if above >= 0:
             grown += (trellis.col_cost[q] if q < last and trellis.col_to[q] == x else 0.0) - messages.up_col[u]
@@ -353,7 +353,7 @@ def tighten(trellis: Trellis, messages: Messages, path: Ints, sweeps: int, enoug
             cost = found
             for i in range(len(path)):
                 path[i] = trial[i]
-        if bound >= min(cost, enough) - 1e-9:
+        if bound >= min(cost, enough) - SAME_COST_NATS:
             break
     return bound, cost
 
@@ -367,12 +367,12 @@ def prune(trellis: Trellis, messages: Messages, below: float, in_place: bool) ->
         trellis: the whole trellis.
         messages: those after a backward sweep.
         below: nats.
-        in_place: whether the rest may overwrite the whole, which survives only if a domain is left empty.
+        in_place: whether to overwrite the whole trellis; it survives only if a domain is left empty.
     """
     kept = reachable(trellis, messages.through, below)
     held = np.flatnonzero(kept)
     rows = coupling_rows(trellis, kept)
-    fewest = np.diff(np.searchsorted(held, trellis.dom_ptr)).min()  # least number of kept positions in any domain
+    fewest = np.diff(np.searchsorted(held, trellis.dom_ptr)).min()  # positions left in the smallest domain
     return subset(trellis, kept, rows, in_place and bool(fewest > 0)), Messages(
         messages.down_row[held], messages.up_row[held], messages.down_col[held], messages.up_col[rows],
         messages.constants.copy(), messages.before.copy(), messages.ahead[held], messages.through[held],

@@ -15,7 +15,7 @@ from motionmind.discretize.states import StateSpace
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
-from motionmind.grammar.rows import insertion_points
+from motionmind.grammar.rows import searchsorted_rows
 from motionmind.search.problem import Problem, places
 from motionmind.tween.problem import TRANSITION, WAIT, kinds_of
 
@@ -75,7 +75,7 @@ def break_down_cost(
     likelihood = np.where(edges >= 0, np.exp(-graph.weights("conditional")[edges]), 0.0)
     if timed is not None:
         guide[:] = np.take_along_axis(timed[1:], problem.model.starts[:-1] + after, axis=1)
-    moves = held.costs[insertion_points(held.indptr, held.targets, held.starts[:-1] + before, after)]
+    moves = held.costs[searchsorted_rows(held.indptr, held.targets, held.starts[:-1] + before, after)]
     children = np.flatnonzero(network.parents >= 0)
     above = after[:, network.parents[children]]
     together[:, children] = factor * network.cost(children, above, after[:, children], held.starts)

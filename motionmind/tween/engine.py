@@ -21,7 +21,7 @@ from motionmind.geometry.splines import rotation_spline
 from motionmind.learned import graphs, summary
 from motionmind.learned.model import LearnedCorpus
 from motionmind.realise.realise import Realised, Style, Wishes, realise
-from motionmind.search.apart import TooAlikeError, difference, solve_apart
+from motionmind.search.diverse import TooSimilarError, difference, solve_diverse
 from motionmind.search.problem import places
 from motionmind.search.sample import sample_path
 from motionmind.search.solve import Certificate, Watch, solve
@@ -231,9 +231,9 @@ class Engine(LearnedCorpus):
         try:
             if request.unlike:
                 known = [other.path for other in request.unlike]
-                return solve_apart(searched, known, request.differ, watch, request.search.within)
+                return solve_diverse(searched, known, request.differ, watch, request.search.within)
             return solve(searched, watch)
-        except TooAlikeError as error:
+        except TooSimilarError as error:
             raise _no_other_path(request, error.most) from error
         except InfeasibleError as error:
             raise self._no_path(formulation) from error

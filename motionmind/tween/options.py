@@ -239,9 +239,9 @@ class SearchOptions:
         check_integer("chains", chains)
         if self.memory is None:
             return self.node_budget
-        from motionmind.search.astar import nodes_in  # numba is slow to import
+        from motionmind.search.astar import node_capacity  # numba is slow to import
 
-        nodes = nodes_in(int(self.memory), chains)
+        nodes = node_capacity(int(self.memory), chains)
         if nodes < 1:
             raise MotionMindError(f"memory={self.memory} is too small: a search needs some megabytes")
         return min(nodes, MAX_NODES)

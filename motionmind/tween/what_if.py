@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, TypeVar
 
-from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.search.length import choose_length
 from motionmind.search.problem import Problem
 from motionmind.search.solve import Certificate, solve
+from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS
 from motionmind.tween.request import TweenRequest
 
 _Item = TypeVar("_Item")

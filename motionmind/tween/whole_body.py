@@ -15,9 +15,9 @@ from motionmind._typing import Floats, Int32s, Ints
 from motionmind.corpus.corpus import FACING, Corpus
 from motionmind.errors import InfeasibleError
 from motionmind.geometry import rotations as rot
-from motionmind.search.attention import Clock
 from motionmind.search.problem import Model, Problem, Rules, costs_to_go
 from motionmind.search.solve import Certificate
+from motionmind.search.watcher import Stopwatch
 
 
 class Bodies(NamedTuple):
@@ -65,7 +65,7 @@ def solve_whole_body(problem: Problem, bodies: Bodies) -> Certificate:
         InfeasibleError: no sequence of bodies leads from start to goal within the rules.
     """
     start, goal, rules = problem.start, problem.goal, problem.rules
-    clock, count = Clock("problem", "bound", "search"), bodies.states.shape[1]
+    clock, count = Stopwatch("problem", "bound", "search"), bodies.states.shape[1]
     model = problem.model_with_waits()
     costs = _costs(model, bodies)
     to_go = costs_to_go(model, goal, rules.longest)

@@ -38,7 +38,7 @@ from motionmind.corpus.gather import gather
 from motionmind.errors import CorpusError, SkeletonError
 from motionmind.formats import write_motion, write_posture
 from motionmind.geometry import rotations as rot
-from motionmind.grammar.coordination import PRIOR_POSTURES
+from motionmind.grammar.coordination import PRIOR_WEIGHT
 from motionmind.tween.engine import Engine
 
 BALLET = Path(__file__).parents[2] / "corpora" / "ballet"
@@ -146,7 +146,7 @@ def test_how_joints_stand_together_is_weighed_alike(home: Home) -> None:
         above = sum(number for (above, _), number in pairs.items() if above == pole)
         for c, flag in enumerate(called["flag"]):
             marginal = sum(number for (_, below), number in pairs.items() if below == flag) / total
-            probability = (pairs[pole, flag] + PRIOR_POSTURES * marginal) / (above + PRIOR_POSTURES)
+            probability = (pairs[pole, flag] + PRIOR_WEIGHT * marginal) / (above + PRIOR_WEIGHT)
             assert cpd[c, p] == pytest.approx(probability)
             assert table[p, c] == pytest.approx(-math.log(probability))
 

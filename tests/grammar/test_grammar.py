@@ -24,7 +24,7 @@ from motionmind.errors import CorpusError
 from motionmind.geometry import rotations as rot
 from motionmind.grammar import coordination
 from motionmind.grammar.bridges import MAX_BRIDGE_DEG, N_BRIDGES_PER_STATE, Bridges, _Neighbours, find_bridges
-from motionmind.grammar.coordination import PRIOR_POSTURES, Coordination, fit_network, learn_coordination
+from motionmind.grammar.coordination import PRIOR_WEIGHT, Coordination, fit_network, learn_coordination
 from motionmind.grammar.grammar import Grammar, learn
 from motionmind.grammar.transitions import Transitions, Weights, count_transitions, flatten
 from motionmind.search.problem import Model, Problem, Rules
@@ -275,7 +275,7 @@ def test_unless_attested_bridges_run_both_ways_along_a_shortest_tree_and_else_to
             assert np.sum(angles[before] < angles[before, after]) <= N_BRIDGES_PER_STATE  # itself among them
 
 
-def test_of_many_states_the_bridges_are_those_of_all_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_k_d_tree_finds_the_bridges_of_all_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
     for size in (2, 3, 7, 60, 300):
         centres = rot.normalise(np.random.default_rng(size).normal(size=(size, 4)))
         graph = count_transitions(np.zeros((1, 1), np.int32), np.array([size]), np.zeros(0, np.int64), np.zeros(0))
@@ -337,7 +337,7 @@ def test_the_network_is_the_corpus_counted_with_a_prior_spread_as_the_marginal(s
             above = Counter(body.states[:, parent].tolist())
             expected = [
                 [
-                    (pairs[c, p] + PRIOR_POSTURES * marginal[c] / len(body.states)) / (above[p] + PRIOR_POSTURES)
+                    (pairs[c, p] + PRIOR_WEIGHT * marginal[c] / len(body.states)) / (above[p] + PRIOR_WEIGHT)
                     for p in range(body.sizes[parent])
                 ]
                 for c in range(body.sizes[chain])
@@ -384,7 +384,7 @@ def test_the_network_is_what_pgmpys_own_estimator_fits(seed: int) -> None:
     estimator = DiscreteBayesianEstimator(
         state_names={name: list(range(body.sizes[j])) for j, name in enumerate(names)},
         prior_type="dirichlet",
-        pseudo_counts={name: PRIOR_POSTURES * prior / len(body.states) for name, prior in priors.items()},
+        pseudo_counts={name: PRIOR_WEIGHT * prior / len(body.states) for name, prior in priors.items()},
     )
     network = DiscreteBayesianNetwork()
     network.add_nodes_from(names)
@@ -466,7 +466,7 @@ def test_standing_somewhere_costs_lambda_times_minus_log_p(seed: int, factor: fl
         np.testing.assert_allclose(alone, factor * table.min(axis=0), atol=1e-12)
 
 
-def test_what_a_state_costs_at_least_is_no_more_than_beside_any_state_of_its_parent(seed: int) -> None:
+def test_the_least_cost_of_a_state_bounds_its_couplings(seed: int) -> None:
     """Of any tables, not only of those that a corpus's counts make."""
     rng, starts = np.random.default_rng(seed), np.array([0, 3, 8])
     seen = rng.random((3, 5)) < 0.4
@@ -485,7 +485,7 @@ def test_what_a_state_costs_at_least_is_no_more_than_beside_any_state_of_its_par
     assert np.all(alone[:3] == 0.0)
 
 
-def test_lists_that_the_search_looks_things_up_in_are_in_order(seed: int) -> None:
+def test_arrays_that_the_search_bisects_are_sorted(seed: int) -> None:
     model = build_model(grammar(seed), "conditional", 1.0, 1.0)
     for pointer, listed in ((model.indptr, model.targets), (model.pair_ptr, model.pair_states)):
         for first, last in pairwise(pointer):

@@ -20,13 +20,13 @@ from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.bundled import bundled
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_posture
-from motionmind.grammar.coordination import PRIOR_POSTURES, Coordination
+from motionmind.grammar.coordination import PRIOR_WEIGHT, Coordination
 from motionmind.grammar.progression import fit_progression
-from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.search.cfn import Ingredients, cfn
 from motionmind.search.problem import Model, Problem, Rules, Via, costs_to_go, places, with_waits
 from motionmind.search.sample import gibbs_sample, sample_path
 from motionmind.search.solve import solve
+from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS
 from motionmind.search.trellis import build_trellis
 from motionmind.tween.ends import bring_ends
 from motionmind.tween.engine import Engine
@@ -105,11 +105,9 @@ class Body:
         """-log P(s' | s, p, p') by its definition [s, s', p, p']; of the unattested s' all have that of their class."""
         seen = self.counts(chain)
         pairs = seen.sum(axis=(2, 3))
-        alone = np.where(pairs > 0.0, pairs, PRIOR_POSTURES) / (pairs.sum(axis=1, keepdims=True) + PRIOR_POSTURES)
+        alone = np.where(pairs > 0.0, pairs, PRIOR_WEIGHT) / (pairs.sum(axis=1, keepdims=True) + PRIOR_WEIGHT)
         return np.asarray(
-            -np.log(
-                (seen + PRIOR_POSTURES * alone[:, :, None, None]) / (seen.sum(axis=1, keepdims=True) + PRIOR_POSTURES)
-            )
+            -np.log((seen + PRIOR_WEIGHT * alone[:, :, None, None]) / (seen.sum(axis=1, keepdims=True) + PRIOR_WEIGHT))
         )
 
     def best(
@@ -189,12 +187,12 @@ def test_the_tables_are_those_of_a_network_over_two_postures(seed: int) -> None:
         size, above = toy.sizes[chain], toy.sizes[parent]
         pairs = toy.counts(chain).sum(axis=(2, 3))
         alone = np.zeros((size, size + 1))
-        alone[:, :size], alone[:, size] = pairs, PRIOR_POSTURES
+        alone[:, :size], alone[:, size] = pairs, PRIOR_WEIGHT
         alone /= alone.sum(axis=1, keepdims=True)
         network = DiscreteBayesianNetwork([("a", "next"), ("b", "next"), ("c", "next")])
         names = {"next": range(size + 1), "a": range(size), "b": range(above), "c": range(above)}
         columns = [(given[0], given) for given in product(range(size), range(above), range(above))]
-        prior = np.array([PRIOR_POSTURES * alone[s] for s, _ in columns]).T
+        prior = np.array([PRIOR_WEIGHT * alone[s] for s, _ in columns]).T
         flat = {name: np.ones((len(names[name]), 1)) for name in "abc"}
         frame = pd.DataFrame(
             {
@@ -239,7 +237,7 @@ def move(held: Model, chain: int, before: int, after: int) -> int:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_lists_that_the_search_looks_things_up_in_are_in_order(seed: int) -> None:
+def test_arrays_that_the_search_bisects_are_sorted(seed: int) -> None:
     model, _ = body(seed).of_moves(ends_of(seed)[1], 0.7, 1.0)
     for pointer, listed in ((model.indptr, model.targets), (model.pair_ptr, model.pair_states)):
         for first, last in pairwise(pointer):
@@ -251,7 +249,7 @@ def test_lists_that_the_search_looks_things_up_in_are_in_order(seed: int) -> Non
 
 @settings(max_examples=200)
 @given(st.integers(0, 100_000), st.floats(0.0, 0.5), st.integers(0, 2), st.sampled_from([0.0, 0.6, 1.0, 3.0]))
-def test_whatever_is_asked_the_cost_is_that_of_brute_force(seed: int, share: float, passed: int, factor: float) -> None:
+def test_the_cost_is_that_of_brute_force(seed: int, share: float, passed: int, factor: float) -> None:
     toy, rng = body(seed), np.random.default_rng(seed + 2)
     start, goal = ends_of(seed)
     rules = Rules(float(rng.uniform(0.2, 1.5)), 0.3, int(rng.integers(1, 3)), MOVES, 100_000)
@@ -387,7 +385,7 @@ def join(engine: Engine, **asked: Any) -> Tween:
     return engine.tween(a, b, coordination="progression", **asked)
 
 
-def test_the_report_adds_up_to_the_cost_whatever_was_asked(engine: Engine) -> None:
+def test_the_report_adds_up_to_the_cost(engine: Engine) -> None:
     plain = join(engine)
     assert plain.status == "optimal"
     for asked in (

@@ -19,6 +19,7 @@ from toys import noisy_messages, random_toy, solution, trellis_of
 from motionmind.search import astar, bounding, pair_chains
 from motionmind.search.heuristic import Heuristic
 from motionmind.search.pair_chain_tables import PairChains
+from motionmind.search.tolerances import SAME_COST_NATS
 from motionmind.search.trellis import Trellis
 
 MOVES = 5
@@ -39,7 +40,7 @@ class Case:
     def search(self, budget: int, expansions: int = ENOUGH, cost: float = np.inf) -> astar.Found:
         path = np.zeros(len(self.trellis.dom_ptr) - 1, np.int64)
         on = np.zeros(1, dtype=bool)
-        return astar.search(self.trellis, self.heuristic, cost, astar.SAME_COST_RATIO, path, budget, expansions, on)
+        return astar.search(self.trellis, self.heuristic, cost, SAME_COST_NATS, path, budget, expansions, on)
 
     @property
     def heuristic(self) -> Heuristic:
@@ -89,7 +90,7 @@ def test_with_enough_memory_the_answer_is_the_optimum_and_proven(even: bool) -> 
 
 
 @pytest.mark.parametrize("even", [False, True])
-def test_what_is_forgotten_is_not_lost_from_the_proof(even: bool) -> None:
+def test_forgetting_keeps_the_bound_valid(even: bool) -> None:
     proven_in_little = 0
     for case in cases(even):
         needed = case.search(ENOUGH).peak_nodes
@@ -106,14 +107,14 @@ def test_what_is_forgotten_is_not_lost_from_the_proof(even: bool) -> None:
     assert proven_in_little > 20
 
 
-def test_a_known_cost_that_is_the_optimum_is_proven_so_and_not_undercut() -> None:
+def test_a_known_optimum_is_proven() -> None:
     for case in cases():
         cost, lower, *_ = case.search(ENOUGH, cost=case.optimum)
         assert cost == case.optimum
         assert lower == pytest.approx(case.optimum, abs=ROUNDING)
 
 
-def test_a_search_that_is_cut_short_states_a_bound_that_grows_with_the_effort() -> None:
+def test_bounds_of_interrupted_searches_grow_with_effort() -> None:
     for case in cases():
         bounds = [case.search(ENOUGH, expansions).lower_bound for expansions in (0, 1, 2, 5, 20, 100, 500, ENOUGH)]
         assert bounds[0] == case.bound
@@ -121,7 +122,7 @@ def test_a_search_that_is_cut_short_states_a_bound_that_grows_with_the_effort() 
         assert bounds[-1] == pytest.approx(case.optimum, abs=ROUNDING)
 
 
-def test_nodes_with_the_same_frontier_are_one_so_hardly_any_is_expanded_twice() -> None:
+def test_duplicates_are_merged_so_few_nodes_are_expanded_twice() -> None:
     """Only those are that were freed, because all that lies behind them was reached otherwise, and met again."""
     for case in cases() + cases(even=True):
         expansions = case.search(ENOUGH).expansions
@@ -165,65 +166,69 @@ def test_all_numbers_of_moves_together_take_no_more_expansions_than_are_allowed(
 
 
 @pytest.mark.parametrize("budget", [30, 45, 70])
-def test_when_memory_is_full_a_quarter_of_it_is_forgotten_and_what_is_proven_stays(budget: int) -> None:
+def test_full_memory_loses_a_quarter_of_its_nodes_and_keeps_the_bound(budget: int) -> None:
     """Or all but the way to the node that is being expanded: so forgetting is paid for by the nodes then made anew."""
     times = 0
     for case in cases():
         path, nodes = np.zeros(len(case.trellis.dom_ptr) - 1, np.int64), astar._root(case.trellis, case.bound, budget)
         for _ in range(300):
-            if nodes.tally[astar._HEAPED] == 0 or nodes.tally[astar._FREE] < 8:
+            if nodes.counters[astar._N_OPEN] == 0 or nodes.counters[astar._N_FREE] < 8:
                 break
             node = nodes.heap[0]  # no integer of Python, for which all of this would be compiled once more
             astar._close(nodes, node)
-            astar._expand(case.trellis, case.heuristic, nodes, node, np.inf, astar.SAME_COST_RATIO, path)
-            astar._release(nodes, node)
-        if nodes.tally[astar._FREE] >= 8 or nodes.tally[astar._HEAPED] == 0:
+            astar._expand(case.trellis, case.heuristic, nodes, node, np.inf, SAME_COST_NATS, path)
+            astar._free_dead_ends(nodes, node)
+        if nodes.counters[astar._N_FREE] >= 8 or nodes.counters[astar._N_OPEN] == 0:
             continue
         current = nodes.heap[0]
         astar._close(nodes, current)
-        before = {float(nodes.key[node]) for node in nodes.heap[: nodes.tally[astar._HEAPED]]}
-        held, forgotten = nodes.tally[[astar._NODES, astar._FORGOTTEN]]
+        before = {float(nodes.priority[node]) for node in nodes.heap[: nodes.counters[astar._N_OPEN]]}
+        held, forgotten = nodes.counters[[astar._N_HELD, astar._N_FORGOTTEN]]
         assert astar._forget(nodes, current)
-        opened = nodes.heap[: nodes.tally[astar._HEAPED]]
-        assert nodes.tally[astar._NODES] <= max(astar.KEPT_MEMORY_SHARE * budget, case.depth)
+        opened = nodes.heap[: nodes.counters[astar._N_OPEN]]
+        assert nodes.counters[astar._N_HELD] <= max(astar.KEPT_NODES_SHARE * budget, case.depth)
         assert (
-            nodes.tally[astar._NODES] > astar.KEPT_MEMORY_SHARE * budget - case.depth
+            nodes.counters[astar._N_HELD] > astar.KEPT_NODES_SHARE * budget - case.depth
         )  # a leaf more, and its way, are too many
-        assert nodes.tally[astar._NODES] + nodes.tally[astar._FREE] == budget
-        assert nodes.tally[astar._FORGOTTEN] - forgotten == held - nodes.tally[astar._NODES] > 0
-        assert min(nodes.key[opened]) == min(before)
-        assert {float(key) for key in nodes.key[opened]} <= before
-        assert (nodes.slot[opened] == np.arange(len(opened))).all()
+        assert nodes.counters[astar._N_HELD] + nodes.counters[astar._N_FREE] == budget
+        assert nodes.counters[astar._N_FORGOTTEN] - forgotten == held - nodes.counters[astar._N_HELD] > 0
+        assert min(nodes.priority[opened]) == min(before)
+        assert {float(key) for key in nodes.priority[opened]} <= before
+        assert (nodes.heap_index[opened] == np.arange(len(opened))).all()
         times += 1
     assert times > 3
 
 
 @pytest.mark.parametrize("count", [1000, 1024, 1025, 2047, 2049])
-def test_so_many_nodes_as_are_said_to_fit_into_memory_do(count: int) -> None:
+def test_node_capacity_counts_all_memory(count: int) -> None:
     """Just beyond a power of two the buckets take most."""
     for trellis in {case.trellis.chains: case.trellis for case in cases()}.values():
-        memory = next(size for size in range(10**7) if astar.nodes_in(size, trellis.chains) == count)
+        memory = next(size for size in range(10**7) if astar.node_capacity(size, trellis.chains) == count)
         nodes = astar._root(trellis, 0.0, count)
-        taken = sum(array.nbytes for array in nodes) - nodes.tally.nbytes + count  # and a mark while others go
+        taken = sum(array.nbytes for array in nodes) - nodes.counters.nbytes + count  # and a mark while others go
         assert 0.9 * memory < taken <= memory
 
 
-def test_the_open_list_stays_in_order_whatever_is_taken_from_its_middle() -> None:
+def test_the_heap_stays_ordered_when_nodes_are_removed_from_its_middle() -> None:
     rng, count = np.random.default_rng(0), 200
     nodes = astar._root(cases()[0].trellis, 0.0, count)
     for node in np.arange(1, count, dtype=np.int32):
-        nodes.key[node], nodes.f[node], nodes.var[node] = rng.integers(0, 60), rng.integers(0, 5), rng.integers(0, 5)
+        nodes.priority[node], nodes.f[node], nodes.var[node] = (
+            rng.integers(0, 60),
+            rng.integers(0, 5),
+            rng.integers(0, 5),
+        )
         astar._open(nodes, node)
-    place = {node: (nodes.key[node], -nodes.var[node], nodes.f[node], node) for node in range(count)}
+    place = {node: (nodes.priority[node], -nodes.var[node], nodes.f[node], node) for node in range(count)}
     for node in rng.permutation(count)[: count - 1].astype(np.int32):
         astar._close(nodes, node)
-        heap = nodes.heap[: nodes.tally[astar._HEAPED]].tolist()
+        heap = nodes.heap[: nodes.counters[astar._N_OPEN]].tolist()
         assert all(place[heap[(k - 1) // 2]] < place[heap[k]] for k in range(1, len(heap)))
-        assert nodes.slot[heap].tolist() == [*range(len(heap))]
-        assert nodes.slot[node] == -1
+        assert nodes.heap_index[heap].tolist() == [*range(len(heap))]
+        assert nodes.heap_index[node] == -1
 
 
-def test_nodes_are_told_apart_in_whatever_bucket_they_are() -> None:
+def test_the_hash_table_finds_exactly_the_added_nodes() -> None:
     """By variable and whole frontier: half of all frontiers are added, and those are found and no others."""
     rng = np.random.default_rng(0)
     trellis = next(case.trellis for case in cases() if case.trellis.chains > 2)
@@ -245,7 +250,7 @@ def test_nodes_are_told_apart_in_whatever_bucket_they_are() -> None:
 # --- against the search in plain Python -------------------------------------------------------------------------------
 
 
-def test_the_compiled_search_proves_what_the_plain_one_proves() -> None:
+def test_compiled_and_plain_search_agree() -> None:
     for case in cases():
         for budget in (3 * case.depth, ENOUGH):
             ours, book = case.search(budget, 1500), ByTheBook(case, budget, 1500)
@@ -254,7 +259,7 @@ def test_the_compiled_search_proves_what_the_plain_one_proves() -> None:
                 assert ours.lower_bound == pytest.approx(book.lower, abs=ROUNDING)
 
 
-def test_without_backing_up_forgetting_claims_bounds_that_are_false() -> None:
+def test_forgetting_without_backing_up_gives_false_bounds() -> None:
     fooled = []
     for case in cases():
         for budget in (case.depth + 10, 2 * case.depth):
@@ -300,7 +305,7 @@ class ByTheBook:
     def run(self, expansions: int) -> float:
         while self.opened:
             node = min(self.opened, key=lambda node: (node.key, -node.var, node.number))
-            if node.key >= self.cost - astar.SAME_COST_RATIO:
+            if node.key >= self.cost - SAME_COST_NATS:
                 break
             if self.expansions == expansions:
                 return node.key
@@ -318,14 +323,14 @@ class ByTheBook:
         chain = var % self.case.trellis.chains
         for choice, f in children(self.case, node):
             key = max(f, floor)
-            if key >= self.cost - astar.SAME_COST_RATIO:
+            if key >= self.cost - SAME_COST_NATS:
                 continue
             if var == len(self.case.trellis.dom_ptr) - 2:
                 self.cost = f
                 continue
             frontier = (*node.frontier[:chain], choice, *node.frontier[chain + 1 :])
             twin = next(reversed(self.twins[var, frontier]), None)
-            if twin is not None and twin.f <= f + astar.SAME_COST_RATIO:
+            if twin is not None and twin.f <= f + SAME_COST_NATS:
                 continue
             if twin is not None and twin.is_open and twin.children == 0:
                 self.close(twin)

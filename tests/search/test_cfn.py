@@ -62,7 +62,7 @@ def written(seeds: int) -> Iterator[Written]:
             yield Written(toy, problem, found.path, chains, text)
 
 
-def test_what_functions_of_a_scope_add_up_to_is_what_the_search_pays_there() -> None:
+def test_functions_add_up_to_the_costs_of_the_search() -> None:
     """For all values of all variables: states, edges and pairs of coupled states, forbidden ones included."""
     checked = 0
     for one in written(80):
@@ -112,7 +112,7 @@ def scopes(trellis: Trellis, first: int, chains: list[str]) -> Iterator[tuple[Sc
             yield (names[above], names[i]), np.array([[correction(trellis, u, x) for x in domains[i]] for u in rows])
 
 
-def test_each_ingredient_of_a_path_is_what_the_body_pays_for_it_in_each_move() -> None:
+def test_each_ingredient_adds_up_to_its_cost_along_a_path() -> None:
     kinds = 0
     for one in written(60):
         held, ingredients = one.problem.model_with_waits(), one.toy.ingredients(one.problem)
@@ -164,5 +164,5 @@ def toy_chains(toy: Toy) -> list[str]:
 def test_a_via_without_a_move_is_refused() -> None:
     toy = random_toy(0)
     problem = toy.problem(toy.rules(3, 3), [Via(np.array(toy.start))])
-    with pytest.raises(ValueError, match="via 1 names no move"):
+    with pytest.raises(ValueError, match="via 1 has no move"):
         cfn(problem, 3, toy_chains(toy), toy.ingredients(problem))

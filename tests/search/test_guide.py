@@ -17,12 +17,12 @@ from toys import Toy, best, evaluate, random_toy, solution
 from motionmind._typing import Bools, Floats
 from motionmind.geometry import rotations as rot
 from motionmind.search import bounding
-from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.search.cfn import cfn
 from motionmind.search.costs import path_cost
 from motionmind.search.problem import Problem, Rules, Via
 from motionmind.search.sample import sample_path
 from motionmind.search.solve import Certificate, Progress, feasible, solve
+from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS
 from motionmind.search.trellis import segment_trellises
 from motionmind.tween.engine import Engine
 from motionmind.tween.problem import build_model, ingredients_of
@@ -196,7 +196,7 @@ def test_a_guide_that_costs_nothing_changes_nothing_and_one_that_costs_all_alike
             assert costs == pytest.approx(costs[:1] * 4, abs=SAME)
 
 
-def test_a_dear_guide_is_followed_past_a_via_and_a_sampled_path_follows_it_too() -> None:
+def test_optimal_and_sampled_paths_follow_a_strong_guide_past_a_via() -> None:
     """Guides that charge 60 nats for leaving a path whose every move is possible."""
     followed = 0
     for seed in range(60):
@@ -217,7 +217,7 @@ def test_a_dear_guide_is_followed_past_a_via_and_a_sampled_path_follows_it_too()
     assert followed > 20
 
 
-def test_a_sampled_path_costs_what_the_guide_charges_it() -> None:
+def test_the_cost_of_a_sampled_path_includes_the_guide() -> None:
     for seed in range(30):
         toy = random_toy(seed)
         vias, guide = random_vias(toy, seed, seed % 3, at=0.3), random_guide(toy, seed)

@@ -1,4 +1,4 @@
-"""Single messages, single moments of a polished path and matrices, against what they are defined as."""
+"""Single messages, single moves of a polished path and matrices, against what they are defined as."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_messages_between_chains_are_minima_over_all_pairs(dear: bool) -> None:
 
 
 @pytest.mark.parametrize("dear", [False, True])
-def test_no_moment_of_a_polished_path_can_be_made_cheaper(dear: bool) -> None:
+def test_no_single_move_improves_a_polished_path(dear: bool) -> None:
     for seed, trellis in toys(dear=dear):
         messages, path = noisy_messages(trellis, seed, 5.0), np.zeros(len(trellis.dom_ptr) - 1, np.int64)
         path[: trellis.chains] = trellis.dom_ptr[: trellis.chains]

@@ -13,7 +13,6 @@ import pytest
 from toys import Toy, evaluate, noisy_messages, random_toy, solution, trellis_of
 
 from motionmind.search import astar, bounding, heuristic, pair_chains, parts, solve, trws
-from motionmind.search.attention import Attention
 from motionmind.search.cfn import cfn
 from motionmind.search.costs import path_cost
 from motionmind.search.heuristic import Heuristic
@@ -22,12 +21,14 @@ from motionmind.search.polish import polish
 from motionmind.search.problem import Model, Problem, Rules, costs_to_go, with_waits
 from motionmind.search.segments import Piece, Segments
 from motionmind.search.solve import Certificate
+from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS, SAME_COST_NATS
 from motionmind.search.trellis import Trellis, locate
+from motionmind.search.watcher import Watcher
 from motionmind.tween.engine import Engine
 from motionmind.tween.problem import build_model
 
 MOVES = 6
-PROVEN = 2 * bounding.OPTIMAL_WITHIN_NATS
+PROVEN = 2 * OPTIMAL_WITHIN_NATS
 ROUNDING = 1e-9
 ON = np.zeros(1, dtype=bool)  # what would end A* before its time
 KINDS = {
@@ -122,7 +123,7 @@ def test_bound_optimum_and_cost_stand_in_this_order_whatever_effort_is_allowed(
                 assert found.cost >= optima[moves] - ROUNDING, (seed, moves, node_budget)
                 assert toy.cost(found.path) == pytest.approx(found.cost, abs=ROUNDING), (seed, moves, node_budget)
                 assert found.lower_bound <= found.cost
-                assert (found.status == "optimal") == (found.cost - found.lower_bound <= bounding.OPTIMAL_WITHIN_NATS)
+                assert (found.status == "optimal") == (found.cost - found.lower_bound <= OPTIMAL_WITHIN_NATS)
                 assert found.peak_nodes <= node_budget
                 assert min(moves, 1) <= found.expansions <= node_budget
                 searched += found.expansions > moves * len(toy.sizes)
@@ -132,7 +133,7 @@ def test_bound_optimum_and_cost_stand_in_this_order_whatever_effort_is_allowed(
 
 
 @pytest.mark.parametrize("pairs", [0, bounding.MAX_STATE_PAIRS])
-def test_the_answer_is_the_path_that_the_search_returned_and_never_dearer_than_the_one_before(
+def test_the_answer_is_the_path_of_a_star_and_costs_no_more_than_the_incumbent(
     monkeypatch: pytest.MonkeyPatch, kind: dict[str, bool], pairs: int
 ) -> None:
     """Where it had room to walk from the start to the goal, of all parts together."""
@@ -172,7 +173,7 @@ def test_where_the_bound_is_tight_the_search_walks_straight_to_the_goal() -> Non
     assert straight > 50
 
 
-def test_many_paths_of_the_same_cost_do_not_lead_it_astray() -> None:
+def test_many_paths_of_equal_cost_do_not_slow_the_search() -> None:
     """Chains of bundled ballet that nothing couples, all attested moves alike, in more moves than they need."""
     engine = Engine.load("ballet")
     model, rng = build_model(engine.grammar, "conditional", 0.0, 1.0, novelty=1.0), np.random.default_rng(0)
@@ -198,7 +199,7 @@ def test_every_pair_of_sweeps_raises_the_bound_and_none_lifts_it_over_the_optimu
             assert proven[-1] <= optimum + ROUNDING, seed
 
 
-def test_what_chains_cost_on_their_own_is_no_more_than_the_optimum(kind: dict[str, bool]) -> None:
+def test_independent_costs_bound_the_optimum(kind: dict[str, bool]) -> None:
     for seed in range(100):
         toy = random_toy(seed, **kind)
         start, goal = toy.ends()
@@ -207,7 +208,7 @@ def test_what_chains_cost_on_their_own_is_no_more_than_the_optimum(kind: dict[st
         assert np.all(alone + toy.per_move * np.arange(MOVES + 1) <= toy.optima(MOVES) + ROUNDING), seed
 
 
-def test_what_chains_cost_on_their_own_is_the_optimum_where_nothing_couples_them() -> None:
+def test_independent_costs_are_the_optimum_without_couplings() -> None:
     for seed in range(100):
         toy = random_toy(seed)
         free = replace(toy, parents=(-1,) * len(toy.sizes))
@@ -221,7 +222,7 @@ def test_the_best_path_stays_in_what_is_left_of_its_trellis(kind: dict[str, bool
     pruned = 0
     for trellis, optimum, seed in bodies(60, kind):
         state = bounding.Bounded(trellis, Heuristic.of_messages(trws.no_messages(trellis)), np.inf)
-        bounding.tighten(state, 20, Attention(None))
+        bounding.tighten(state, 20, Watcher(None))
         chosen = locate(state.trellis, state.states)
         assert (chosen >= 0).all(), seed
         assert path_cost(state.trellis, chosen) == pytest.approx(state.cost, abs=ROUNDING), seed
@@ -231,13 +232,11 @@ def test_the_best_path_stays_in_what_is_left_of_its_trellis(kind: dict[str, bool
 
 
 @pytest.mark.parametrize(("sweeps", "ends"), [(20, True), (1, False), (bounding.N_FIRST_SWEEPS, False), (20, False)])
-def test_whenever_bounding_ends_no_chain_or_moment_of_its_path_can_be_bettered(
-    kind: dict[str, bool], sweeps: int, ends: bool
-) -> None:
+def test_no_single_chain_or_move_improves_a_bounded_path(kind: dict[str, bool], sweeps: int, ends: bool) -> None:
     """That of the first round, too, which is polished only if it is the last."""
     for (trellis, _, seed), (own, _, _) in zip(bodies(60, kind), bodies(60, kind), strict=True):
         state = bounding.Bounded(own, Heuristic.of_messages(trws.no_messages(own)), np.inf)
-        bounding.tighten(state, sweeps, Attention(lambda: ends))
+        bounding.tighten(state, sweeps, Watcher(lambda: ends))
         path = locate(trellis, state.states)
         assert polish(trellis, path, np.full(len(trellis.dom), -np.inf)) >= state.cost - ROUNDING, seed
 
@@ -248,7 +247,7 @@ def test_under_messages_alone_the_search_finds_the_optimum_too(sweeps: int, kind
         messages, path = trws.no_messages(trellis), np.zeros((MOVES + 1) * trellis.chains, np.int64)
         trws.tighten(trellis, messages, path, sweeps, np.inf)
         heuristic = Heuristic.of_messages(messages)
-        found = astar.search(trellis, heuristic, np.inf, astar.SAME_COST_RATIO, path, 50_000, 50_000, ON)
+        found = astar.search(trellis, heuristic, np.inf, SAME_COST_NATS, path, 50_000, 50_000, ON)
         assert found.cost == pytest.approx(optimum, abs=PROVEN), seed
         assert found.lower_bound == pytest.approx(optimum, abs=PROVEN), seed
         assert path_cost(trellis, path) == pytest.approx(optimum, abs=PROVEN), seed
@@ -337,7 +336,7 @@ def test_by_pair_chains_f_grows_along_every_path_from_the_bound_to_its_cost(swee
         assert f == pytest.approx(path_cost(trellis, path), abs=ROUNDING), seed
 
 
-def test_what_pair_chains_bound_through_a_position_is_no_more_than_any_path_through_it(kind: dict[str, bool]) -> None:
+def test_pair_chains_bound_the_paths_through_each_position(kind: dict[str, bool]) -> None:
     moves = 4
     for seed in range(60):
         toy = random_toy(seed, **kind)
@@ -355,7 +354,7 @@ def test_what_pair_chains_bound_through_a_position_is_no_more_than_any_path_thro
 
 
 @pytest.mark.parametrize("spare", [1e-6, 0.1, 1.0])
-def test_narrowed_pair_chains_keep_every_path_that_is_cheaper_and_what_was_proven(spare: float) -> None:
+def test_pruned_pair_chains_keep_cheaper_paths_and_the_bound(spare: float) -> None:
     taken_out = 0
     for whole, optimum, seed in bodies(100, {"frustrated": True}):
         trellis, tables = whole, pair_chains.build(whole, trws.no_messages(whole))
@@ -369,7 +368,7 @@ def test_narrowed_pair_chains_keep_every_path_that_is_cheaper_and_what_was_prove
         path = some_path(trellis, seed)
         assert shares(trellis, tables, path) == pytest.approx(path_cost(trellis, path), abs=ROUNDING), seed
         heuristic = Heuristic.of_pair_chains(tables)
-        found = astar.search(trellis, heuristic, np.inf, astar.SAME_COST_RATIO, path, 50_000, 50_000, ON)
+        found = astar.search(trellis, heuristic, np.inf, SAME_COST_NATS, path, 50_000, 50_000, ON)
         assert found.cost == pytest.approx(optimum, abs=PROVEN), seed
         assert found.lower_bound == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0
@@ -384,7 +383,7 @@ def test_pair_chains_are_left_empty_where_nothing_is_cheap_enough() -> None:
         assert len(smaller.dom) == 0
 
 
-def test_what_is_bounded_through_a_position_is_no_more_than_any_path_through_it(kind: dict[str, bool]) -> None:
+def test_messages_bound_the_paths_through_each_position(kind: dict[str, bool]) -> None:
     moves = 4
     for seed in range(60):
         toy = random_toy(seed, **kind)
@@ -402,7 +401,7 @@ def test_what_is_bounded_through_a_position_is_no_more_than_any_path_through_it(
 
 
 @pytest.mark.parametrize("spare", [1e-6, 0.1, 1.0])
-def test_a_narrowed_trellis_keeps_every_path_that_is_cheaper(spare: float) -> None:
+def test_a_pruned_trellis_keeps_cheaper_paths(spare: float) -> None:
     taken_out = 0
     for seed in range(100):
         toy = random_toy(seed, frustrated=True)
@@ -420,13 +419,13 @@ def test_a_narrowed_trellis_keeps_every_path_that_is_cheaper(spare: float) -> No
             continue
         tables = pair_chains.build(trellis, messages)
         heuristic = Heuristic.of_pair_chains(tables)
-        found = astar.search(trellis, heuristic, np.inf, astar.SAME_COST_RATIO, path, 50_000, 50_000, ON)
+        found = astar.search(trellis, heuristic, np.inf, SAME_COST_NATS, path, 50_000, 50_000, ON)
         assert found.cost == pytest.approx(optimum, abs=PROVEN), seed
         assert found.lower_bound == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0
 
 
-def test_polishing_never_makes_a_path_dearer_and_states_its_cost(kind: dict[str, bool]) -> None:
+def test_polishing_never_raises_the_cost_that_it_returns(kind: dict[str, bool]) -> None:
     better = 0
     for seed in range(100):
         toy = random_toy(seed, **kind)
@@ -446,7 +445,7 @@ def test_polishing_never_makes_a_path_dearer_and_states_its_cost(kind: dict[str,
     assert better > 0
 
 
-def test_polishing_passes_over_nothing_that_makes_a_path_cheaper(kind: dict[str, bool]) -> None:
+def test_polishing_skips_only_useless_positions(kind: dict[str, bool]) -> None:
     passed_over = 0
     for seed in range(100):
         toy = random_toy(seed, **kind)
@@ -507,7 +506,7 @@ def test_a_chain_with_one_state_parts_those_below_it_from_those_above() -> None:
 # --- edges of the problem --------------------------------------------------------------------------------------------
 
 
-def test_the_best_path_is_in_the_trellis_of_what_is_hardly_dearer(kind: dict[str, bool]) -> None:
+def test_a_limit_just_above_the_optimum_keeps_the_best_path(kind: dict[str, bool]) -> None:
     kept = 0
     for seed in range(30):
         toy = random_toy(seed, **kind)
@@ -519,7 +518,7 @@ def test_the_best_path_is_in_the_trellis_of_what_is_hardly_dearer(kind: dict[str
     assert kept > 3
 
 
-def test_nothing_is_proven_beyond_the_cost_that_paths_are_to_be_cheaper_than() -> None:
+def test_bounds_never_exceed_the_limit() -> None:
     """Dearer ones were cut off, and what is proven of the rest does not hold of them."""
     trellis = trellis_of(a_body(), MOVES)
     chosen = np.zeros(len(trellis.dom_ptr) - 1, dtype=np.int64)
@@ -529,7 +528,7 @@ def test_nothing_is_proven_beyond_the_cost_that_paths_are_to_be_cheaper_than() -
     assert (state.lower_bound, state.found, state.closed) == (-100.0, False, True)
 
 
-def test_what_was_proven_of_a_piece_stays_proven() -> None:
+def test_bounds_of_pieces_never_fall() -> None:
     segments, none = Segments(np.array([[[np.inf, 1.0, 7.0]]]), 1, []), np.zeros((0, 2), dtype=np.int32)
     for bound, proven in ((5.0, 5.0), (3.0, 5.0), (9.0, 7.0)):
         segments.update(Piece(0, 0, 1), bound, np.inf, none)

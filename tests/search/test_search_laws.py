@@ -25,7 +25,7 @@ from motionmind.discretize.codebook import Codebook
 from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
 from motionmind.grammar import coordination
-from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
+from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS
 from motionmind.tween.engine import Engine
 from motionmind.tween.result import Tween
 
@@ -161,7 +161,7 @@ class Book:
 @given(
     bodies, seeds, st.booleans(), st.booleans(), st.integers(0, 2), st.integers(0, 2), st.sampled_from([0.0, 0.3, 1.0])
 )
-def test_whatever_is_asked_together_the_cost_is_that_of_every_path_listed(
+def test_combined_requests_cost_the_same_as_by_enumeration(
     body: int, seed: int, pinned: bool, passed: bool, avoided: int, others: int, novelty: float
 ) -> None:
     movement, rng = clips(body), np.random.default_rng(seed)
@@ -200,7 +200,7 @@ def test_whatever_is_asked_together_the_cost_is_that_of_every_path_listed(
 
 @settings(max_examples=60, deadline=None)
 @given(bodies, seeds, st.booleans(), st.integers(0, 2), st.booleans(), st.sampled_from([1, 200_000]))
-def test_what_a_restriction_costs_is_the_difference_to_every_path_listed_without_it(
+def test_the_cost_of_a_restriction_is_that_of_enumeration(
     body: int, seed: int, pinned: bool, avoided: int, timed: bool, node_budget: int
 ) -> None:
     movement, rng = clips(body), np.random.default_rng(seed)
@@ -266,7 +266,7 @@ def test_every_clip_twice_says_the_same_once_the_pseudo_count_is_doubled_too_or_
     once = join(engine, ends, **asked)
     with pytest.MonkeyPatch.context() as patch:
         if coordinated:
-            patch.setattr(coordination, "PRIOR_POSTURES", 2.0 * coordination.PRIOR_POSTURES)
+            patch.setattr(coordination, "PRIOR_WEIGHT", 2.0 * coordination.PRIOR_WEIGHT)
         twice = join(learned([*movement, *again]), ends, **asked)
     assert (once is None) == (twice is None)
     if once is not None and twice is not None:

@@ -14,7 +14,7 @@ from motionmind.body.motion import Posture
 from motionmind.bundled import bundled
 from motionmind.errors import MotionMindError, NoPathError
 from motionmind.formats import read_posture
-from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
+from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS
 from motionmind.tween.engine import Engine
 from motionmind.tween.result import Tween
 

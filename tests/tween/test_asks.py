@@ -26,11 +26,11 @@ from motionmind.errors import MotionMindError, NoPathError
 from motionmind.formats import read_motion, read_posture
 from motionmind.geometry import rotations as rot
 from motionmind.search import astar
-from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.search.cfn import cfn
 from motionmind.search.problem import Via
 from motionmind.search.sample import gibbs_sample
 from motionmind.search.solve import Certificate, Progress
+from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS
 from motionmind.search.trellis import Trellis
 from motionmind.tween.engine import Engine
 from motionmind.tween.result import Tween
@@ -273,7 +273,7 @@ def test_nodes_take_no_more_memory_than_is_said(memory: int, chains: int) -> Non
     parents = np.full(chains, -1, np.int64)
     empty, none = np.zeros(0), np.zeros(0, np.int64)
     trellis = Trellis(chains, 0, parents, none, none, empty, none, none, empty, none, none, none, empty)
-    budget = astar.nodes_in(memory, chains)
+    budget = astar.node_capacity(memory, chains)
     held = sum(array.nbytes for array in astar._root.py_func(trellis, 0.0, budget))
     forgetting = budget
     assert 0.8 * memory < held + forgetting <= memory + 100
@@ -525,7 +525,7 @@ def test_the_report_says_what_was_asked(engine: Engine) -> None:
     assert asked["via"] == [4]
     assert asked["avoid"] == [["left_knee", "passe 139"]]
     assert (asked["novelty"], asked["memory"], asked["moves"]) == (0.25, 10**7, None)
-    assert found.node_budget == astar.nodes_in(10**7, len(found.joints))
+    assert found.node_budget == astar.node_capacity(10**7, len(found.joints))
 
 
 # --- on the command line ----------------------------------------------------------------------------------------------

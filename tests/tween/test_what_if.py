@@ -18,9 +18,9 @@ from motionmind.cli.printing import format_what_if
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_posture
 from motionmind.realise.timeline import usual
-from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.search.length import choose_length
 from motionmind.search.solve import solve
+from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS
 from motionmind.tween.engine import Engine
 from motionmind.tween.report import read_report
 from motionmind.tween.request import TweenRequest

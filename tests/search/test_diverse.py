@@ -14,12 +14,12 @@ from toys import Toy, random_toy, solution
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.errors import InfeasibleError
-from motionmind.search.apart import PRICE_MULTIPLES_TRIED, TooAlikeError, _improve, difference, solve_apart
-from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.search.costs import path_cost
-from motionmind.search.polish import minimise_chain, minimise_moment
+from motionmind.search.diverse import PRICE_FACTORS, TooSimilarError, _improve, difference, solve_diverse
+from motionmind.search.polish import minimise_chain, minimise_move
 from motionmind.search.problem import Problem, Via
 from motionmind.search.solve import Certificate, Progress, solve
+from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS
 from motionmind.search.trellis import locate, segment_trellises
 
 ROUNDING = 1e-9
@@ -61,11 +61,11 @@ def passes(path: Int32s, vias: Sequence[Via]) -> bool:
     return True
 
 
-def apart(problem: Problem, others: Sequence[Int32s], share: float) -> Certificate | float:
+def solve_if_possible(problem: Problem, others: Sequence[Int32s], share: float) -> Certificate | float:
     """The certificate, or the greatest share that is said to be possible."""
     try:
-        return solve_apart(problem, others, share)
-    except TooAlikeError as error:
+        return solve_diverse(problem, others, share)
+    except TooSimilarError as error:
         return error.most
 
 
@@ -90,11 +90,11 @@ def test_the_bound_holds_and_the_path_differs_by_enough(
     problem = toy.problem(toy.rules(moves, moves), vias, guide, allowed=allowed)
     if not every:
         with pytest.raises(InfeasibleError):
-            solve_apart(problem, [np.array([toy.start] * (moves + 1), dtype=np.int32)], share)
+            solve_diverse(problem, [np.array([toy.start] * (moves + 1), dtype=np.int32)], share)
         return
     others = [every[0], *(every[int(rng.integers(len(every)))] for _ in range(earlier - 1))]
     least = [min(difference(path, other) for other in others) for path in every]
-    found = apart(problem, others, share)
+    found = solve_if_possible(problem, others, share)
     if isinstance(found, float):
         assert found >= max(least) - ROUNDING
         assert max(least) < share or earlier > 1
@@ -121,7 +121,7 @@ def test_on_toys_most_are_proven_and_nearly_all_are_best() -> None:
         every = listed(toy, 3, allowed, [], guide)
         if not every:
             continue
-        found = apart(toy.problem(toy.rules(3, 3), [], guide), every[:1], 0.5)
+        found = solve_if_possible(toy.problem(toy.rules(3, 3), [], guide), every[:1], 0.5)
         if isinstance(found, float):
             continue
         expected = next(toy.cost(path, guide(3)) for path in every if difference(path, every[0]) >= 0.5)
@@ -135,12 +135,12 @@ def test_on_toys_most_are_proven_and_nearly_all_are_best() -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(seeds)
-def test_a_share_of_nothing_asks_nothing(seed: int) -> None:
+def test_a_share_of_zero_changes_nothing(seed: int) -> None:
     toy = small_toy(seed)
     problem = toy.problem(toy.rules(3, 3), [], random_guide(toy, seed))
     found = solution(problem)
     if found is not None:
-        again = solve_apart(problem, [found.path], 0.0)
+        again = solve_diverse(problem, [found.path], 0.0)
         assert again.status == "optimal"
         assert again.cost == pytest.approx(found.cost, abs=2 * OPTIMAL_WITHIN_NATS)
 
@@ -153,7 +153,7 @@ def test_a_greater_share_has_no_lower_optimum(seed: int) -> None:
     found = solution(problem)
     if found is None:
         return
-    by_share = [apart(problem, [found.path], share) for share in (0.0, 0.25, 0.5, 0.75)]
+    by_share = [solve_if_possible(problem, [found.path], share) for share in (0.0, 0.25, 0.5, 0.75)]
     known = [one for one in by_share if isinstance(one, Certificate)]
     assert all(less.lower_bound <= more.cost + ROUNDING for less, more in pairwise(known))
     assert all(not isinstance(one, Certificate) for one in by_share[len(known) :])
@@ -161,7 +161,7 @@ def test_a_greater_share_has_no_lower_optimum(seed: int) -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(seeds)
-def test_no_chain_or_moment_alone_would_make_an_improved_path_cheaper(seed: int) -> None:
+def test_no_single_chain_or_move_improves_an_improved_path(seed: int) -> None:
     toy, rng = small_toy(seed), np.random.default_rng(seed)
     guide = random_guide(toy, seed)
     every = listed(toy, 4 if len(toy.joint_states()) < 10 else 3, np.ones(sum(toy.sizes), dtype=bool), [], guide)
@@ -180,22 +180,22 @@ def test_no_chain_or_moment_alone_would_make_an_improved_path_cheaper(seed: int)
     cost = _improve(trellis, path, agreeing, allowed, prices)
     assert cost == path_cost(trellis, path)
     assert excess(path) <= before
-    for factor, part in product(PRICE_MULTIPLES_TRIED, range(trellis.chains + trellis.moves)):
+    for factor, part in product(PRICE_FACTORS, range(trellis.chains + trellis.moves)):
         dearer = trellis._replace(unary=trellis.unary + factor * prices @ agreeing)
         trial, kept = path.copy(), np.ones(len(trellis.dom), dtype=np.bool_)
         if part < trellis.chains:
             minimise_chain(dearer, trial, part, kept)
         else:
-            minimise_moment(dearer, trial, part - trellis.chains + 1, kept)
+            minimise_move(dearer, trial, part - trellis.chains + 1, kept)
         assert path_cost(trellis, trial) > cost - ROUNDING or excess(trial) > excess(path)
 
 
-def test_a_path_without_a_way_cannot_differ() -> None:
+def test_a_path_without_inner_states_cannot_differ() -> None:
     toy = replace(small_toy(1), parents=(-1,), edges=(np.zeros((2, 2)),), children=(np.zeros(2),), above=(np.zeros(0),))
     toy = replace(toy, corrections=(np.zeros((0, 2)),), start=(0,), goal=(1,))
     path = solve(toy.problem(toy.rules(1, 1))).path
-    with pytest.raises(TooAlikeError) as fault:
-        solve_apart(toy.problem(toy.rules(1, 1)), [path], 0.2)
+    with pytest.raises(TooSimilarError) as fault:
+        solve_diverse(toy.problem(toy.rules(1, 1)), [path], 0.2)
     assert fault.value.most == 0.0
 
 
@@ -210,7 +210,7 @@ def test_a_watcher_ends_the_search_with_a_path_that_differs_and_a_bound() -> Non
             if not least:
                 continue
             told: list[Progress] = []
-            found = solve_apart(
+            found = solve_diverse(
                 toy.problem(toy.rules(3, 3), [], guide),
                 every[:1],
                 0.5,
@@ -233,7 +233,7 @@ def test_a_path_that_is_near_enough_ends_the_search_sooner() -> None:
         if all(difference(path, every[0]) < 0.5 for path in every):
             continue
         problem = toy.problem(toy.rules(3, 3), [], guide)
-        best, near = (solve_apart(problem, every[:1], 0.5, within=within) for within in (0.0, 0.3))
+        best, near = (solve_diverse(problem, every[:1], 0.5, within=within) for within in (0.0, 0.3))
         assert difference(near.path, every[0]) >= 0.5
         assert near.lower_bound <= best.lower_bound + ROUNDING
         assert best.cost <= near.cost + ROUNDING

@@ -1,14 +1,14 @@
 """Find the cheapest path that differs enough from earlier paths, with a lower bound on all such paths.
 
 The difference of two paths of T moves is the share of the (T - 1) L states between the ends that are not the same.
-Since this constraint ties all states of a path together, relax it: each chain that agrees with path k at a move costs
-mu_k nats (one more cost of states by move), and the allowed agreement is refunded. For mu >= 0
+This constraint couples all states of a path, so relax it: each chain that agrees with path k at a move costs mu_k nats
+(one more cost of states by move), and the allowed agreement is refunded. For mu >= 0
 
     D(mu) = min over x of  E(x) + sum over k of mu_k (agree_k(x) - allowed)
 
 is a lower bound on the cost of every path that agrees with each path k in at most `allowed` states. Every such path
-found on the way, or made from one, gives an upper bound. D is concave, and each path x bounds it from above by a linear
-function of mu; the next mu to try maximises the least of the functions found so far.
+that is found or made on the way gives an upper bound. D is concave, and each path x bounds it from above by a linear
+function of mu (a *cut*); the next mu to try maximises the minimum of the cuts.
 
 Sources: Fisher, "The Lagrangian relaxation method for solving integer programming problems", Management Science 27(1),
 1981; Batra, Yadollahpour, Guzman-Rivera and Shakhnarovich, "Diverse M-best solutions in Markov random fields", ECCV
@@ -29,28 +29,26 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.errors import InfeasibleError
 from motionmind.jit import jit
-from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.search.costs import path_cost
-from motionmind.search.polish import minimise_chain, minimise_moment
+from motionmind.search.polish import minimise_chain, minimise_move
 from motionmind.search.problem import Problem, places
 from motionmind.search.solve import Certificate, Progress, Status, Watch, solve
+from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS, SAME_COST_NATS
 from motionmind.search.trellis import Trellis, locate, segment_trellises, states_of
 
-MAX_PRICE_ROUNDS = 30  # most prices to try; real ballet takes 6 for one earlier path, 22 for three
-PRICE_MULTIPLES_DEARER = tuple(1.2**k for k in range(1, 12))  # multiples of the prices for making a path differ enough
-PRICE_MULTIPLES_TRIED = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0)  # multiples of the prices for improving it
-PATH_WEIGHT_RATE = 4.0  # of the weights of earlier paths in the search for any path that differs from all of them
+MAX_PRICE_ROUNDS = 30  # ballet takes 6 for one earlier path, 22 for three
+PRICE_FACTORS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0)  # by which prices are scaled to improve a path
 
 
-class TooAlikeError(InfeasibleError):
-    """No path was found that differs enough from all earlier ones.
+class TooSimilarError(InfeasibleError):
+    """No path was found that differs enough from all earlier paths.
 
     Attributes:
-        most: no path differs from each of them by more than this share.
+        most: no path differs from each earlier path by more than this share.
     """
 
     def __init__(self, most: float) -> None:
-        super().__init__(f"no path was found that differs by enough; no more than a share of {most:.3f} is possible")
+        super().__init__(f"no path was found that differs enough: at most {most:.3f} of the states can differ")
         self.most = most
 
 
@@ -59,24 +57,25 @@ def difference(path: Int32s, other: Int32s) -> float:
     return float((path[1:-1] != other[1:-1]).mean()) if len(path) > 2 else 0.0
 
 
-def solve_apart(
+def solve_diverse(
     problem: Problem, earlier: Sequence[Int32s], share: float, watch: Watch | None = None, within: float = 0.0
 ) -> Certificate:
-    """Find the cheapest path that differs by at least a share from each of some earlier ones.
+    """Find the cheapest path that differs by at least a share from each of the earlier paths.
 
     Args:
         problem: what to solve, in a given number of moves T.
-        earlier: places of earlier paths [T + 1, L] each, at least one.
+        earlier: places of the earlier paths [T + 1, L] each, at least one.
         share: least difference, from 0 to 1.
         watch: as for `solve`; its costs are those of paths that differ enough.
-        within: end the search once the cost is proven to be at most this share above the least.
+        within: stop once the cost is proven to be at most this share above the least.
 
     Returns:
-        The certificate. Cost and bound are the problem's own, without any price of agreement. It is "optimal" if they
-        agree to 1e-6 nats; else it is "bounded", and the gap includes the relaxation's duality gap.
+        The certificate, with cost and bound of the problem itself, without prices. Its status is "optimal" if they
+        agree to 1e-6 nats; else "bounded", and the gap includes the relaxation's duality gap.
 
     Raises:
-        InfeasibleError: no path satisfies the problem; a TooAlikeError if no path was found that differs enough.
+        InfeasibleError: no path satisfies the problem.
+        TooSimilarError: no path was found that differs enough.
     """
     began = perf_counter()
     search = _Search(problem, earlier, share, watch, within)
@@ -113,7 +112,7 @@ class _Search:
     Attributes:
         best: the best path that differs enough; its cost is infinite before there is one.
         lower_bound: no path that differs enough costs less, nats.
-        ended: whether the watcher ended the search.
+        ended: whether the watcher stopped the search.
     """
 
     def __init__(
@@ -123,8 +122,8 @@ class _Search:
         budget = max(problem.rules.node_budget // MAX_PRICE_ROUNDS, 1)
         self._problem = replace(problem, rules=replace(problem.rules, node_budget=budget))
         self._earlier, self._watch, self._within = np.stack(earlier), watch, within
-        self._on_the_way = max(moves - 1, 0) * chains  # states
-        self._allowed = float(np.floor((1.0 - share) * self._on_the_way + 1e-9))  # the margin is for rounding
+        self._n_inner_states = max(moves - 1, 0) * chains
+        self._allowed = float(np.floor((1.0 - share) * self._n_inner_states + 1e-9))  # with a margin for rounding
         chain_of_row = np.repeat(np.arange(chains), np.diff(model.starts))
         self._agreeing = (self._earlier[:, :, chain_of_row] == model.place).astype(np.float64)  # [K, T + 1, G]
         self._agreeing[:, [0, -1]] = 0.0
@@ -135,9 +134,9 @@ class _Search:
         self.seconds = {"problem": 0.0, "bound": 0.0, "search": 0.0}
 
     def run(self) -> None:
-        """Try prices until the bound cannot rise, is near enough to the best path, or the watcher ends the search."""
+        """Try prices until the bound cannot rise, is near enough to the best path, or the watcher stops the search."""
         prices = np.zeros(len(self._earlier))
-        self._take(self._find_far(), prices)
+        self._take(self._find_different(), prices)
         cuts = [_Cut(self.best.cost, self._excess(self.best.states))]
         for _ in range(MAX_PRICE_ROUNDS):
             found, refund = self._solve(prices), float(prices.sum()) * self._allowed
@@ -146,38 +145,39 @@ class _Search:
             self.lower_bound = min(max(self.lower_bound, found.lower_bound - refund), self.best.cost)
             cuts.append(_Cut(found.cost - refund - float(prices @ excess), excess))
             cuts.append(_Cut(self.best.cost, self._excess(self.best.states)))
-            prices, promised = _greatest(cuts)
+            prices, promised = _maximise_cuts(cuts)
             if self.ended or min(promised, self.best.cost) - self.lower_bound <= OPTIMAL_WITHIN_NATS:
                 return
             if self.best.cost - self.lower_bound <= self._within * self.lower_bound:
                 return
 
     def _excess(self, states: Int32s) -> Floats:
-        """Count a path's agreeing states with each earlier path beyond the allowed number [K]; may be negative."""
+        """Return the number of states that agree with each earlier path, less the allowed number [K]."""
         same = places(self._problem.model, states)[1:-1] == self._earlier[:, 1:-1]
         return np.asarray(same.sum(axis=(1, 2)) - self._allowed, dtype=np.float64)
 
     def _solve(self, prices: Floats) -> Certificate:
         """Solve the problem with a price on agreement with each earlier path [K]."""
         timed = self._timed + np.tensordot(prices, self._agreeing, 1)
-        found = solve(_guided(self._problem, timed), self._watching if self._watch else None)
+        found = solve(_with_timed_costs(self._problem, timed), self._report if self._watch else None)
         self.expansions += found.expansions
         self.peak_nodes = max(self.peak_nodes, found.peak_nodes)
         for part, seconds in found.seconds.items():
             self.seconds[part] += seconds
         return found
 
-    def _watching(self, so_far: Progress) -> bool:
+    def _report(self, so_far: Progress) -> bool:
         if self._watch is not None and not self.ended:
             so_far = Progress(self.best.cost, self.lower_bound, self.expansions + so_far.expansions)
             self.ended = bool(self._watch(so_far))
         return self.ended
 
-    def _find_far(self) -> Certificate:
+    def _find_different(self) -> Certificate:
         """Find a path that differs enough, at any cost.
 
-        Without costs and couplings, chains move independently, and one solve gives the least weighted agreement. It
-        bounds from below the largest agreement of any path; weights grow where paths agree too often.
+        Without costs and couplings, chains move independently, and one solve gives the least weighted agreement, a
+        lower bound on the greatest agreement with any earlier path. Weights grow exponentially with the excess
+        agreement (multiplicative weights), at a rate of 4.
         """
         model, rules = self._problem.model, self._problem.rules
         free = {name: np.zeros_like(getattr(model, name)) for name in ("costs", "unary", "alone")}
@@ -186,20 +186,20 @@ class _Search:
         alone = replace(self._problem, model=model, rules=rules)
         weights, least = np.full(len(self._earlier), 1.0 / len(self._earlier)), 0.0
         for _ in range(MAX_PRICE_ROUNDS):
-            found = solve(_guided(alone, np.tensordot(weights, self._agreeing, 1)))
+            found = solve(_with_timed_costs(alone, np.tensordot(weights, self._agreeing, 1)))
             excess = self._excess(found.path)
-            if self._on_the_way > 0 and np.all(excess <= 0.0):
+            if self._n_inner_states > 0 and np.all(excess <= 0.0):
                 return found
             least = max(least, found.lower_bound)
-            if self._on_the_way == 0 or least > self._allowed + OPTIMAL_WITHIN_NATS:
+            if self._n_inner_states == 0 or least > self._allowed + OPTIMAL_WITHIN_NATS:
                 break
-            weights *= np.exp(PATH_WEIGHT_RATE * excess / self._on_the_way)
+            weights *= np.exp(4.0 * excess / self._n_inner_states)
             weights /= weights.sum()
-        raise TooAlikeError(1.0 - least / self._on_the_way if self._on_the_way > 0 else 0.0)
+        raise TooSimilarError(1.0 - least / self._n_inner_states if self._n_inner_states > 0 else 0.0)
 
     def _take(self, found: Certificate, prices: Floats) -> None:
-        """Make a path differ enough, and improve it; keep it if it is the best."""
-        problem, path = _guided(self._problem, self._timed), found.path.copy()
+        """Make a path differ enough and improve it; keep it if it is the best."""
+        problem, path = _with_timed_costs(self._problem, self._timed), found.path.copy()
         stops, chains, cost = [0, *found.passed, len(path) - 1], path.shape[1], problem.rules.per_move * (len(path) - 1)
         excess = self._excess(path)
         for trellis, (first, last) in zip(segment_trellises(problem, stops), pairwise(stops), strict=True):
@@ -216,8 +216,8 @@ class _Search:
             self.best = _Path(path, found.passed, cost)
 
 
-def _guided(problem: Problem, timed: Floats) -> Problem:
-    """Return the problem with other costs of being in each state after each move, nats [T + 1, G]."""
+def _with_timed_costs(problem: Problem, timed: Floats) -> Problem:
+    """Return the problem with other costs of states by move, nats [T + 1, G]."""
     return replace(problem, guide=lambda _: timed[1:-1])
 
 
@@ -231,8 +231,8 @@ def _improve(trellis: Trellis, chosen: Ints, agreeing: Floats, allowed: Floats, 
         trellis: the problem.
         chosen: the path.
         agreeing: 1 where a position agrees with an earlier path, else 0 [K, P].
-        allowed: in how many states the path may agree [K].
-        prices: nats for each such state [K].
+        allowed: number of states that may agree [K].
+        prices: nats for each agreeing state [K].
     """
 
     def excess(path: Ints) -> float:
@@ -241,7 +241,7 @@ def _improve(trellis: Trellis, chosen: Ints, agreeing: Floats, allowed: Floats, 
     trial, everywhere, parts = chosen.copy(), np.ones(len(trellis.dom), dtype=np.bool_), trellis.chains + trellis.moves
 
     def replacements(factors: Sequence[float]) -> Iterator[int]:
-        """Write one replacement after another to `trial`, and yield its number: at each price, chains, then moves."""
+        """Write one replacement after another to `trial`, and yield its number: at each factor, chains, then moves."""
         for row, factor in enumerate(factors):
             dearer = trellis._replace(unary=trellis.unary + factor * prices @ agreeing)
             part = _replace_next(dearer, chosen, 0, everywhere, trial)
@@ -249,43 +249,43 @@ def _improve(trellis: Trellis, chosen: Ints, agreeing: Floats, allowed: Floats, 
                 yield row * parts + part
                 part = _replace_next(dearer, chosen, part + 1, everywhere, trial)
 
-    too_much = excess(chosen)
-    for _ in replacements(PRICE_MULTIPLES_DEARER):
-        if too_much == 0.0:
+    surplus = excess(chosen)
+    for _ in replacements([1.2**k for k in range(1, 12)]):
+        if surplus == 0.0:
             break
-        if (less := excess(trial)) < too_much:
-            chosen[:], too_much = trial, less
-    cost, before, last = path_cost(trellis, chosen), np.inf, len(PRICE_MULTIPLES_TRIED) * parts
-    while cost < before - 1e-9:
+        if (less := excess(trial)) < surplus:
+            chosen[:], surplus = trial, less
+    cost, before, last = path_cost(trellis, chosen), np.inf, len(PRICE_FACTORS) * parts
+    while cost < before - SAME_COST_NATS:
         before = cost
-        for number in replacements(PRICE_MULTIPLES_TRIED):
-            if number > last and cost == before:  # all from here on were tried since the path last changed
+        for number in replacements(PRICE_FACTORS):
+            if number > last and cost == before:  # the rest were tried since the path last changed
                 break
-            if excess(trial) <= too_much and (least := path_cost(trellis, trial)) < cost:
+            if excess(trial) <= surplus and (least := path_cost(trellis, trial)) < cost:
                 chosen[:], cost, last = trial, least, number
     return cost
 
 
 @jit
 def _replace_next(trellis: Trellis, path: Ints, first: int, everywhere: Bools, trial: Ints) -> int:
-    """Replace a chain or a move of a path [n] by the cheapest: the first one, from number `first` on, that changes.
+    """Copy a path [n] to `trial`, and replace by the cheapest the first chain or move, from `first` on, that changes.
 
-    Write the new path into `trial`, and return the number of the replacement, or their count if none changes.
+    Return the number of the replaced chain (from 0) or move (from L), or L + T if none changes.
     """
     for part in range(first, trellis.chains + trellis.moves):
         trial[:] = path
         if part < trellis.chains:
             minimise_chain(trellis, trial, part, everywhere)
         else:
-            minimise_moment(trellis, trial, part - trellis.chains + 1, everywhere)
+            minimise_move(trellis, trial, part - trellis.chains + 1, everywhere)
         for i in range(len(path)):
             if trial[i] != path[i]:
                 return part
     return trellis.chains + trellis.moves
 
 
-def _greatest(cuts: Sequence[_Cut]) -> tuple[Floats, float]:
-    """Return the prices [K] that maximise the least of the cuts, and its value there in nats."""
+def _maximise_cuts(cuts: Sequence[_Cut]) -> tuple[Floats, float]:
+    """Return the prices [K] that maximise the minimum of the cuts, and that maximum in nats."""
     from scipy.optimize import linprog  # slow to import
 
     excess = np.stack([cut.excess for cut in cuts])
