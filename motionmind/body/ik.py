@@ -1,12 +1,13 @@
 """Inverse kinematics: find the joint angles that bring points of a body to target positions.
 
-One solver serves all clients. It minimises a weighted sum of squares by damped least-squares steps on joint angles; an
-angle that would exceed its limit stops there, points that would sink stop at the floor, and the others compensate.
+One solver serves all clients. It minimises a weighted sum of squares by damped least-squares steps on joint angles. An
+angle stops at its limit, a sinking point at the floor, and the others compensate.
+
 Sources: Wampler, "Manipulator inverse kinematic solutions based on vector formulations and damped least-squares
-methods", IEEE Transactions on Systems, Man and Cybernetics 16 (1986); for limits Baerlocher and Boulic, "An inverse
-kinematics architecture enforcing an arbitrary number of strict priority levels", The Visual Computer 20 (2004). Unlike
-theirs, our targets have weights, not strict priorities, which are unstable if a standing foot and limits leave no
-freedom.
+methods", IEEE Transactions on Systems, Man and Cybernetics 16 (1986).
+For limits: Baerlocher and Boulic, "An inverse kinematics architecture enforcing an arbitrary number of strict priority
+levels", The Visual Computer 20 (2004). Targets here have weights: strict priorities, as in that paper, are unstable if
+a standing foot and limits leave no freedom.
 """
 
 from __future__ import annotations

@@ -81,7 +81,7 @@ class Posture:
         return html_of(self)
 
     def as_motion(self) -> Motion:
-        """This posture as a motion of one frame at time 0."""
+        """Return this posture as a motion of one frame at time 0."""
         return Motion(self.skeleton, self.rotations[None], self.root[None], np.zeros(1), recorded=self.recorded)
 
 

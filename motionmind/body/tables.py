@@ -1,4 +1,4 @@
-"""Movement as tables of other libraries, which are imported when a table is asked for: pandas and xarray."""
+"""Movement as tables of pandas and xarray, which are imported on first use."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class Corpus:
     Attributes:
         name: the corpus's name.
         skeleton: the body; with the first performer's proportions if there are several.
-        clips: the clips, in order and without gaps; of a corpus that was loaded, each is made when it is asked for.
+        clips: the clips, in order and without gaps; a loaded corpus decodes each on access.
         rotations: local rotations of all postures [N, J, 4].
         root: positions of the root joint [N, 3], metres.
         times: seconds in the clip's own recording [N], increasing within a clip.

@@ -52,7 +52,7 @@ def fingerprint(files: Iterable[Path], package: Path = _PACKAGE) -> str:
 
 @cache
 def _own_code() -> hashlib._Hash:
-    """Return the hash of this package's sources, as they are when it is asked for first: what this process runs."""
+    """Return the hash of this package's sources at the first call: the code that this process runs."""
     return _hash_code(_PACKAGE)
 
 

@@ -61,8 +61,8 @@ def read_motion(
             Other formats define their own.
         asf: AMC's skeleton (`read_amc`); None finds it beside the file.
         fps: frames per second: of AMC (default 120), which does not record them, of AIST++ and FineDance (default 60
-            and 30), and of BVH, `.npz` and the papers' notation in place of those that the file states. Frames of JSON
-            and glTF have times of their own.
+            and 30), and of BVH, `.npz` and the papers' notation in place of the file's. Frames of JSON and glTF have
+            times of their own.
         skeleton: the body of the papers' notation, which names joints only; None infers it from their names.
         up: "y" or "z", the vertical in the file: with "z" the movement is turned, so that y is up. None leaves it as it
             is, for `to_human23` to find; but of `.npz`, where it takes z, unless people stand along y.

@@ -1,9 +1,8 @@
 """Reads and writes BVH (Biovision hierarchy) files: movement of any tree of joints.
 
-The format has no standard. The reader accepts programs' files, after the description by M. Meredith and S. Maddock,
-"Motion capture file formats explained", University of Sheffield, CS-01-11 (2001): rotation channels apply in the listed
-order, each about axes turned by the previous ones; position channels, anywhere in the list, move the joint in its
-parent's frame and replace its OFFSET.
+The format has no standard. Rotation channels apply in the listed order, each about axes turned by the previous ones.
+Position channels, anywhere in the list, move the joint in its parent's frame and replace its OFFSET.
+Source: M. Meredith and S. Maddock, "Motion capture file formats explained", University of Sheffield, CS-01-11 (2001).
 """
 
 from __future__ import annotations
@@ -42,10 +41,10 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None, fps: float | No
     are skipped. If the header's frame count is wrong, all frames in the file are read, with a warning.
 
     Constant position channels of a joint other than the root replace its OFFSET. If they vary and the joint carries
-    most of the body, it becomes the root, with its ancestors folded in (Bandai-Namco's `joint_Root` stays at the
-    origin while `Hips` moves); otherwise the joint stays at its mean place, and a warning gives its largest distance
-    from there. If position channels are near 0 while the offsets are not, the two are added, with a warning, as old
-    exporters of Blender meant.
+    most of the body, it becomes the root, with its ancestors folded in: Bandai-Namco's `joint_Root` stays at the origin
+    while `Hips` moves. Any other joint stays at its mean place, and a warning gives its largest distance from there. If
+    position channels are near 0 while the offsets are not, the two are added, with a warning, as old exporters of
+    Blender meant.
 
     Args:
         path: the file; its stem becomes the name of the skeleton and of the motion.

@@ -4,10 +4,10 @@ R. Li, S. Yang, D. Ross and A. Kanazawa, "AI Choreographer: Music Conditioned 3D
 (2021): a pickle (`_unpickle`) of `smpl_poses` [T, 72], rotation vectors of SMPL's 24 joints, `smpl_trans` [T, 3] and
 `smpl_scaling` [1], the length of a metre; 60 frames a second.
 
-R. Li et al., "FineDance: A Fine-grained Choreography Dataset for 3D Full Body Dance Generation", ICCV (2023): an array
-of frames, each a place and the rotations of SMPL+H's 52 joints, by the first two rows of their matrices [T, 3 + 312];
-30 frames a second. Variants that its code makes: with four marks of contact in front [T, 319], for the body's 22 joints
-[T, 135], or with rotation vectors of 52 joints [T, 159] or of SMPL-X's 55 [T, 168].
+R. Li et al., "FineDance: A Fine-grained Choreography Dataset for 3D Full Body Dance Generation", ICCV (2023).
+An array of frames, 30 a second: a place, then the rotations of SMPL+H's 52 joints, by the first two rows of their
+matrices [T, 3 + 312]. Its code also writes four marks of contact in front [T, 319], the body's 22 joints [T, 135], and
+rotation vectors of 52 joints [T, 159] or of SMPL-X's 55 [T, 168].
 
 Both worlds are y up. As in `npz`, joints have human44's places: the files have no lengths of bones. The given place is
 that of the body model's origin, about 0.24 m above the pelvis in SMPL and 0.35 m in SMPL-X.

@@ -40,8 +40,11 @@ def _piece_at(times: Floats, at: float) -> int:
 def second_derivatives(times: Floats, values: Floats) -> Floats:
     """Return the second derivatives [K, m] of the natural spline through values [K, m] at its knots.
 
-    They solve the tridiagonal system h[i-1] M[i-1] + 2 (h[i-1] + h[i]) M[i] + h[i] M[i+1] = 6 (d[i] - d[i-1]), with
-    steps h and slopes d; source: de Boor, "A Practical Guide to Splines" (1978), chapter IV.
+    With steps h and slopes d, they solve the tridiagonal system
+
+        h[i-1] M[i-1] + 2 (h[i-1] + h[i]) M[i] + h[i] M[i+1] = 6 (d[i] - d[i-1]).
+
+    Source: de Boor, "A Practical Guide to Splines" (1978), chapter IV.
     """
     out, upper = np.zeros(values.shape), np.zeros(len(times))
     for i in range(1, len(times) - 1):

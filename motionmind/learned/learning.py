@@ -192,8 +192,7 @@ def _learn_all(
 
 
 def _keep_visited(space: StateSpace, states: States) -> tuple[StateSpace, States]:
-    """Drop one joint's states without a posture, of which nothing is known; return the smaller space and the states [N]
-    renumbered in it."""
+    """Drop one joint's states that no posture visits; return the smaller space and the states [N] renumbered in it."""
     seen = np.unique(states)
     labels = [[space.labels[0][s] for s in seen] if space.labels[0] else []]
     smaller = StateSpace.of_joints(

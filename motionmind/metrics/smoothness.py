@@ -39,9 +39,9 @@ def sparc(speed: Floats, fps: float) -> float:
 
     Defined by Balasubramanian, Melendez-Calderon, Roby-Brami and Burdet, "On the analysis of movement smoothness", J.
     NeuroEngineering and Rehabilitation 12:112 (2015); the constants are those of its section on discrete movements and
-    of the code released with it. It is minus the length of the curve of the speed's amplitude spectrum, from 0 Hz to
-    the last frequency, at most 10 Hz, whose amplitude is at least 5 % of the greatest; amplitudes and that range of
-    frequencies are scaled to 1. It does not depend on the size of the movement.
+    of the code released with it. It is minus the length of the curve of the speed's amplitude spectrum. The curve runs
+    from 0 Hz to the last frequency, at most 10 Hz, whose amplitude is at least 5 % of the greatest. Amplitudes and that
+    range of frequencies are scaled to 1, so the value does not depend on the size of the movement.
 
     Args:
         speed: [T], in any unit, evenly spaced in time.

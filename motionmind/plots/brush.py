@@ -21,7 +21,7 @@ class Brush:
     """Draws on an empty sheet of paper; coordinates and sizes are pixels of the finished picture."""
 
     def __init__(self, width: int, height: int) -> None:
-        """A sheet of `width` by `height` pixels."""
+        """Make a sheet of `width` by `height` pixels."""
         from PIL import Image, ImageDraw
 
         self._size = width, height

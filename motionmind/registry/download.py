@@ -42,7 +42,7 @@ def check_address(url: str, before: str | None = None) -> None:
     except ValueError as error:
         raise CorpusError(f"{url}: is not an address: {error}") from error
     if is_secret:
-        raise CorpusError(f"{url}: names a user or a password, which would be sent to whoever is there")
+        raise CorpusError(f"{url}: remove the user name and password; they would be sent to the server")
     is_here = _is_loopback(host or "")
     if parts.scheme not in (("https", "http") if is_here else ("https",)) or not host:
         raise CorpusError(f"{url}: is not asked for; addresses begin with https:// (or are on this machine)")
@@ -179,7 +179,7 @@ def _append(url: str, file: IO[bytes], size: int, response: Any, on_progress: Pr
     if response.status != http.client.PARTIAL_CONTENT:
         _empty(file)  # the server sends the whole file
     elif not response.headers.get("Content-Range", "").startswith(f"bytes {file.tell()}-"):
-        raise http.client.HTTPException("the server sends another part of the file than it was asked for")
+        raise http.client.HTTPException("the server sends another part of the file than requested")
     while chunk := response.read(1 << 18):
         if file.tell() + len(chunk) > size:
             _empty(file)

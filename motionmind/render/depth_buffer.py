@@ -25,7 +25,7 @@ class DepthBuffer:
     """
 
     def __init__(self, left: float, top: float, width: int, height: int, scale: float) -> None:
-        """An empty buffer.
+        """Make an empty buffer.
 
         Args:
             left, top: x and y of its upper left corner, metres.

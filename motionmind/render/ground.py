@@ -47,7 +47,7 @@ class Ground:
     """
 
     def __init__(self, camera: Camera, low: Floats, high: Floats, height: float) -> None:
-        """The floor under a path.
+        """Lay the floor under a path.
 
         Args:
             camera: the camera.

@@ -48,9 +48,11 @@ def _cone(
 ) -> None:
     """Draw a round cone that is not seen from an end; `a` and `b` are its ends' centres and radii.
 
-    Its surface is the greatest z that any of its balls reaches: at the pixel p the greatest
-    a_z + t d_z + sqrt(q(t)) for t in [0, 1], with q(t) = r(t)^2 - |p - c(t)|^2 in the picture's plane, where
-    q(t) = Q (A + 2 B t - t^2) and Q > 0. Without bounds it would be at t = B + d_z sqrt((B^2 + A) / (d_z^2 + Q)).
+    Its surface is the greatest z that any of its balls reaches. At the pixel p that is the maximum over t in [0, 1] of
+
+        a_z + t d_z + sqrt(q(t)),  with q(t) = r(t)^2 - |p - c(t)|^2 = Q (A + 2 B t - t^2), Q > 0,
+
+    where p and c(t) are in the picture's plane. Without bounds it is at t = B + d_z sqrt((B^2 + A) / (d_z^2 + Q)).
     """
     shade, place = buffer[2:]
     ax, ay, az, radius = a
@@ -89,8 +91,9 @@ def _ellipsoid(
 ) -> None:
     """Draw an ellipsoid v' s^-1 v = 1 about its centre; `square` is the upper half of s = A A', row by row.
 
-    Over the pixel p of its shadow, the ellipse p' S^-1 p < 1 with S the picture's corner of s, the surface is at
-    k p + sqrt(d (1 - p' S^-1 p)), where k = S^-1 (s_xz, s_yz) and d = s_zz - k (s_xz, s_yz).
+    Its shadow is the ellipse p' S^-1 p < 1, with S the picture's corner of s. Over a pixel p of it the surface is at
+
+        z = k p + sqrt(d (1 - p' S^-1 p)),  with k = S^-1 (s_xz, s_yz) and d = s_zz - k (s_xz, s_yz).
     """
     shade, place = buffer[2:]
     xx, xy, xz, yy, yz, zz = square

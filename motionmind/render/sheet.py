@@ -47,10 +47,10 @@ def draw_sheet(
 ) -> Image.Image:
     """Draw postures of a motion side by side, in rows, each with its frame number and time.
 
-    Each posture is drawn on the same floor and at the same scale from the front, as the audience sees it, and from one
-    side of the stage; below the front view, the feet on the floor are drawn from above. The views follow the root
-    horizontally. A dot marks the body's centre of mass, with a dashed line down to the floor; whatever is under the
-    floor is marked. Inserted movement is violet, with balls around joints amid a move that no corpus attests.
+    All views have the same floor and scale: from the front, as the audience sees the posture, from one side of the
+    stage, and, below the front view, the feet from above. The views follow the root horizontally. A dot marks the
+    body's centre of mass, with a dashed line down to the floor; points under the floor are marked. Inserted movement is
+    violet, with balls around joints amid a move that no corpus attests.
 
     Args:
         motion: the motion, on any skeleton.

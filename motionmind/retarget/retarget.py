@@ -44,12 +44,13 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
     """Retarget movement to human23's joints, with the performer's proportions.
 
     Forward kinematics reproduces the file's joint positions exactly, except where several joints of the file became
-    one: a straight bone then replaces a bent chain. In a spine the lumbar joint's bone points to the arms. (CMU, whose
-    three joints of the spine become two, without the lower neck: arms are 1 mm off on average in 20 clips of a dancer,
-    10 mm at most, and the head 23 mm; 0.4 mm, 4 mm and 15 mm in 9 clips of karate; the legs are exact.) Joints that the
-    file lacks, such as toes or fingers, move with their parents, at human23's place scaled by the length of the legs.
-    Movement on human23 is returned unchanged; movement taken from there to human44, whose new joints stay at rest,
-    comes back unchanged.
+    one: a straight bone then replaces a bent chain. In a spine the lumbar joint's bone points to the arms. CMU's three
+    spine joints become two, without the lower neck: in 20 clips of a dancer arms are 1 mm off on average and 10 mm at
+    most, and the head 23 mm. In 9 clips of karate these are 0.4 mm, 4 mm and 15 mm. The legs are exact.
+
+    Joints that the file lacks, such as toes or fingers, move with their parents, at human23's place scaled by the
+    length of the legs. Movement on human23 is returned unchanged; movement taken from there to human44, whose new
+    joints stay at rest, comes back unchanged.
 
     Args:
         movement: a motion or posture on the file's own skeleton.

@@ -1,10 +1,12 @@
 """Movements by key: clips and postures of corpora, saved postures, and movements stored in the project.
 
-ballet/adagio    a clip of a corpus
-ballet/arabesque    a named posture of a corpus: a movement of one frame
-own/bow    a posture saved in the project
-m-0123456789abcdef    a movement stored in the project, by the hash of its content
-~KEY    the mirrored movement
+A key has one of these forms:
+
+    ballet/adagio         a clip of a corpus
+    ballet/arabesque      a named posture of a corpus: a movement of one frame
+    own/bow               a posture saved in the project
+    m-0123456789abcdef    a movement stored in the project, by the hash of its content
+    ~KEY                  the mirrored movement
 """
 
 from __future__ import annotations

@@ -384,7 +384,7 @@ def _nothing(_: Report) -> None:
 
 
 def _room() -> int:
-    """Return the number of workers: two need two processors and 1 GiB of free memory, of which they take a fifth."""
+    """Return the number of workers: two need two processors and 1 GiB of free memory, and take a fifth of it."""
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     try:
         memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_AVPHYS_PAGES")

@@ -165,7 +165,7 @@ OPTIONS: Mapping[str, _Rule] = {
 
 
 def take_options(options: Any) -> None:
-    """Check the fields of a dataclass by their rules, and copy those that the caller could change later."""
+    """Check the fields of a dataclass by their rules, and copy mutable values."""
     for one in fields(options):
         if one.name in OPTIONS:
             value = OPTIONS[one.name](one.name.rstrip("_"), getattr(options, one.name))

@@ -218,7 +218,7 @@ def test_addresses_that_may_be_asked(url: str) -> None:
         ("ftp://example.org/a", "begin with https"),
         ("https://", "begin with https"),
         ("https:///a", "begin with https"),
-        ("https://a:b@example.org/", "names a user or a password"),
+        ("https://a:b@example.org/", "remove the user name and password"),
         ("https://example.org:99999/", "is not an address"),
         ("https://[::1/", "is not an address"),
     ],

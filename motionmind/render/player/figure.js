@@ -341,7 +341,7 @@ function azimuths(around) {
   return Array.from({ length: around }, (_, i) => (2 * Math.PI * i) / around);
 }
 
-/** Triangles between rings of vertices, counter-clockwise from outside; those that a pole makes empty left out. */
+/** Triangles between rings of vertices, counter-clockwise from outside, without the empty ones at a pole. */
 function triangles(rings, around) {
   const corners = [];
   for (let ring = 0; ring + 1 < rings; ring++) {

@@ -21,7 +21,7 @@ export class Pictures {
   ask() {
     if (this.#asked) return;
     this.#asked = true;
-    this.#last ??= performance.now(); // whoever rested begins now
+    this.#last ??= performance.now(); // after a rest, time starts now
     requestAnimationFrame((now) => this.#next(now));
   }
 

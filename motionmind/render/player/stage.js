@@ -21,7 +21,7 @@ import { COARSE, Figures, FINE, Marks, paperUniforms, PAPERS } from "motionmind/
 const FIELD = 26; // degrees from the picture's lower edge to its upper one
 const SHARPEST = 2; // device pixels to a CSS pixel, at most
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i; // what browsers call drawing without a GPU
-const SAMPLES = 150; // postures, at most, beside those that reach farthest, by which a path's extent is found
+const SAMPLES = 150; // postures, at most, to find a path's extent, besides the ones that reach farthest
 const MARGIN = 0.12; // metres round the ends of limbs that a body 1.70 m tall takes up, and some air
 const PIECES = 16; // of a line of the floor's grid, along which it fades
 const GHOSTS = 0.34; // strength of A and B

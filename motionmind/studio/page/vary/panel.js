@@ -58,7 +58,7 @@ export function Panel({ studio }) {
   const isFarthest = Boolean(proposal) && !varying.asking && wish.nudge === null && wish.depart > proposal.departs + DEPARTURE_SLACK;
   const label = isFarthest ? `${departs} at most` : departs;
   const make = async () => {
-    // Wait for edits under way, and for those that come meanwhile: the variation must include them.
+    // Wait for edits under way, and for any made meanwhile: the variation must include them.
     for (let changed; changed !== studio.api.changed; ) {
       ({ changed } = studio.api);
       await changed;
