@@ -1,4 +1,4 @@
-"""Gathers recordings and other corpora into a corpus: repairs them, resamples them, mirrors them."""
+"""Gather recordings and other corpora into a corpus: repair, resample and mirror them."""
 
 from __future__ import annotations
 
@@ -87,45 +87,45 @@ def gather(
     performer: str | Mapping[str, str] = "",
     workshop: Workshop | None = None,
 ) -> Corpus:
-    """Gather `motions`, and the corpora to `mix` with them, into a corpus; all are on the same joints.
+    """Gather `motions`, and the corpora to `mix` with them, into one corpus; all must have the same joints.
 
     Args:
         name: the corpus's name.
-        motions: the recordings, named; repeated names are numbered. Those that were taken before
-            (`motionmind.corpus.recordings.take`, with the same options) stay as they are.
+        motions: the named recordings; repeated names are numbered. A `Recording`, which
+            `motionmind.corpus.recordings.take` returned for the same options, is used as it is.
         rate: postures per second; None keeps every frame with its own time. "auto" takes 5 postures a second of a
-            recording, which a log entry says (logger "motionmind.corpus.remarks", level INFO), and every frame of
-            keyframes: of a motion that says so, and of one with fewer than 15 frames a second. Corpora that are mixed
-            in are then brought to the recordings' rate, or where there are none to the lowest rate that any has.
-        skip: frames to drop at each recording's start, such as an added T-pose; a log entry says where most begin with
-            one, and none are dropped.
+            recording, and logs it (logger "motionmind.corpus.remarks", level INFO). It takes every frame of keyframes:
+            a motion marked as keyframed, or one with fewer than 15 frames a second. It resamples corpora mixed in at
+            the recordings' rate, or without recordings at the lowest rate of these corpora.
+        skip: frames to drop at each recording's start, such as an added T-pose. If it is 0 and most recordings begin
+            with such a pose, a log entry says so.
         facing: "free" removes the turn about the vertical from the root's state and makes it a joint chain of its own;
-            "stage" leaves it there, and facing the wall is then another state than facing the audience.
-        flips: treatment of a recording with flips (`find_flips`): `repair` mends them (`repair_flips`), and cuts the
-            recording where it cannot, so no flip is learned; `keep` takes it unchanged, `drop` leaves it out.
+            "stage" leaves it there, so facing the wall and facing the audience are different states.
+        flips: treatment of a recording with flips (`find_flips`): "repair" mends them (`repair_flips`), or cuts the
+            recording there, so no flip is learned; "keep" takes it unchanged; "drop" leaves it out.
         flip_degrees: the turn in one frame that counts as a flip.
         mirror: whether to learn from the mirror images of all clips, too.
-        reverse: the price, in nats per move, of learning from all clips backwards, too: there each move counts
+        reverse: the price, in nats per move, of learning from all clips backwards, too: a move backwards counts
             exp(-price). None keeps the prices of corpora mixed in, and adds no others.
-        mix: other corpora, each with the count of its postures and moves relative to those of `motions`, which have 1.
-            Only ratios matter: the largest becomes 1. Their clips are taken unchanged, or resampled at `rate`; `skip`
-            and `flips` apply to the recordings only.
+        mix: other corpora, each with the weight of its postures and moves; `motions` have weight 1. Only ratios matter:
+            the largest becomes 1. Clips of these corpora are taken unchanged, or resampled at `rate`; `skip` and
+            `flips` apply to the recordings only.
         about: one-line descriptions of clips, by name.
         title: a one-line description of the corpus.
         author: who made it.
         source: where it comes from.
         licence: the licence for its use.
         citation: how to cite it.
-        performer: who performs the recordings: one for all, or each by the recording's name. Where it is not known, the
-            author is credited.
-        workshop: room for the corpus, where memory lacks it; None keeps it in memory.
+        performer: the performer of all recordings, or of each by its name. The author is credited for recordings
+            without a performer.
+        workshop: room on disk for a corpus that does not fit into memory; None keeps it in memory.
 
     Returns:
         The corpus.
 
     Warns:
-        MotionMindWarning: recordings contradict their clocks (`question_tempo`), or the licences of the corpora stand
-            against passing on what is made of them together (`motionmind.credits.licences`).
+        MotionMindWarning: recordings contradict their clocks (`question_tempo`), or the licences of the corpora do not
+            allow passing on a mixture of them (`motionmind.credits.licences`).
 
     Raises:
         CorpusError: nothing is left to learn from, recordings or corpora differ in their joints or cannot be brought to
@@ -243,17 +243,17 @@ def _check_mix(name: str, mix: Sequence[tuple[Corpus, float]], rate: float | Non
 def _common_rate(
     name: str, taken: float | None, has_own: bool, mix: Sequence[tuple[Corpus, float]], auto: bool
 ) -> float | None:
-    """Return the rate of recordings and of the corpora mixed with them.
+    """Return the common rate of recordings and of the corpora mixed with them.
 
     Args:
-        name: the name of what becomes of them.
-        taken: postures a second that were taken of recordings.
+        name: the name of the new corpus.
+        taken: postures a second taken of the recordings.
         has_own: whether there are recordings.
-        mix: the corpora, as of `gather`.
-        auto: whether corpora may be brought to another rate than theirs.
+        mix: the corpora, as for `gather`.
+        auto: whether corpora may be resampled.
 
     Raises:
-        CorpusError: the rates differ, and these stay as they are or cannot be brought to one.
+        CorpusError: the rates differ, and the corpora may not or cannot be resampled to one.
     """
     found: dict[float | None, str] = {taken: "the recordings"} if has_own else {}
     for mixed, _ in mix:
@@ -273,14 +273,14 @@ def _pace(rate: float | None) -> str:
     return "frame by frame" if rate is None else f"{rate:g} postures a second"
 
 
-# --- a corpus that grows ----------------------------------------------------------------------------------------------
+# --- a growing corpus -------------------------------------------------------------------------------------------------
 
 
 class _Growing:
-    """Clips of a corpus, one after the other, and their movement.
+    """A corpus under construction: its clips so far, one after the other, and their movement.
 
     Attributes:
-        clips: the clips, in their places.
+        clips: the clips, with their ranges in the corpus.
     """
 
     def __init__(self, workshop: Workshop) -> None:
@@ -300,7 +300,7 @@ class _Growing:
                 pile.add(getattr(piece, name))
 
     def extend(self, others: _Growing) -> None:
-        """Add all clips of others, which grow no more."""
+        """Add all clips of `others`, which must be complete."""
         if not others.clips:
             return
         rotations, root, times = (others.array(name) for name in ("rotations", "root", "times"))
@@ -314,7 +314,7 @@ class _Growing:
         return self._piles[name].array()
 
     def detail(self, between: int) -> NDArray[np.float16]:
-        """Return the detail of all postures [N, between, J, 3]; of keyframes, which have none, zeros."""
+        """Return the detail of all postures [N, between, J, 3]; zeros for keyframes."""
         pile, count = self._piles["detail"], self.clips[-1].stop
         if len(pile) == count and set(self._between) == {between}:
             return pile.array()
@@ -340,10 +340,10 @@ def _lay_out_clips(name: str, clips: Sequence[Clip], rate: float | None, reverse
 
 
 def _take_recordings(motions: Iterable[Motion | Recording], taking: Taking) -> Iterator[Recording]:
-    """Yield recordings, taken if they are not yet, with repeated names numbered; then warn of doubtful clocks.
+    """Yield the recordings, with repeated names numbered; take motions first. At the end warn of doubtful clocks.
 
     Raises:
-        CorpusError: they are on different joints, or there is nothing to take of one.
+        CorpusError: they are on different joints, or skipping leaves no frames of one.
         SkeletonError: the body cannot be mirrored.
     """
     first: Recording | None = None
@@ -371,12 +371,12 @@ def _take_recordings(motions: Iterable[Motion | Recording], taking: Taking) -> I
 
 
 def _name_in(other: Corpus, clip: Clip) -> tuple[str, str]:
-    """Return the name of the corpus that a clip of another corpus comes from, and its own."""
+    """Return the name of the corpus that a clip of `other` comes from, and the clip's own name."""
     return clip.corpus or other.name, clip.name
 
 
 def _mixed(other: Corpus, clip: Clip, weight: float, rate: float | None) -> Source:
-    """Take a clip of another corpus, marked with its name, counting `weight` times as much."""
+    """Take a clip of another corpus: record that corpus's name, and multiply the clip's weight by `weight`."""
     found = take_clip(other, clip, rate)
     return found._replace(clip=replace(clip, corpus=clip.corpus or other.name, weight=weight * clip.weight))
 

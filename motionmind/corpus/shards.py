@@ -1,11 +1,11 @@
-"""Files of movement taken as recordings by workers, who leave them as shards: a build that is broken off goes on there.
+"""Read motion files in worker processes and store the recordings as shards, so that an interrupted build can resume.
 
-A shard holds what `motionmind.corpus.recordings.take` made of one file. Its name is a hash of all that it depends on:
-the file's bytes and name, the options, and the package's code; and it lists the other files that were read for it (a
-skeleton, a score that is included), with their hashes. So a shard that is there is right, whoever wrote it, and workers
-pass on no more than its name. They and their client share the disk that it lies on.
+A shard holds what `motionmind.corpus.recordings.take` made of one file. Its name is a hash of everything that it
+depends on: the file's bytes and name, the options, and the package's code. It lists the other files that were read for
+it (a skeleton, an included score) with their hashes. So an existing shard is valid whichever process wrote it, and
+workers return only its name. Workers and client must share the disk.
 
-    shards/mine/3f/3f9a...npz      of the corpus "mine", until it is built
+    shards/mine/3f/3f9a...npz      for the corpus "mine", until it is built
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from motionmind.errors import CorpusError, MotionMindError, MotionMindWarning
 from motionmind.executors.team import Team, UnfinishedError
 from motionmind.files import make_folder, read_bytes, reads_recorded, replace_file
 
-_ONE_AT_A_TIME = threading.Lock()  # in a process: Python's list of warnings is one for all its threads
+_ONE_AT_A_TIME = threading.Lock()  # all threads of a process share Python's list of warnings
 
 
 @dataclass(frozen=True)
@@ -46,9 +46,9 @@ class Reading:
     """Options for reading and taking files.
 
     Attributes:
-        taking: what to take of them.
-        joints: the human23 joint of each of a file's; None recognises rigs by name.
-        unit, asf, fps, up: as `read_motion`.
+        taking: the options of `take`.
+        joints: {file's joint: human23's joint}; None recognises rigs by name.
+        unit, asf, fps, up: as for `read_motion`.
     """
 
     taking: Taking
@@ -64,10 +64,10 @@ class Job(NamedTuple):
 
     Attributes:
         file: its path.
-        name: its clip's name; a score names its own.
+        name: its clip's name; a score names its own clips.
         reading: the options.
-        folder: of the shards.
-        code: names the package's code (`code_name`).
+        folder: the shards' folder.
+        code: hash of the package's code (`code_name`).
     """
 
     file: Path
@@ -81,12 +81,12 @@ class Job(NamedTuple):
 
 
 class Taken(NamedTuple):
-    """A file that was taken, or could not be.
+    """The result of taking a file.
 
     Attributes:
         key: the shard's name; "" if there is none.
-        size: its bytes.
-        fault: why the file cannot be read or taken; "" if it was.
+        size: the shard's size, bytes.
+        fault: why the file cannot be read or taken; "" if it was taken.
         body: a hash of its joints' names and parents.
     """
 
@@ -97,7 +97,7 @@ class Taken(NamedTuple):
 
 
 class _RecordingEntry(msgspec.Struct, frozen=True):
-    """A recording without its arrays; attributes as in Recording, each clip from and to its place in the arrays."""
+    """A recording without its arrays: attributes as in Recording; each clip has its range in the arrays."""
 
     name: str
     body: BodyEntry
@@ -112,7 +112,7 @@ class _RecordingEntry(msgspec.Struct, frozen=True):
 
 
 class _Entry(msgspec.Struct, frozen=True):
-    """A shard without its arrays: the recordings, warnings about them, and the hashes of other files that were read."""
+    """A shard without its arrays: the recordings, warnings about them, and the hashes of the other files read."""
 
     recordings: tuple[_RecordingEntry, ...]
     warnings: tuple[str, ...]
@@ -124,9 +124,9 @@ class _Entry(msgspec.Struct, frozen=True):
 
 @contextmanager
 def shards_of(name: str, home: Path | None) -> Iterator[Path]:
-    """Hold the folder of a corpus's shards, until the context ends; then remove it, unless another build holds it.
+    """Hold the folder of a corpus's shards until the context ends; then remove it, unless another build holds it.
 
-    It stays where the work may go on: after Ctrl-C, a full disk, or the loss of workers; not after bad input.
+    It is kept after Ctrl-C, a full disk or the loss of workers, so that the build can resume, but not after bad input.
 
     Raises:
         CorpusError: it cannot be made.
@@ -151,7 +151,7 @@ def shards_of(name: str, home: Path | None) -> Iterator[Path]:
 
 
 def _remove(folder: Path, above: Sequence[Path]) -> None:
-    """Remove shards that nobody holds, and the folders above them that they leave empty."""
+    """Remove a folder of shards that no build holds, and the folders `above` it if they are empty."""
     versions.remove_unused(folder)
     with suppress(OSError):
         for one in above:
@@ -168,26 +168,26 @@ def take_files(
     on_taken: Callable[[Taken], None],
     on_odd: Callable[[str], None],
 ) -> Iterator[Recording]:
-    """Yield the recordings in files, in their order; workers take them first, all that are not taken yet.
+    """Have workers take all files without a shard; then yield the recordings in the order of the files.
 
-    Files on another skeleton than most, or than the first where two are as many, are left out.
+    Files on another skeleton than most are left out; of equally frequent skeletons the first counts.
 
     Args:
         names: the clip's name for each file.
         reading: the options.
-        folder: where the shards are and go.
+        folder: the shards' folder.
         team: the workers.
-        on_need: is called with the bytes that the corpus and its shards will need on disk, as soon as that is known:
-            when a file of each format was taken.
-        on_taken: is called for each file; what it raises ends the work.
-        on_odd: is called with what is wrong with each file that is on another skeleton; what it raises ends the work.
+        on_need: called once a file of each format was taken, with the estimated bytes of the corpus and its shards on
+            disk.
+        on_taken: called for each file; an exception from it ends the work.
+        on_odd: called with a message for each file on another skeleton; an exception from it ends the work.
 
     Warns:
-        MotionMindWarning: what readers warn of.
+        MotionMindWarning: warnings of the readers.
 
     Raises:
         CorpusError: no file can be read, the disk lacks space, or workers do not share it.
-        UnfinishedError: workers die of a file again and again, or are out of reach.
+        UnfinishedError: a file crashes workers again and again, or workers are out of reach.
     """
     code = code_name()
     jobs = [Job(file, name, reading, folder, code) for file, name in names.items()]
@@ -239,7 +239,7 @@ def _differs(job: Job, usual: Job, done: Mapping[Path, Taken]) -> str:
 def _needed(names: Mapping[Path, str], samples: Mapping[Path, Taken]) -> float:
     """Estimate the bytes on disk that all files need, from one of each format."""
     shares = {file.suffix.lower(): taken.size / max(_size(file), 1) for file, taken in samples.items()}
-    # 7 bytes for each of the shards': themselves, arrays to learn from, and what is learned
+    # 7 bytes per byte of shards: the shards, the corpus's arrays, and what is learned
     return 7.0 * sum(shares[file.suffix.lower()] * _size(file) for file in names)
 
 
@@ -248,7 +248,7 @@ def _size(file: Path) -> int:
 
 
 def _recordings(job: Job, taken: Taken) -> Iterator[Recording]:
-    """Read a shard, and warn of what it warns of."""
+    """Read a shard, and repeat its warnings."""
     recordings, said = _shard(job, taken)
     for text in said:
         warnings.warn(text, MotionMindWarning, stacklevel=2)
@@ -256,7 +256,7 @@ def _recordings(job: Job, taken: Taken) -> Iterator[Recording]:
 
 
 def _shard(job: Job, taken: Taken) -> tuple[list[Recording], tuple[str, ...]]:
-    """Read a shard, written anew if it was lost or damaged since."""
+    """Read a shard; if it was lost or damaged, write it again first."""
     found = _open(job, taken.key)
     if found is None:
         found = _open(job, take_file(job).key)
@@ -269,7 +269,7 @@ def _shard(job: Job, taken: Taken) -> tuple[list[Recording], tuple[str, ...]]:
 
 
 def take_file(job: Job) -> Taken:
-    """Take a file, unless its shard is there; return the shard's name, or why it cannot be taken.
+    """Take a file, unless its shard exists; return the shard's name, or why the file cannot be taken.
 
     Raises:
         UnfinishedError: the shard cannot be written.
@@ -292,7 +292,7 @@ def take_file(job: Job) -> Taken:
         path = _place(job.folder, key)
         try:
             if found is None:
-                read.pop(str(job.file.absolute()), None)  # formats from other packages may open it themselves
+                read.pop(str(job.file.absolute()), None)  # readers of other packages may open it themselves
                 make_folder(path.parent)
                 replace_file(path, _encode(recordings, said, read))
             first = (found[0] if found else recordings)[:1]
@@ -305,7 +305,7 @@ def take_file(job: Job) -> Taken:
 
 
 def _read(job: Job) -> Iterator[Motion]:
-    """Read the movement of a file, on human23 where its joints map to it."""
+    """Read the movement of a file; on human23 if its joints map to it."""
     from motionmind.body.motion import Insertion
     from motionmind.formats import read_motion
     from motionmind.formats.bvh import has_inserted_frames
@@ -320,7 +320,7 @@ def _read(job: Job) -> Iterator[Motion]:
     motion = read_motion(job.file, unit=options.unit, asf=options.asf, fps=options.fps, up=options.up)
     if len(motion) == 1:
         doubt = f"{job.file}: holds one posture, and no move to learn from"
-        if options.taking.skip:  # which would drop it
+        if options.taking.skip:  # it would drop the posture
             raise CorpusError(doubt)
         warnings.warn(doubt, MotionMindWarning, stacklevel=2)
     if job.file.suffix.lower() == ".bvh" and has_inserted_frames(job.file):
@@ -346,7 +346,7 @@ def _place(folder: Path, key: str) -> Path:
 
 
 def _encode(recordings: Sequence[Recording], said: tuple[str, ...], read: dict[str, str]) -> bytes:
-    """Return a shard: recordings, warnings about them, and the hashes of other files that were read."""
+    """Encode a shard: recordings, warnings about them, and the hashes of the other files read."""
     arrays: dict[str, Any] = {}
     entries = []
     for number, one in enumerate(recordings):
@@ -370,7 +370,7 @@ def _encode(recordings: Sequence[Recording], said: tuple[str, ...], read: dict[s
 
 
 def _open(job: Job, key: str) -> tuple[list[Recording], tuple[str, ...]] | None:
-    """Return a shard's recordings and warnings; None if it is not there, is damaged, or another file has changed."""
+    """Return a shard's recordings and warnings; None if it is missing or damaged, or another file has changed."""
     try:
         with np.load(io.BytesIO(_place(job.folder, key).read_bytes()), allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
