@@ -2,9 +2,9 @@
 
     learned/3f9a...-c0de.../manifest.json, *.npy
 
-A folder's name is a hash of a corpus, whatever its name, and of the code that learned from it: whatever changes either
-finds another folder, or none. A writer fills a hidden folder and renames it, so that a killed one leaves nothing that
-is found. Each array has a checksum. Nothing here is ever needed: what is missing or damaged is learned again.
+A folder's name combines a hash of the corpus, without its name, and a hash of the code that learned from it, so a
+change of either leads to another folder. A writer fills a hidden folder and renames it, so readers never find the
+folder of a killed writer. Each array has a checksum. Missing or damaged arrays are learned again.
 """
 
 from __future__ import annotations
@@ -38,19 +38,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _MANIFEST = "manifest.json"
-_UNFINISHED_S, _UNUSED_S = 86_400.0, 60 * 86_400.0  # after which a folder is removed
+_UNFINISHED_S, _UNUSED_S = 86_400.0, 60 * 86_400.0  # a folder without change for this long is removed
 
 
 def cache_folder(room: str) -> Path:
-    """Return one of the folders in the user's cache: "corpora" (bundled ones, compiled), "learned" or "archives"."""
+    """Return a folder of the user's cache: "corpora" (compiled bundled corpora), "learned" or "archives"."""
     return Path(platformdirs.user_cache_dir("motionmind", appauthor=False)) / room
 
 
 def recall(corpus: str) -> dict[str, NDArray[Any]] | None:
-    """Return the arrays that this code learned from a corpus, by its hash; None if they are not kept, or damaged.
+    """Return the arrays that this code learned from a corpus, by its hash; None if they are missing or damaged.
 
     Warns:
-        MotionMindWarning: they are damaged, and will be learned again.
+        MotionMindWarning: they are damaged; the corpus will be learned again.
     """
     folder = _folder(corpus)
     try:
@@ -76,7 +76,7 @@ def recall(corpus: str) -> dict[str, NDArray[Any]] | None:
 
 
 def remember(corpus: str, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Keep what this code learned from a corpus, by its hash; what is kept already stays.
+    """Store the arrays that this code learned from a corpus, by its hash, unless they are stored already.
 
     Warns:
         MotionMindWarning: the cache cannot be written.
@@ -88,7 +88,7 @@ def remember(corpus: str, arrays: Mapping[str, NDArray[Any]]) -> None:
         _remove_unused(folder.parent)
         try:
             unfinished.mkdir()
-            entries = write_arrays(unfinished, arrays, flush=False)  # a checksum shows what a power cut did
+            entries = write_arrays(unfinished, arrays, flush=False)  # a checksum detects damage by a power cut
             (unfinished / _MANIFEST).write_bytes(msgspec.json.encode(entries))
             unfinished.rename(folder)
         finally:
@@ -100,7 +100,7 @@ def remember(corpus: str, arrays: Mapping[str, NDArray[Any]]) -> None:
 
 
 def forget(corpus: str) -> None:
-    """Remove what any code learned from a corpus, by its hash, as far as that can be done."""
+    """Remove all arrays learned from a corpus, by its hash, by any version of the code; ignore errors."""
     for folder in cache_folder("learned").glob(f"{corpus}-*"):
         _remove(folder)
 
@@ -118,7 +118,7 @@ def _folder(corpus: str) -> Path:
 
 
 def _remove(folder: Path) -> None:
-    """Remove a folder, at once for those who look for it."""
+    """Remove a folder atomically: move it aside first; ignore errors."""
     aside = folder.with_name(f".{secrets.token_hex(8)}")
     with suppress(OSError):
         folder.rename(aside)
@@ -126,7 +126,7 @@ def _remove(folder: Path) -> None:
 
 
 def _remove_unused(parent: Path) -> None:
-    """Remove what killed writers left, and folders that nothing has used for two months."""
+    """Remove folders of killed writers, and folders unused for two months."""
     for entry in parent.iterdir():
         with suppress(OSError):
             limit = _UNFINISHED_S if entry.name.startswith(".") else _UNUSED_S

@@ -1,7 +1,7 @@
-"""Clips and faults of a corpus on disk: an entry for each, read when it is asked for, and columns beside them.
+"""Clips and faults of a corpus on disk: one entry each, decoded on access, and columns beside them.
 
-A corpus of a hundred hours has tens of thousands of clips. Loading it reads none of them: all that a tween asks of
-every clip is where it starts and what it counts, and that is in the columns.
+A corpus of a hundred hours has tens of thousands of clips. Loading it decodes none of them: a tween needs only the
+start and the weight of every clip, and the columns hold these.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ class Packed(NamedTuple):
     """A line of JSON for each of n entries.
 
     Attributes:
-        text: the lines, one after the other [B], UTF-8.
-        lines: where each begins [n + 1], and the end.
+        text: the lines, one after the other, as UTF-8 [B].
+        lines: start of each line, then the end of the text [n + 1].
     """
 
     text: Bytes
@@ -38,11 +38,11 @@ class Packed(NamedTuple):
 
 
 class Entries(Sequence[_Kind]):
-    """Packed entries, each of which is read when it is asked for.
+    """Packed entries, decoded on access.
 
     Args:
         packed: the entries.
-        kind: the type of each.
+        kind: the type of an entry.
     """
 
     def __init__(self, packed: Packed, kind: type[_Kind]) -> None:
@@ -63,9 +63,9 @@ class Entries(Sequence[_Kind]):
         numbers = range(len(self))[index]
         if not isinstance(numbers, int):
             return tuple(map(self._read, numbers))
-        kept = self._lately  # another thread may begin a new one
+        kept = self._lately  # another thread may replace it
         if numbers not in kept:
-            if len(kept) >= 4096:  # one tween asks for the same ones hundreds of times
+            if len(kept) >= 4096:  # a tween reads the same entries hundreds of times
                 kept = self._lately = {}
             kept[numbers] = self._read(numbers)
         return kept[numbers]
@@ -86,9 +86,9 @@ class Columns(NamedTuple):
     """Columns of C clips.
 
     Attributes:
-        starts: first posture of each [C + 1], and the number of postures.
-        weights: counts of each of its moves forwards and backwards [C, 2]; 0 if it is not learned backwards.
-        order: the clips, by the corpus that they were taken from and by name [C].
+        starts: first posture of each clip, then the number of postures [C + 1].
+        weights: weight of each of its moves forwards and backwards [C, 2]; 0 if it is not learned backwards.
+        order: the clips, sorted by the corpus that they come from and by name [C].
     """
 
     starts: Ints
@@ -106,7 +106,7 @@ class Columns(NamedTuple):
 
 
 def key_of(clip: Clip) -> tuple[str, str]:
-    """Return what clips are ordered by."""
+    """Return the sort key of a clip."""
     return clip.corpus, clip.name
 
 
@@ -115,7 +115,7 @@ class StoredClips(Entries[Clip]):
 
     Args:
         packed: their entries.
-        columns: their columns, which agree with the entries.
+        columns: their columns, consistent with the entries.
     """
 
     def __init__(self, packed: Packed, columns: Columns) -> None:

@@ -1,12 +1,12 @@
-"""Finds where a joint of a recording jumps, and repairs it.
+"""Find frames at which a joint of a recording jumps, and repair them.
 
-Motion capture fits a skeleton to markers frame by frame. Where several orientations fit almost as well, the fit may
-jump to another one and, some frames later, back: the knee of a raised leg swings to the other side of the line from hip
+Motion capture fits a skeleton to markers frame by frame. If several orientations fit almost equally well, the fit may
+jump to another one and, some frames later, back. The knee of a raised leg swings to the other side of the line from hip
 to ankle, or a hand or foot turns over. Such a *flip* is repaired in one of two ways:
 
-- it is *put back* exactly where it is a half turn about the line from the joint to its child or to its child's child,
-  whose place it does not change: a second half turn about the same line undoes it;
-- otherwise the joint is *reconstructed*: interpolated over the frames between flips that follow each other closely.
+- It is *put back* exactly if it is a half turn about the line from the joint to its child or grandchild. Such a turn
+  does not move the child or grandchild, and a second half turn about the same line undoes it.
+- Otherwise the joint is *reconstructed*: interpolated over the frames between flips that follow each other closely.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from motionmind.geometry import rotations as rot
 
 
 class _Jump(NamedTuple):
-    """A flip and the quick turns around it: the frame before them, and the frame after them."""
+    """A flip with the quick turns around it: the frame before them, and the frame after them."""
 
     before: int
     after: int
@@ -56,7 +56,7 @@ class Mended(NamedTuple):
 
     Attributes:
         motion: the recording as it is now.
-        flips: the flips that it had, with what became of each.
+        flips: the flips that it had, each with its repair.
         repairs: the frames that were changed.
     """
 
@@ -68,11 +68,11 @@ class Mended(NamedTuple):
 def repair_flips(motion: Motion, degrees: float = FLIP_DEGREES) -> Mended:
     """Repair the flips of a recording, as this module's docstring describes.
 
-    Flips remain where a joint jumps to and fro for more than a second.
+    Flips remain if a joint jumps back and forth for more than a second.
 
     Args:
         motion: the recording.
-        degrees: the turn between two frames that counts as a flip, as of `find_flips`.
+        degrees: the turn between two frames that counts as a flip, as for `find_flips`.
     """
     flips = find_flips(motion, degrees)
     rotations = motion.rotations.copy()
@@ -90,9 +90,9 @@ def repair_flips(motion: Motion, degrees: float = FLIP_DEGREES) -> Mended:
 
 
 def _what_became_of(flip: JointFlip, repairs: list[JointRepair]) -> Repair:
-    """Return which repair a flip had: the last of those that change a frame beside it.
+    """Return a flip's repair: the last repair that changes a frame beside it.
 
-    A half turn that took some frames is put back, though those frames themselves are not.
+    A flip that takes several frames counts as put back, although these frames are interpolated.
     """
     own = [one for one in repairs if one.joint == flip.joint]
     mended = [one for one in own if one.start <= flip.frame <= one.stop]
@@ -115,9 +115,9 @@ def _is_quick(motion: Motion, turned: Floats, degrees: float, share: float) -> B
 
 
 def _jumps(motion: Motion, degrees: float) -> Iterator[tuple[int, list[_Jump]]]:
-    """Yield each joint that flips, with its jumps in order of time: flips without a pause between them are one."""
+    """Yield each joint that flips, with its jumps in order of time; flips without a pause between them are one jump."""
     turned = _turned(motion)
-    flips, quick = (_is_quick(motion, turned, degrees, share) for share in (1.0, 0.25))  # 0.25: frames around a flip
+    flips, quick = (_is_quick(motion, turned, degrees, share) for share in (1.0, 0.25))  # 0.25: around a flip
     for joint in np.flatnonzero(flips.any(axis=0)):
         edges = np.diff(np.concatenate([[0], quick[:, joint], [0]]).astype(int))
         runs = zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True)
@@ -128,11 +128,11 @@ def _jumps(motion: Motion, degrees: float) -> Iterator[tuple[int, list[_Jump]]]:
 
 
 def _put_back(motion: Motion, joint: int, jumps: list[_Jump], tolerance: float) -> tuple[Floats, list[JointRepair]]:
-    """Undo half turns of a joint between its jumps, and interpolate over the jumps of which nothing is left then.
+    """Undo half turns of a joint between its jumps, and interpolate over each jump that this removes.
 
-    Of all ways to turn some of the stretches between jumps, take one that leaves the fewest jumps, with as few turns as
-    that allows. A stretch may be turned only if that brings the joint nearer to its rest orientation: a jump shows that
-    one side of it is wrong, but not which.
+    Choose the stretches to turn so that the fewest jumps are left, then so that the fewest stretches are turned. Turn a
+    stretch only if that brings the joint nearer to its rest orientation: a jump shows that one side of it is wrong, but
+    not which.
 
     Args:
         motion: the recording.
@@ -167,9 +167,9 @@ def _put_back(motion: Motion, joint: int, jumps: list[_Jump], tolerance: float) 
 
 
 def _half_turns(motion: Motion, joint: int) -> Iterator[Floats]:
-    """Yield half turns of a joint [T, 4] in its own frame that keep a place below it: its child's, its child's child's.
+    """Yield the half turns of a joint [T, 4], in its own frame, that do not move its child, then its grandchild.
 
-    Where the limb ends the tip counts as a child.
+    At the end of a limb the tip counts as the child.
     """
     skeleton = motion.skeleton
     place, turned, at = np.zeros(3), np.broadcast_to(rot.IDENTITY, (len(motion), 4)), joint
@@ -191,12 +191,12 @@ def _repair(motion: Motion, joint: int, start: int, stop: int, *, exact: bool) -
 
 
 def _angles(a: Floats, b: Floats) -> Floats:
-    """Return the angles [K, K], degrees, between each of some rotations [K, 4] and each of others."""
+    """Return the angles [K, K], degrees, between all pairs of rotations `a` and `b` [K, 4]."""
     return np.asarray(np.degrees(rot.angle(a[:, None], b[None, :])))
 
 
 def _cheapest_path(prices: Floats, left: list[Bools]) -> list[int]:
-    """Choose one of K ways for each of S stretches, with the least sum of prices [S, K] and of jumps left [K, K]."""
+    """Choose one of K turns for each of S stretches, with the least sum of prices [S, K] and of jumps left [K, K]."""
     cost, came_from = prices[0], []
     for price, step in zip(prices[1:], left, strict=True):
         through = cost[:, None] + step
@@ -212,9 +212,10 @@ def _cheapest_path(prices: Floats, left: list[Bools]) -> list[int]:
 
 
 def _faults(motion: Motion, degrees: float) -> Iterator[tuple[int, _Jump]]:
-    """Yield joints with stretches in which they jump, by joint and time: jumps that follow each other closely are one.
+    """Yield joints with the stretches in which they jump, by joint and time; jumps close in time are merged.
 
-    A joint whose parent or child flips, and that jumps by half as much in the same frame, makes up for the flip.
+    A joint that turns by more than half of `degrees` in a frame in which its parent or child flips compensates for that
+    flip, so it is faulty there, too.
     """
     turned = _turned(motion)
     flips = _is_quick(motion, turned, degrees, 1.0)
@@ -242,9 +243,9 @@ def _neighbours(skeleton: Skeleton, joint: int) -> list[int]:
 
 
 def _reconstruct(motion: Motion, own: Floats, joint: int, fault: _Jump) -> tuple[Floats, list[JointRepair]]:
-    """Interpolate a joint's rotations `own` [T, 4] over a fault, from and to frames so far apart that it goes credibly.
+    """Interpolate a joint's rotations `own` [T, 4] over a fault, widened until the joint turns at a credible speed.
 
-    At the recording's own ends, where there is nothing beyond the fault, the joint is held still.
+    At an end of the recording, with nothing beyond the fault, hold the joint still.
     """
     times, before, after = motion.times, fault.before, fault.after
     while _seconds_between(own, before, after) > times[after] - times[before] and before > 0 and after < len(own) - 1:
@@ -264,12 +265,12 @@ def _reconstruct(motion: Motion, own: Floats, joint: int, fault: _Jump) -> tuple
 
 
 def _seconds_between(own: Floats, before: int, after: int) -> float:
-    """Return how long a joint takes, at a credible speed, from one of its rotations [T, 4] to another."""
+    """Return the seconds that a joint needs, at a credible speed, from one of its rotations [T, 4] to another."""
     return float(np.degrees(rot.angle(own[before], own[after]))) / 720.0  # degrees a second
 
 
 def _interpolate(times: Floats, own: Floats, gap: _Jump) -> None:
-    """Take rotations `own` [T, 4] evenly from the frame before a gap to the frame after it, in place."""
+    """Interpolate rotations `own` [T, 4] in place, from the frame before a gap to the frame after it."""
     inner = slice(gap.before + 1, gap.after)
     share = (times[inner] - times[gap.before]) / (times[gap.after] - times[gap.before])
     own[inner] = rot.normalise(rot.slerp(own[gap.before], own[gap.after], share))

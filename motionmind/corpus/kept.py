@@ -1,4 +1,4 @@
-"""The clips that a corpus has in common with an earlier state of it: what was measured of them need not be again."""
+"""Find the clips that a corpus shares with an earlier state of it, whose measurements can be reused."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ MOVEMENT = ("rotations", "root", "times", "detail")
 
 
 class Run(NamedTuple):
-    """Entries that follow one another in two arrays.
+    """A contiguous range of entries to copy from one array to another.
 
     Attributes:
-        is_new: whether they are of new clips, and not of those that are kept.
-        source: their places in the array of these clips.
-        target: their places in that of the whole corpus.
+        is_new: whether the entries belong to new clips, not to kept ones.
+        source: their range in the array of the new clips, or of the earlier corpus.
+        target: their range in the array of the whole corpus.
     """
 
     is_new: bool
@@ -35,12 +35,12 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """The C clips of a corpus that an earlier one has, too, and those that are new in it.
+    """The C clips of a corpus, split into kept clips, which an earlier corpus also has, and new ones.
 
     Attributes:
         corpus: the corpus.
-        before: the earlier one; None if all clips are new.
-        numbers: number of each clip in the earlier one, or -1 [C].
+        before: the earlier corpus; None if all clips are new.
+        numbers: index of each clip in the earlier corpus, or -1 [C].
         new: a corpus of the new clips alone, in their order; None if there are none.
     """
 
@@ -51,19 +51,19 @@ class Kept:
 
     @classmethod
     def none(cls, corpus: Corpus) -> Kept:
-        """Return that all of a corpus is new."""
+        """Return a corpus with all clips new."""
         return cls(corpus, None, np.full(len(corpus.clips), -1), corpus)
 
     @classmethod
     def find(cls, corpus: Corpus, before: Corpus, workshop: Workshop | None = None) -> Kept:
         """Find the clips of an earlier corpus in one of another, on the same joints.
 
-        A clip is kept if it is the same in name, repairs and movement, to the last bit, whatever its weight; none is
-        where the body is of another size, or its facing is treated in another way.
+        A clip is kept if its name, repairs and movement are the same, to the last bit; its weight may differ. No clip
+        is kept if the body has another size, or the corpus another `facing`.
 
         Args:
             corpus: the corpus.
-            before: the earlier one.
+            before: the earlier corpus.
             workshop: room for the movement of the new clips; None for memory.
         """
         if corpus.facing != before.facing or not _is_same_body(corpus.skeleton, before.skeleton):
@@ -81,30 +81,30 @@ class Kept:
 
     @cached_property
     def places(self) -> Ints:
-        """Number of each clip in the earlier corpus, or else among the new clips [C]."""
+        """Index of each clip in the earlier corpus, or of a new clip among the new clips [C]."""
         is_new = self.numbers < 0
         return np.where(is_new, np.cumsum(is_new) - 1, self.numbers)
 
     @cached_property
     def postures(self) -> list[Run]:
-        """Where the postures of the clips are."""
+        """The ranges of the clips' postures."""
         old, new = self.before, self.new
         return self.runs(old.columns.starts if old else None, new.columns.starts if new else None)
 
     @cached_property
     def moves(self) -> list[Run]:
-        """Where the moves of the clips are: all that lead forwards, then all that lead backwards."""
+        """The ranges of the clips' moves: all moves forwards, then all moves backwards."""
         old, new = self.before, self.new
         return self.runs(old.moves.firsts if old else None, new.moves.firsts if new else None, rounds=2)
 
     def runs(self, old: Ints | None, new: Ints | None, rounds: int = 1) -> list[Run]:
-        """Return where the entries of the clips are, in arrays that go through all clips once or more times.
+        """Return the ranges of the clips' entries, in arrays that list all clips once or more times.
 
         Args:
-            old: the first entry of each clip in each round, and the number of entries, of the earlier corpus
-                [rounds * C + 1].
-            new: the same of the new clips.
-            rounds: how often all clips come.
+            old: first entry of each clip in each round, then the number of entries, in the array of the earlier corpus
+                [rounds * its clips + 1].
+            new: the same for the new clips.
+            rounds: number of times that the arrays list all clips.
         """
         is_new, bounds = np.tile(self.numbers < 0, rounds), np.zeros((2, rounds * len(self.numbers)), dtype=np.int64)
         for firsts, chosen in ((old, ~is_new), (new, is_new)):
@@ -121,7 +121,7 @@ class Kept:
         ]
 
     def join(self, old: NDArray[Any] | None, new: NDArray[Any] | None, runs: list[Run], out: NDArray[Any]) -> None:
-        """Write an array of the corpus, from that of the earlier one and that of the new clips where there are such."""
+        """Write an array of the corpus, `out`, from the arrays of the earlier corpus and of the new clips, if given."""
         for is_new, source, target in runs:
             if (whole := new if is_new else old) is not None:
                 out[target] = whole[source]
@@ -138,7 +138,7 @@ def _is_same_body(one: Skeleton, other: Skeleton) -> bool:
 
 
 def _is_same(one: Corpus, clip: Clip, other: Corpus, known: Clip) -> bool:
-    """Return whether two clips of two corpora are the same but for their place and weight."""
+    """Return whether two clips of two corpora are the same, apart from their range and weight."""
     if replace(clip, start=known.start, stop=known.stop, weight=known.weight) != known or len(clip) != len(known):
         return False
     here, there = slice(clip.start, clip.stop), slice(known.start, known.stop)

@@ -1,4 +1,4 @@
-"""Taking recordings as the clips of a corpus, each by itself: repaired, cut at faults, resampled, mirrored."""
+"""Turn single recordings into clips of a corpus: repair them, cut them at faults, resample and mirror them."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from motionmind.geometry.splines import rotation_spline
 Flips = Literal["drop", "keep", "repair"]
 Rate = float | Literal["auto"] | None
 
-POSTURE_RATE_FPS = 5.0  # of a recording, unless another rate is given: [O10]'s choice for motion capture
-FLOOR_OFFSET_M = 0.03  # above which a recording's floor is reported
+POSTURE_RATE_FPS = 5.0  # default for recordings, as [O10] chose for motion capture
+FLOOR_OFFSET_M = 0.03  # a floor farther from 0 is reported
 _DETAIL_MIN_FPS = 20.0  # a slower recording has no detail to keep
 
 
@@ -64,18 +64,18 @@ class Piece(NamedTuple):
 
 
 class Recording(NamedTuple):
-    """A recording without its faults, as it was taken.
+    """The result of taking a recording: its repaired pieces, and what was found in it.
 
     Attributes:
         name: its name; "" if it has none.
         body: its skeleton.
-        rate: postures a second that were taken of it; None if every frame was, or none.
-        doubt: contradicts its clock, if it does (`question_tempo`); else "".
-        faults: the faults.
+        rate: postures taken a second; None if every frame was taken, or none.
+        doubt: why its clock is doubtful (`question_tempo`); "" if it is not.
+        faults: its flips.
         pieces: its unbroken parts; none if it is left out.
-        images: their mirror images, if they are wanted.
-        added: frames of one posture before the movement, as of `added_frames`, after those that are skipped.
-        floor: height of the floor that its feet stand on (`find_floor`), metres; 0 of keyframes.
+        images: their mirror images, if requested.
+        added: number of frames of one posture before the movement (`added_frames`), after the skipped frames.
+        floor: height of the floor that its feet stand on (`find_floor`), metres; 0 for keyframes.
         is_made: whether the engine made some of it.
     """
 
@@ -92,7 +92,7 @@ class Recording(NamedTuple):
 
 
 class Source(NamedTuple):
-    """A clip as it is taken from: its postures, as much of its recording as detail is taken from, its attributes."""
+    """The material of a clip: its postures, the part of its recording that gives the detail, and its attributes."""
 
     postures: Motion
     recording: Motion
@@ -142,14 +142,14 @@ def take(recording: Motion, taking: Taking) -> Recording:
 
 def floor_of(motion: Motion) -> float:
     """Return the height of the floor that feet stand on in a recording, metres, as of `find_floor` with heels."""
-    some = slice(None, None, -(-len(motion) // 500))  # of 500 frames at most
+    some = slice(None, None, -(-len(motion) // 500))  # 500 frames at most
     return find_floor(motion.skeleton, motion.rotations[some], motion.root[some], heels=True)
 
 
 def added_frames(recording: Motion) -> int:
-    """Return how many frames of one posture were added before the movement, such as a T-pose; 0 if none were.
+    """Return the number of frames of one added posture before the movement, such as a T-pose.
 
-    Nothing moves in them, and then several joints jump at once.
+    Nothing moves in these frames; then several joints jump at once.
     """
     if recording.keyframed or recording.fps < FILM_RATE:
         return 0
@@ -163,13 +163,13 @@ def added_frames(recording: Motion) -> int:
 
 
 def usually_added(taken: Sequence[Recording]) -> int:
-    """Return how many frames were added before most recordings, as of `added_frames`; 0 if to most none were."""
+    """Return the most common `added_frames` of recordings; 0 unless most recordings have some."""
     found = Counter(one.added for one in taken if one.added)
     return found.most_common(1)[0][0] if 2 * found.total() > len(taken) else 0
 
 
 def renamed(taken: Recording, name: str) -> Recording:
-    """Return a recording under another name, with those of its pieces, which begin with it."""
+    """Return a recording under another name; the names of its pieces, which begin with the old one, change too."""
     if name == taken.name:
         return taken
 
@@ -205,23 +205,23 @@ def mirror_image(source: Source, between: int) -> Piece:
 
 
 def frames_between(rate: float | None) -> int:
-    """Return how many frames of detail there are between two postures."""
+    """Return the number of frames of detail between two postures."""
     return max(round(30.0 / rate) - 1, 0) if rate else 0
 
 
 def posture_rate(motion: Motion) -> float | None:
-    """Return how many postures a second to take of a motion; None for every frame, of keyframes."""
+    """Return the postures a second to take of a motion; None, every frame, for keyframes."""
     return None if motion.keyframed or motion.fps < FILM_RATE else POSTURE_RATE_FPS
 
 
-# --- inside -----------------------------------------------------------------------------------------------------------
+# --- helpers ----------------------------------------------------------------------------------------------------------
 
 
 def _detail(postures: Motion, recording: Motion, between: int) -> NDArray[np.float16]:
     """Return a recording's departures from the spline through its postures [N, between, J, 3], rotation vectors.
 
-    They are 0 after the last posture, where each frame is a posture, and for a joint in a move in which it departs by
-    more than 30 degrees.
+    They are 0 after the last posture, if each frame is a posture, and for a joint throughout a move in which it departs
+    by more than 30 degrees.
     """
     count, joints = len(postures), len(postures.skeleton)
     out = np.zeros((count, between, joints, 3), np.float16)
@@ -241,7 +241,7 @@ def _cut(
 ) -> list[Source]:
     """Cut a recording before the frames `cuts`, and take its parts' postures; `whole` is its clip.
 
-    Parts are numbered; those that begin at `dropped` frames are left out, and those of a single posture, which have no
+    Parts are numbered. Leave out parts that begin at `dropped` frames, and parts of a single posture: they have no
     move.
     """
     parts = [motion.slice(a, b) for a, b in pairwise([0, *cuts, len(motion)]) if a not in dropped]
@@ -258,7 +258,7 @@ def _cut(
 
 
 def _with_detail(postures: Motion, part: Motion, rate: float | None) -> Motion:
-    """Return as much of a part of a recording as detail is taken from: hours of it would fill the memory."""
+    """Return a part of a recording at the times of its detail only: hours of recording would fill the memory."""
     between = frames_between(rate)
     if between == 0 or len(postures) == 1 or part.fps < _DETAIL_MIN_FPS:
         return postures
@@ -266,12 +266,12 @@ def _with_detail(postures: Motion, part: Motion, rate: float | None) -> Motion:
 
 
 def _later(repairs: Iterable[JointRepair], frames: int) -> tuple[JointRepair, ...]:
-    """Return the same repairs, numbered from so many frames before."""
+    """Return the repairs with their frame numbers increased by `frames`."""
     return tuple(replace(one, start=one.start + frames, stop=one.stop + frames) for one in repairs)
 
 
 def _mirrored_clip(clip: Clip, postures: Motion, partners: Ints) -> Clip:
-    """Return a clip with left and right exchanged; `partners` are the joints' on the other side [J]."""
+    """Return a clip with left and right exchanged, given each joint's partner on the other side [J]."""
     names = postures.skeleton.names
     opposite = {name: names[partner] for name, partner in zip(names, partners, strict=True)}
     repairs = tuple(replace(repair, joint=opposite[repair.joint]) for repair in clip.repairs)

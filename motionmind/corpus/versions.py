@@ -1,10 +1,10 @@
-"""Folders whose content is replaced at once: each version has a folder of its own, and one file names the current one.
+"""Replace a folder's content atomically: each version has its own subfolder, and one file names the current version.
 
     corpora/mine/manifest.json     the current version, in "folder": 3
     corpora/mine/3/*.npy           its arrays
 
-To replace it, a writer makes folder 4, fills and flushes it, and moves a new manifest over the old one: up to that
-call readers find version 3, from then on version 4. Readers and writers of a version lock its folder; the lock ends
+To replace version 3, a writer makes folder 4, fills and flushes it, and moves a new manifest over the old one. Readers
+find version 3 before that move and version 4 after it. Readers and writers of a version lock its folder; the lock ends
 with the process, and cleaning removes versions without locks.
 """
 
@@ -27,12 +27,12 @@ from motionmind.files import TEMPORARY, sync_folder
 if sys.platform != "win32":
     import fcntl
 
-_UNUSED_S = 3600.0  # time without change after which a folder that cannot be locked counts as unused
+_UNUSED_S = 3600.0  # a folder without locks that has not changed for this long counts as unused
 
 
 @contextmanager
 def hold(version: Path) -> Iterator[bool]:
-    """Keep a version from being removed until the context ends; yield whether it is there."""
+    """Prevent the removal of a version until the context ends; yield whether the version exists."""
     with ExitStack() as stack:
         try:
             there = stack.enter_context(locked(version, alone=False))
@@ -43,7 +43,7 @@ def hold(version: Path) -> Iterator[bool]:
 
 @contextmanager
 def new_version(folder: Path) -> Iterator[Path]:
-    """Make a folder for the next version of `folder`, and hold it alone."""
+    """Make a folder for the next version of `folder`, and hold an exclusive lock on it."""
     numbers = [int(entry.name) for entry in folder.iterdir() if _is_version(entry)]
     for number in count(max(numbers, default=0) + 1):
         version = folder / str(number)
@@ -51,7 +51,7 @@ def new_version(folder: Path) -> Iterator[Path]:
             try:
                 version.mkdir()
                 mine = stack.enter_context(locked(version, alone=True, is_new=True))
-            except (FileExistsError, FileNotFoundError):  # another writer's; or taken for a leftover
+            except (FileExistsError, FileNotFoundError):  # another writer made it, or removed it as a leftover
                 continue
             # Another writer may have removed it as a leftover, and made and locked it anew.
             if mine:
@@ -60,7 +60,7 @@ def new_version(folder: Path) -> Iterator[Path]:
 
 
 def remove_others(folder: Path, current: Callable[[], Path | None]) -> None:
-    """Remove all versions of `folder` but the current one and those that are held, as far as that can be done.
+    """Remove all versions of `folder` except the current one and locked ones; ignore errors.
 
     Args:
         folder: the folder.
@@ -81,7 +81,7 @@ def remove(folder: Path) -> None:
     """Remove a folder with all its versions at once: move it to a hidden name first.
 
     Raises:
-        OSError: it cannot be moved. Files that cannot be removed then are removed with the next version of its name.
+        OSError: it cannot be moved. `remove_leftovers` removes files that cannot be removed after the move.
     """
     aside = folder.with_name(f".{folder.name}-{secrets.token_hex(6)}")
     folder.rename(aside)
@@ -90,14 +90,14 @@ def remove(folder: Path) -> None:
 
 
 def remove_unused(folder: Path) -> None:
-    """Remove a folder and its content unless it is locked, as far as that can be done."""
+    """Remove a folder and its content unless it is locked; ignore errors."""
     with suppress(OSError), locked(folder, alone=True) as unused:
         if unused:
             shutil.rmtree(folder, ignore_errors=True)
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove the folders to which killed processes moved `folder` to remove it."""
+    """Remove the folders that `remove` moved aside but did not delete, because its process was killed."""
     name = re.compile(rf"\.{re.escape(folder.name)}-[0-9a-f]{{12}}")
     for aside in filter(lambda entry: name.fullmatch(entry.name), folder.parent.iterdir()):
         if find_stranger(aside, "manifest.json") is None:
@@ -129,17 +129,18 @@ def _is_array(entry: Path) -> bool:
 
 @contextmanager
 def locked(folder: Path, *, alone: bool, is_new: bool = False) -> Iterator[bool]:
-    """Lock a folder until the context or the process ends: alone, or with others who do not lock it alone.
+    """Lock a folder, exclusively or shared, until the context or the process ends.
+
+    File systems without locks, and Windows, which cannot lock folders, take a folder to be unused, and so lockable
+    exclusively, if it has not changed for an hour. Windows does not remove open files in any case.
 
     Args:
-        folder: the folder, which is there.
-        alone: whether nobody else may lock it.
-        is_new: whether only those who lock it use it, so that where there are no locks it is taken to be unused.
+        folder: an existing folder.
+        alone: whether to lock it exclusively.
+        is_new: whether the caller has just made the folder, so that without locks it counts as unused.
 
     Yields:
-        Whether it is locked, and still in its place; alone only if nobody else has locked it. Where there are no locks,
-        a folder that has not changed for an hour is taken to be unused, and no other is removed; and Windows, which has
-        none on folders, removes no file that is open.
+        Whether it is locked and still in its place; False if another lock prevents that.
     """
     unused = time.time() - folder.stat().st_mtime > _UNUSED_S
     if sys.platform == "win32":
@@ -149,7 +150,7 @@ def locked(folder: Path, *, alone: bool, is_new: bool = False) -> Iterator[bool]
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB if alone else fcntl.LOCK_SH)
-            locked = _is_in_place(folder, descriptor)  # else it was removed since, and perhaps made anew
+            locked = _is_in_place(folder, descriptor)  # else another process removed it, and may have made it anew
         except BlockingIOError:
             locked = False
         except OSError:
@@ -160,7 +161,7 @@ def locked(folder: Path, *, alone: bool, is_new: bool = False) -> Iterator[bool]
 
 
 def _is_in_place(folder: Path, descriptor: int) -> bool:
-    """Whether an open folder is still the one of its name."""
+    """Return whether `folder` still names the open folder."""
     try:
         return os.path.samestat(folder.stat(), os.fstat(descriptor))
     except FileNotFoundError:
