@@ -24,26 +24,26 @@ from motionmind.learned.percentiles import Percentile
 from motionmind.learned.sampled import BLOCK_FRAMES
 from motionmind.learned.trust import PRIOR_TRUST, Trust
 
-FIRMNESS_HALVED_MPS = 0.3  # m/s: speed on the floor that halves a limb's firmness
-AIRBORNE_CLEARANCE_M = 0.06  # least clearance of a body in the air, metres; its lowest point must also move
-MIN_FIRMNESS = 0.5  # least firmness of a supporting limb
-RARE_POSTURE_SHARE = 0.01  # share of postures that may exceed the learned limb penetration or overhang
-DEFAULT_OVERHANG_M = 0.08  # metres of overhang, for a corpus that shows none
-MAX_OVERHANG_M = 0.15  # greatest overhang, metres: dancers who lean farther are moving
+FIRMNESS_HALVED_MPS = 0.3  # speed on the floor that halves a limb's firmness
+AIRBORNE_CLEARANCE_M = 0.06  # a body in the air is at least this high, and its lowest point moves
+MIN_FIRMNESS = 0.5  # of a supporting limb
+RARE_POSTURE_SHARE = 0.01  # share of postures that exceed the learned limb penetration or overhang
+DEFAULT_OVERHANG_M = 0.08  # for bodies of unknown mass, or never on a single limb
+MAX_OVERHANG_M = 0.15  # dancers who lean farther are moving
 
 
 @dataclass(frozen=True, eq=False)
 class Carriage:
     """Posture statistics of a corpus: orientations, travel and support in its N samples.
 
-    The samples are the postures, then the middle of each of the M moves. A step is half a move.
+    The samples are the postures, then the midpoints of the M moves. A step is half a move.
 
     Attributes:
         orientations: orientations of the joint chains [N, L, 4].
         weights: weight of each sample [N].
-        begins: sample that each step leads from [2 M].
-        ends: sample that it leads to [2 M].
-        shares: probability of each step, given the sample that it leaves [2 M].
+        begins: sample at the start of each step [2 M].
+        ends: sample at its end [2 M].
+        shares: probability of each step, given the sample at its start [2 M].
         clusters: cluster of each body part in each sample [N, P] (see `motionmind.learned.clusters`).
         turn: turn about the vertical in each half of each move [M], radians.
         travel: displacement of the root in each half, metres, relative to the body's heading midway [M, 3].
@@ -51,10 +51,11 @@ class Carriage:
         stands: firmness of each limb, then of the trunk [N, limbs + 1]: 1 if its lowest point does not move
             horizontally, near 0 if it moves fast. A low foot may slide, as dancers' feet do.
         aloft: 1 if the body is in the air [N], else 0: its lowest point is off the floor, and moves.
-        overhang: greatest distance of the centre of mass beyond a single supporting limb, except in the RARE most
-            extreme postures [1], metres.
+        overhang: greatest distance of the centre of mass beyond a single supporting limb [1], metres, without the
+            RARE_POSTURE_SHARE of most extreme postures.
         loose: whether each joint exceeds its limits in the corpus [J].
-        touches: greatest penetration depth for each of `Capsules.pairs`, except in RARE postures [P], metres.
+        touches: greatest penetration depth for each of `Capsules.pairs` [P], metres, without the RARE_POSTURE_SHARE of
+            most extreme postures.
         trees: neighbour trees over the samples; None if there are few samples.
         trust: share of the walks' departure from the minimal movement to keep.
     """
@@ -171,7 +172,7 @@ def _join_moments(kept: Kept, before: Carriage, workshop: Workshop) -> _Moments:
 
 
 def _blocks(count: int) -> Iterator[slice]:
-    """Yield slices of BLOCK rows from 0 to a count: measuring all postures at once would exhaust memory."""
+    """Yield slices of BLOCK_FRAMES rows from 0 to a count: measuring all postures at once would exhaust memory."""
     return (slice(start, start + BLOCK_FRAMES) for start in range(0, count, BLOCK_FRAMES))
 
 
@@ -192,7 +193,7 @@ def _orientations(corpus: Corpus, workshop: Workshop) -> Floats:
 
 
 def _touching(corpus: Corpus, workshop: Workshop) -> Floats:
-    """Return the greatest penetration depth of each pair of limbs [P], metres, except in RARE postures."""
+    """Return the greatest penetration depth of each pair of limbs [P], metres, as in Carriage."""
     if not len(capsules_of(corpus.skeleton).pairs()):
         return np.zeros(0)
 
@@ -208,8 +209,8 @@ def _touching(corpus: Corpus, workshop: Workshop) -> Floats:
 def _standing(corpus: Corpus, workshop: Workshop) -> Floats:
     """Return the firmness of limbs and trunk [N, limbs + 1], as in Carriage.
 
-    In a move it is 1 / (1 + (v / SLIDES)^2), with v the horizontal speed of the limb's lowest point; in a posture, the
-    mean over the moves that begin or end there.
+    In a move it is 1 / (1 + (v / FIRMNESS_HALVED_MPS)^2), with v the horizontal speed of the limb's lowest point. In a
+    posture it is the mean over the moves that begin or end there.
     """
     begins, ends = corpus.moves.begins, corpus.moves.ends
     limb = limb_of_points(corpus.skeleton)
@@ -222,7 +223,7 @@ def _standing(corpus: Corpus, workshop: Workshop) -> Floats:
             corpus.skeleton.positions_and_tips(corpus.rotations[of[here]], corpus.root[of[here]])
             for of in (begins, ends)
         )
-        for number in np.unique(limb):  # where every joint belongs to a limb, none is the trunk's
+        for number in np.unique(limb):  # not all numbers: a body may have no trunk
             moved = _lowest_moved(before[:, limb == number], after[:, limb == number])
             speed = np.hypot(moved[:, 0], moved[:, 2]) / corpus.moves.seconds[here]
             out[len(corpus) :, number][here] = 1.0 / (1.0 + (speed / FIRMNESS_HALVED_MPS) ** 2)
@@ -244,7 +245,7 @@ def _lowest_moved(before: Floats, after: Floats) -> Floats:
 def _aloft(corpus: Corpus, clearance: Floats, workshop: Workshop) -> Floats:
     """Return whether the body is in the air in each sample [N], 0 or 1, as in Carriage.
 
-    A body on half-pointe, or above a slightly misplaced floor, may be as high, but its lowest point hardly moves.
+    A body on half-pointe, or with a slightly misplaced floor, may be as high, but its lowest point hardly moves.
 
     Args:
         corpus: the movement.

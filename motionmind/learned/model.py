@@ -1,4 +1,4 @@
-"""A learned corpus: the one object that learning, loading and saving deal in."""
+"""LearnedCorpus: learn, load and save a corpus."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _DISCRETIZATION = "a Discretization, as make_discretization makes"
 
 @dataclass(frozen=True, eq=False)
 class LearnedCorpus(Learned):
-    """A learned corpus (see `Learned`), and the time that it took to load.
+    """A learned corpus (see `Learned`), with its loading time.
 
     Attributes:
-        load_seconds: time that loading took; 0 if it was not loaded.
+        load_seconds: loading time, seconds; 0 if it was not loaded.
     """
 
     load_seconds: float = 0.0
@@ -44,22 +44,23 @@ class LearnedCorpus(Learned):
         workshop: Workshop | None = None,
         **options: Unpack[Gathering],
     ) -> Self:
-        """Learn from clips, all on the same joints (`own_skeleton` brings known rigs together).
+        """Learn from clips, which must have the same joints (`own_skeleton` retargets known rigs).
 
         Args:
-            clips: the movement; sources of moves are reported by the clips' names.
-            name: of the corpus.
+            clips: the movement; reports name the clip that each move comes from.
+            name: name of the corpus.
             discretization: how orientations become states; by default a learned codebook of 15 degrees.
-            mix: other corpora to learn from as well, by name or folder, each with the weight of its postures and moves,
-                those of `clips` having weight 1.
-            home: where corpora that `mix` names are.
-            workshop: threads, and room for large arrays; None for this thread and memory. What is learned is the same.
+            mix: other corpora to learn from as well, by name or folder, each with the weight of its postures and moves;
+                `clips` have weight 1.
+            home: the folder of the corpora that `mix` names.
+            workshop: threads, and room for large arrays; None for this thread and memory. It does not affect the
+                result.
             options: rate, skip, facing, flips, flip_degrees, mirror, reverse, about, title, author, source, licence,
                 citation: see `motionmind.corpus.gather.gather`.
 
         Raises:
-            CorpusError: there is nothing to learn from, clips are on different joints, there are more states than can
-                be held, or there is no such corpus to mix.
+            CorpusError: there is nothing to learn from, clips are on different joints, there are too many states, or a
+                corpus to mix does not exist.
             SkeletonError: the body cannot be mirrored.
         """
         check_type("discretization", discretization, Discretization, wanted=_DISCRETIZATION, or_none=True)
@@ -80,16 +81,16 @@ class LearnedCorpus(Learned):
 
     @classmethod
     def load(cls, name: str, home: str | os.PathLike[str] | None = None) -> Self:
-        """Load what was learned from a corpus, by its name or folder: a built corpus or a bundled one.
+        """Load a built or bundled corpus, by its name or folder.
 
-        What the user's cache folder does not hold is learned and kept there.
+        Learned data missing from the user's cache folder is learned and stored there.
 
         Args:
-            name: of the corpus, or its folder.
-            home: where a user's corpora are.
+            name: the corpus's name or folder.
+            home: the folder of the user's corpora.
 
         Raises:
-            CorpusError: there is no such corpus; the message names those there are.
+            CorpusError: there is no such corpus; the message names the existing ones.
             FormatError: it cannot be read.
         """
         check_path("home", home, or_none=True)
@@ -98,10 +99,10 @@ class LearnedCorpus(Learned):
         return cls._of(learned, perf_counter() - began)
 
     def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write the corpus to a folder, completely or not at all, and cache what was learned.
+        """Write the corpus to a folder, completely or not at all, and cache the learned data.
 
         Args:
-            folder: where; a built corpus that is there is replaced.
+            folder: the folder; a built corpus in it is replaced.
 
         Raises:
             CorpusError: the folder cannot be written, or holds anything but a built corpus.

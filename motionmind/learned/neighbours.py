@@ -1,12 +1,13 @@
-"""Neighbours: a ball tree over a corpus's samples for each body part, so that searches visit few samples.
+"""Neighbours: a ball tree over a corpus's samples for each body part, for fast nearest-neighbour searches.
 
 The distance of two postures of a part is the root mean square over its joints of 2 sin(angle / 2), radians: that of
-their rotation matrices, up to a factor. A node is a ball around its samples. Its children halve these by which of two
-samples far apart they are nearer to. Source: Omohundro, "Five balltree construction algorithms", ICSI TR-89-063 (1989).
+their rotation matrices, up to a factor. A node is a ball around its samples. Two distant samples divide them: each
+child takes the half that is nearer to one of the two. Source: Omohundro, "Five balltree construction algorithms", ICSI
+TR-89-063 (1989).
 
-A leaf stores its samples' orientations of the part contiguously, one byte per number: a search
-(`motionmind.learned.nearest`) reads a leaf in one piece, while the orientations themselves are scattered over
-gigabytes. The bytes distort distances of near samples by about 0.01 radians per joint.
+A leaf stores its samples' orientations of the part contiguously, one byte per number, so that a search
+(`motionmind.learned.nearest`) reads a leaf in one piece; the full orientations are scattered over gigabytes. The bytes
+distort distances of near samples by about 0.01 radians per joint.
 
 The trees of all parts halve equal numbers of samples, so they share one table of node ranges: node n has the children
 2 n + 1 and 2 n + 2, and a node of the last level is a leaf.
@@ -28,13 +29,13 @@ from motionmind.executors.workshop import Workshop
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit, read_only
 
-MAX_FULL_SEARCH = 8000  # largest number of samples in a corpus without trees, searched in full
-BLOCK_SAMPLES = 2048  # samples copied at a time
-MAX_LEAF_SAMPLES = 32  # most samples in a leaf
-N_SAMPLES_FOR_CENTRE = 64  # samples of a node used to find its centre and to halve it
-MAX_COPIED_BYTES = 1 << 26  # most bytes of centres to copy for searches
-_CENTRE_SLACK_RAD = 1e-6  # radians: allowance for rounded centres
-CODE_OF_ONE = 127.0  # the code of 1
+MAX_FULL_SEARCH = 8000  # samples of a corpus without trees
+BLOCK_SAMPLES = 2048  # copied at a time
+MAX_LEAF_SAMPLES = 32
+N_SAMPLES_FOR_CENTRE = 64  # of a node, also used to halve it
+MAX_COPIED_BYTES = 1 << 26  # larger arrays of centres are not copied
+_CENTRE_SLACK_RAD = 1e-6  # for the rounding of centres
+CODE_OF_ONE = 127.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +50,8 @@ class Neighbours:
         centres: centres of the nodes, with the joints of all parts concatenated [K, W, 4].
         radii: radii of the nodes [P, K], radians.
         weights: total weight of each node's samples [P, K].
-        codes: orientations of each part's samples, in 127ths, part after part and leaf after leaf; a leaf of n samples
-            and m joints has 4 m rows of n numbers.
+        codes: orientations of the samples, in 127ths, part after part and leaf after leaf; for each leaf of n samples
+            and m joints, 4 m rows of n numbers.
     """
 
     parts: tuple[Ints, ...]
@@ -166,7 +167,7 @@ def _grow(shown: Singles, bounds: Int32s, order: Int32s, centres: Singles, radii
 def _measure(own: Singles, centre: Singles, keys: Floats) -> float:
     """Write a node's centre [m, 4] and the keys that halve its n samples [n, m, 4]; return its radius.
 
-    A key is the squared distance from a sample far from the centre, less that from a sample far from the first [n].
+    A key is the squared distance to the sample farthest from the centre, minus that to the sample farthest from it [n].
     """
     sample = own[:: max(1, len(own) // N_SAMPLES_FOR_CENTRE)]
     _centre(sample, centre)

@@ -1,29 +1,29 @@
 """Pace: durations of a corpus's movements by displacement, and limits on speed.
 
 A displacement leads from one posture to another (`Way`): each joint turns, the body turns about the vertical, and the
-root travels. Its parts affect the duration differently in each corpus, so they are first converted to one unit,
-seconds at the corpus's usual speeds:
+root travels. These parts affect the duration differently in each corpus, so they are first converted to one unit,
+seconds at the corpus's usual speeds. As a body turns while it travels, the displacement is
 
-    s = mean joint angle + hypot(travel, half the body's turn)
+    s = mean joint angle + hypot(travel, half the body's turn).
 
-since a body turns as it travels. The same displacement takes less time in the midst of quick movement than from rest to
-rest. Between movements a body slows down, but seldom stands still. The resting speed (*lull*) of a frame is the mean
-joint speed in the resting frames before and after it, divided by the usual speed. The logarithm of a movement's
-duration is normal about
+The same displacement takes less time amid quick movement than from rest to rest. Between movements a body slows down,
+but seldom stands still. The resting speed r (*lull*) of a frame is the mean joint speed in the resting frames before
+and after it, divided by the usual speed. The logarithm of a movement's duration is normal about
 
-    level + slope log(BEGINS + s) + pull log(STILL + lull),
+    level + slope log(DURATION_OFFSET_S + s) + pull log(RESTING_OFFSET_RATIO + r),
 
 with the geometric mean of the resting speeds at both ends. A longer displacement never takes less time, and durations
-grow at most as the square root: steeper slopes did not generalise. The law is fitted to all pairs of resting frames of
-a clip that are 0.3 to 5 s apart, between which the body went from one posture to another and arrived. It is a least
-squares fit with a prior worth AS_MANY windows, since a corpus of one clip may have three windows, or none: LEVEL,
-SLOPE, PULL and SPREAD come from the recorded corpora together (experiments/duration). A posture on its own takes the
-resting speed of the corpus's most similar postures.
+grow at most as the square root: steeper slopes did not generalise.
+
+The law is fitted by least squares to *windows*: all pairs of resting frames of a clip that are 0.3 to 5 s apart. A
+corpus of one clip may have three windows, or none, so the fit has a prior worth PRIOR_COUNT windows, from the recorded
+corpora together (experiments/duration). A posture outside the corpus takes the resting speed of the corpus's most
+similar postures.
 
 The fastest speeds are 99th percentiles over the corpus's frames at 30 per second, joint by joint. Parts that hardly
 move in the corpus may still move: the limit of a joint is at least a quarter of the median joint's, or everyday
-movement where that joint rests; those of the body's turn and travel are at least everyday movement. The *peaks*
-(`motionmind.learned.peaks`) are limits for windows of 1 to 6 s, including the root's acceleration; none is less than
+movement if the median joint rests. The limits of the body's turn and travel are at least everyday movement. The *peaks*
+(`motionmind.learned.peaks`) are limits for windows of 1 to 6 s, including the root's acceleration. They are never below
 the fastest speeds, or everyday movement.
 """
 
@@ -48,22 +48,20 @@ from motionmind.learned.peaks import PEAK_PERCENTILE, PEAK_WINDOWS_S, Peaks, acc
 from motionmind.learned.percentiles import Percentile
 from motionmind.learned.sampled import BLOCK_FRAMES, SAMPLED_FPS, Sampled
 
-SHORTEST_WINDOW_S, LONGEST_WINDOW_S = 0.3, 5.0  # seconds between the resting frames of a window
-SPEED_SMOOTHING_S = 0.5  # seconds over which speeds are averaged to find resting frames
-DURATION_OFFSET_S = 0.3  # offset of a displacement, seconds at usual speeds: starting and stopping take time
-RESTING_OFFSET_RATIO = 0.05  # offset of a resting speed, in usual speeds: every recording has noise
+SHORTEST_WINDOW_S, LONGEST_WINDOW_S = 0.3, 5.0  # between the resting frames of a window
+SPEED_SMOOTHING_S = 0.5  # to find resting frames
+DURATION_OFFSET_S = 0.3  # at usual speeds: starting and stopping take time
+RESTING_OFFSET_RATIO = 0.05  # to the usual speed: every recording has noise
 # Logarithms of seconds; fitted to cmu-05, indian, cmu-16 and cmu-135 together.
 PRIOR_LEVEL, PRIOR_SLOPE, PRIOR_PULL, PRIOR_SPREAD = 0.0, 0.5, -0.35, 0.6
-SLOPE_RANGE = 0.15, 0.5  # bounds of the slope: a longer displacement takes longer, at a higher speed
-PULL_RANGE = -0.5, 0.0  # bounds of the pull: movement that is quick at its ends takes no longer
+SLOPE_RANGE = 0.15, 0.5  # a longer displacement takes longer, at a higher speed
+PULL_RANGE = -0.5, 0.0  # movement that is quick at its ends takes no longer
 N_NEIGHBORS = 5  # similar postures of the corpus that give a posture's resting speed
 PRIOR_COUNT = 20.0  # weight of the prior, in windows
-MIN_USUAL_SPEEDS = 0.3, 0.2, 0.1  # least usual speeds: mean joint, rad/s; turn, rad/s; travel, heights/s
-MIN_PEAK_MEDIAN_RATIO = 0.25  # a joint's least fastest speed, relative to the median joint's
-MIN_PEAK_SPEEDS = 3.0, 2.0, 0.5  # least fastest speeds: a joint where most rest, rad/s; turn, rad/s; travel, heights/s
-MIN_PEAK_ROOT_ACCELERATION = (
-    3.0  # least peak acceleration of the root, heights/s^2: recorded dancers exceed it in 3 of 4 seconds
-)
+MIN_USUAL_SPEEDS = 0.3, 0.2, 0.1  # mean joint, rad/s; turn, rad/s; travel, heights/s
+MIN_PEAK_MEDIAN_RATIO = 0.25  # of a joint's fastest speed to the median joint's
+MIN_PEAK_SPEEDS = 3.0, 2.0, 0.5  # a joint if most joints rest, rad/s; turn, rad/s; travel, heights/s
+MIN_PEAK_ROOT_ACCELERATION = 3.0  # heights/s^2: recorded dancers exceed it in 3 of 4 seconds
 
 
 class Way(NamedTuple):
@@ -130,8 +128,8 @@ class Pace:
         fastest: fastest speeds of the joints, rad/s, of the body's turn, rad/s, and of its travel, heights/s [J + 2].
         greatest: greatest speeds of the same parts in any frame [J + 2].
         slowest: 1st percentile of the mean joint speed over a second, rad/s [1].
-        peaks: 99th percentiles, over windows of each of LENGTHS, of the greatest speeds of the same parts and of the
-            root's rise or fall, heights/s, and of the root's acceleration, heights/s^2 [6, J + 4].
+        peaks: 99th percentiles, over windows of each of PEAK_WINDOWS_S, of the greatest speeds of the same parts and of
+            the root's rise or fall, heights/s, and of the root's acceleration, heights/s^2 [6, J + 4].
         lulls: resting speeds of the corpus's N postures, in usual mean joint speeds [N].
         law: level, slope, pull and spread of the logarithm of durations [4].
     """
@@ -203,7 +201,7 @@ def _measure(corpus: Corpus, workshop: Workshop) -> Gauge:
 
 
 def _show(corpus: Corpus, clip: Clip) -> tuple[Singles, Floats, Floats]:
-    """Return a clip's steps, resting frames and windows, as in Gauge; all empty for a single frame."""
+    """Return a clip's steps, resting frames and windows, as in Gauge; all are empty for a single frame."""
     recording = Sampled(corpus, clip, SAMPLED_FPS)
     if len(recording) < 2:
         return np.zeros((0, len(corpus.skeleton) + 6), np.float32), np.zeros((0, 2)), np.zeros((0, 6))
@@ -287,18 +285,18 @@ def _danced(clip: Sampled) -> Ints:
 
 
 def over_seconds(speeds: Floats, fps: float) -> Floats:
-    """Return the means of speeds [T] over each window of a second, or over all if there is less."""
+    """Return the means of speeds [T] over each window of a second; over all T if they are fewer."""
     return np.asarray(np.lib.stride_tricks.sliding_window_view(speeds, min(round(fps), len(speeds))).mean(axis=1))
 
 
 def _effort(way: Way, usual: Floats) -> Floats:
-    """Return the logarithm of displacements in seconds at usual speeds, plus BEGINS [...]."""
+    """Return log(DURATION_OFFSET_S + s) for displacements s in seconds at usual speeds [...]."""
     joints, turn, travel = way.joints.mean(axis=-1) / usual[0], way.turn / usual[1], way.travel / usual[2]
     return np.asarray(np.log(DURATION_OFFSET_S + joints + np.hypot(travel, 0.5 * turn)))
 
 
 def _quickness(first: Floats, last: Floats) -> Floats:
-    """Return the mean logarithm of the resting speeds at both ends, each plus STILL [...]."""
+    """Return the mean of log(RESTING_OFFSET_RATIO + r) over the resting speeds r at both ends [...]."""
     return np.asarray(0.5 * (np.log(RESTING_OFFSET_RATIO + first) + np.log(RESTING_OFFSET_RATIO + last)))
 
 
@@ -308,7 +306,7 @@ def _windows(clip: Sampled, still: Ints, speeds: Floats) -> Floats:
     No window spans reconstructed movement, which nobody danced.
 
     Args:
-        clip: at FPS frames per second.
+        clip: the clip, at SAMPLED_FPS frames a second.
         still: its resting frames, in order [S].
         speeds: mean joint speed in them [S], rad/s.
     """
@@ -342,11 +340,12 @@ def _fit_windows(windows: Floats, usual: Floats) -> Floats:
 
 
 def _lulls(steps: Floats) -> tuple[Ints, Floats]:
-    """Return a clip's resting frames, in order [S], and the mean joint speed in them [S], rad/s; without any, the first
-    frame and the clip's mean speed.
+    """Return a clip's resting frames, in order [S], and the mean joint speed in them [S], rad/s.
+
+    A clip without resting frames has its first frame, with its mean speed.
 
     Args:
-        steps: angle that the mean joint turns by from each frame to the next [T - 1], at FPS frames a second.
+        steps: mean joint angle from each frame to the next [T - 1], radians, at SAMPLED_FPS frames a second.
     """
     still = find_still(steps)
     if not len(still):
@@ -358,7 +357,7 @@ def find_still(steps: Floats) -> Ints:
     """Return the resting frames: local minima of the smoothed mean joint speed.
 
     Args:
-        steps: angle that the mean joint turns by from each frame to the next [T - 1], at FPS frames a second.
+        steps: mean joint angle from each frame to the next [T - 1], radians, at SAMPLED_FPS frames a second.
     """
     # Keyframed joints turn evenly, at speeds equal up to rounding. A flat minimum yields one frame, its middle. SciPy's
     # `find_peaks` finds the same in negated speeds, but its import takes longer than learning a few clips.
@@ -370,7 +369,7 @@ def find_still(steps: Floats) -> Ints:
 
 
 def _smooth(steps: Floats) -> Floats:
-    """Smooth steps [T - 1] over SMOOTHED seconds about each frame; empty for a clip that is shorter."""
+    """Smooth steps [T - 1] over SPEED_SMOOTHING_S about each frame; empty for a shorter clip."""
     window = np.hanning(round(SPEED_SMOOTHING_S * SAMPLED_FPS) + 2)[1:-1]
     if len(steps) < len(window):
         return np.zeros(0)

@@ -8,7 +8,7 @@ Two measures extend those of `motionmind.body.plausibility`:
   (`motionmind.body.contact.skating`), for bodies of human height with feet.
 
 The limit of each measure is the 99.5th percentile, over all one-second stretches of the corpus's clips, of its greatest
-value in a stretch. A shorter clip is one stretch.
+value in a stretch; a shorter clip is one stretch.
 
 The speed of feet near the floor is not a measure but a limit for tweens: the 95th percentile over the same stretches. A
 few kicks are much faster in every corpus, but its steps are not.
@@ -32,7 +32,7 @@ from motionmind.learned.pace import way_of
 from motionmind.learned.sampled import BLOCK_FRAMES, Sampled
 
 MEASURES = (*SEEN, "pace", "sliding")
-UNITS_AND_MEANINGS = {  # the unit of each, and what it is
+UNITS_AND_MEANINGS = {
     "balance": ("m", "how far the body leans over what it stands on, on one limb and at ease"),
     "bounce": ("m/s^2", "greatest acceleration of the body's mass, up or down"),
     "flight": ("", "share of gravity that the body lacks in the air: 1 where it floats"),
@@ -40,14 +40,14 @@ UNITS_AND_MEANINGS = {  # the unit of each, and what it is
     "pace": ("", "how many times as fast as its fastest the fastest part of the body is"),
     "sliding": ("", "greatest share of a second in which a foot near the floor slides"),
 }
-STRETCH_S = 1.0  # seconds
-LIMIT_PERCENTILE = 99.5  # percentile of the corpus's own stretches
-FOOT_SPEED_PERCENTILE = 95.0  # percentile for the speed of feet near the floor
-MIN_FOOT_SPEED_LIMIT = 1.5  # least limit of that speed, heights/s: feet reach it in slow walking
+STRETCH_S = 1.0
+LIMIT_PERCENTILE = 99.5  # of the corpus's own stretches
+FOOT_SPEED_PERCENTILE = 95.0  # for feet near the floor
+MIN_FOOT_SPEED_LIMIT = 1.5  # heights/s: feet reach it in slow walking
 # Negligible values in any corpus: metres, m/s^2, share of gravity, metres, ratio of speeds, share.
 NEGLIGIBLE_EXCESS = np.array([0.02, 1.0, 0.2, 0.01, 1.0, 0.2])
-_N_FRAMES_MEASURED = 40_000  # approximate number of frames to measure
-_PIECE_FRAMES = BLOCK_FRAMES // 32  # frames of each piece of a corpus that has more
+_N_FRAMES_MEASURED = 40_000  # approximately
+_PIECE_FRAMES = BLOCK_FRAMES // 32  # the size of pieces of a corpus with more frames
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Sighting:
         value: the greatest value; None where the measure does not apply to the movement.
         most: the limit from one-second stretches of the corpus; None where the corpus sets none.
         unit: the unit of both; "" for shares and ratios.
-        part: the body part with the greatest value, if it is one part: a joint, "facing" or "travel"; else "".
+        part: the body part with the greatest value: a joint, "facing" or "travel"; "" if it is not a single part.
 
     >>> from motionmind.learned import Sighting
     >>> Sighting(31.0, 18.5, "m/s^2").is_beyond
@@ -180,10 +180,11 @@ def _sliding(motion: Motion, floor: float) -> tuple[Floats, Floats]:
 
 
 def _frames_of(corpus: Corpus, fastest: Floats) -> Iterator[Floats]:
-    """Yield the measures in each frame of a corpus's clips, and the speed of feet, infinite in reconstructed movement
-    [T, M + 1].
+    """Yield the measures in each frame of a corpus's clips, and the speed of feet [T, M + 1].
 
-    A corpus with more than about _MOST frames is measured in evenly spread pieces, with about _MOST frames in all.
+    The speed of feet is infinite in reconstructed movement.
+
+    If a corpus has more than _N_FRAMES_MEASURED frames, evenly spread pieces with about that many are measured.
     """
     seconds = sum(corpus.times[clip.stop - 1] - corpus.times[clip.start] for clip in corpus.clips)
     every = int(np.ceil(RATE * seconds / _N_FRAMES_MEASURED))

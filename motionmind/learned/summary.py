@@ -1,6 +1,6 @@
-"""Summaries of a corpus: its contents, its origins, and how well it hangs together.
+"""Summaries of a corpus: its contents, its origins, and how well it is connected.
 
-The structs are what `corpus info` and `corpus check` write as JSON, field by field in this order.
+`corpus info` and `corpus check` write the structs as JSON, with the fields in this order.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class ClipSummary(msgspec.Struct, frozen=True):
         name: the clip's label.
         postures: number of its postures.
         about: a line on its content.
-        performer: who performs it; the corpus's author where that is not known.
+        performer: its performer; the corpus's author if the performer is not known.
     """
 
     name: str
@@ -36,7 +36,7 @@ class ClipSummary(msgspec.Struct, frozen=True):
 
 
 class OriginSummary(msgspec.Struct, frozen=True):
-    """The clips of a corpus that come from one corpus, in the same direction and with the same weight.
+    """The clips of a corpus with one origin: the same corpus, mirroring, direction and weight.
 
     Attributes:
         corpus: the corpus that they come from.
@@ -45,7 +45,7 @@ class OriginSummary(msgspec.Struct, frozen=True):
         clips: number of clips.
         postures: number of their postures.
         moves: number of their moves.
-        weight: weight of each move.
+        weight: weight of a move.
         share: weighted share of all moves of the corpus, from 0 to 1.
         licence: the licence of that corpus.
     """
@@ -69,8 +69,8 @@ class FlipReport(msgspec.Struct, frozen=True):
         joint: name of the joint.
         frame: the first frame after the flip.
         degrees: angle of the flip, rounded to a tenth.
-        repair: "put back" if a half turn was undone, "reconstructed" if the joint was interpolated, "none" if the flip
-            was left as it is, or the recording cut there.
+        repair: "put back" if a half turn was undone; "reconstructed" if the joint was interpolated; "none" if the flip
+            was kept, or the recording cut there.
     """
 
     clip: str
@@ -102,23 +102,23 @@ class CorpusSummary(msgspec.Struct, frozen=True, kw_only=True):
     """A corpus's description and size.
 
     Attributes:
-        name: of the corpus.
-        title: a line on what it is.
+        name: its name.
+        title: a one-line description.
         author: its author.
         source: where it comes from.
-        licence: the licence of its use.
-        citation: how to cite it; "" if nobody asks for that.
+        licence: the licence for its use.
+        citation: how to cite it; "" if no citation is requested.
         clips: its clips.
-        origins: the corpora that it was made of.
+        origins: the corpora that its clips come from.
         postures: number of postures.
         moves: number of moves from posture to posture.
         skeleton: name of the body.
         joints: the joints' names.
         facing: "stage" or "free", as in Corpus.
-        rate: postures a second of what was recorded; None if all are keyframes with times of their own.
+        rate: postures a second of recorded clips; None if all postures are keyframes with times of their own.
         states: number of states, by chain.
         edges: number of attested moves from state to state, by chain.
-        repairs: what was mended of its recordings.
+        repairs: the repairs of its recordings.
     """
 
     name: str
@@ -141,14 +141,13 @@ class CorpusSummary(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class CorpusCheck(CorpusSummary, frozen=True, kw_only=True):
-    """A summary, and how well the corpus hangs together.
+    """A summary, and how well the corpus is connected.
 
     Attributes:
-        joinable: share of random pairs of the corpus's postures such that in every chain attested moves, however many,
-            lead from one state to the other.
-        pairs: number of those pairs.
-        seed: of their random choice.
-        out_degree: mean number of states that a state leads to, by chain.
+        joinable: share of random pairs of postures that any number of attested moves joins in every chain.
+        pairs: number of random pairs.
+        seed: seed of the random pairs.
+        out_degree: mean number of successors of a state, by chain.
         faults: flips of joints in the corpus's recordings.
     """
 
@@ -165,14 +164,14 @@ def summarise(corpus: Corpus, grammar: Grammar) -> CorpusSummary:
 
 
 def check_corpus(corpus: Corpus, grammar: Grammar, states: Int32s, pairs: int = 2000, seed: int = 0) -> CorpusCheck:
-    """Summarise a corpus, and measure how well it hangs together.
+    """Summarise a corpus, and measure how well it is connected.
 
     Args:
         corpus: the movement.
         grammar: what was learned of its states.
         states: states of its postures [N, L].
         pairs: number of random pairs of postures to try to join.
-        seed: of their random choice, at least 0.
+        seed: seed of the random pairs, at least 0.
 
     Raises:
         MotionMindError: `pairs` or `seed` is out of its range.
@@ -202,7 +201,7 @@ def to_plain(summary: CorpusSummary) -> dict[str, Any]:
 
 
 def _plain_number(value: Any) -> Any:
-    """Return a number of numpy's, such as a weight that a caller gave, as Python's."""
+    """Return a NumPy number, such as a weight from a caller, as a Python number."""
     if isinstance(value, np.generic):
         return value.item()
     raise TypeError(f"{type(value).__name__} cannot be written as JSON")
@@ -240,7 +239,7 @@ def _summary_values(corpus: Corpus, grammar: Grammar) -> dict[str, Any]:
 
 
 def origins(corpus: Corpus) -> list[OriginSummary]:
-    """Return where a corpus's clips come from, grouped by corpus, mirroring, direction and weight."""
+    """Return the origins of a corpus's clips, grouped by corpus, mirroring, direction and weight."""
     groups: dict[tuple[str, bool, bool, float], list[Clip]] = {}
     for backwards in (False, True):
         for clip in corpus.clips:
@@ -265,14 +264,14 @@ def joinable(grammar: Grammar, states: Int32s, pairs: int, seed: int) -> float:
         grammar: what was learned of the states.
         states: states of the corpus's postures [N, L].
         pairs: number of pairs.
-        seed: of their random choice.
+        seed: seed of the random pairs.
     """
     chosen = np.random.default_rng(seed).integers(len(states), size=(pairs, 2))
     return float(joined_pairs(grammar, states, chosen).all(axis=1).mean())
 
 
 def joined_pairs(grammar: Grammar, states: Int32s, pairs: Ints) -> Bools:
-    """Return which chains attested moves alone can lead from one posture to another [P, L].
+    """Return whether attested moves alone lead from one posture of a pair to the other, by chain [P, L].
 
     Args:
         grammar: what was learned of the states.

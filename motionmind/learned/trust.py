@@ -1,10 +1,9 @@
 """Trust: the share of the walks' departure from the minimal movement that a corpus can predict.
 
-Walks through a corpus depart from the minimal movement between two postures (`motionmind.walks.minimal`). How much of
-the departure is correct depends on the distance of both postures from the corpus's nearest ones, relative to the
-displacement from one to the other and to the spread of the corpus's postures. Leave-one-out reconstruction of the
-corpus's clips measures it (`motionmind.walks.evidence`). This module fits the share of least error as a table, and
-looks it up.
+Corpus walks depart from the minimal movement between two postures (`motionmind.walks.minimal`). The correct share of
+the departure depends on the distance of both postures from the corpus's nearest ones, relative to the displacement
+between them and to the spread of the corpus's postures. `motionmind.walks.evidence` measures it by leave-one-out
+reconstruction of the corpus's clips. This module fits the share of least error as a table, and interpolates in it.
 
 It also holds the decay time of end velocities, which varies as much between corpora: slow dancers keep moving longer.
 """
@@ -19,7 +18,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 
-ZERO_DISPLACEMENT_RAD = 1e-3  # radians per joint: a displacement of zero, but for the rounding of files
+ZERO_DISPLACEMENT_RAD = 1e-3  # per joint: zero, apart from the rounding of files
 DISTANCE_RATIOS = np.array([0.0, 0.25, 0.5, 1.0, 2.0])  # of the distance from the corpus to the displacement
 
 
@@ -29,7 +28,7 @@ class Trust:
 
     Attributes:
         table: share at each of `DISTANCE_RATIOS` [5], from 0 to 1.
-        lasts: seconds for which a velocity at an end has effect, at most [1].
+        lasts: greatest time for which a velocity at an end has an effect [1], seconds.
         spread: distance between two random postures of the corpus, by body part [P], RMS radians per joint; at this
             distance from every posture the share is 0. Infinity if unknown.
     """
@@ -69,7 +68,7 @@ def counts(off: Floats, ways: Floats, spread: Floats) -> Floats:
 
 # Strengths of the prior, relative to the mean diagonal of A; from almost none to the prior alone.
 PRIOR_STRENGTHS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, np.inf)
-N_STANDARD_ERRORS = 2.0  # standard errors by which a table must beat one nearer to the prior: 95 %
+N_STANDARD_ERRORS = 2.0  # by which a table must beat one nearer to the prior: 95 %
 
 
 class Squares(NamedTuple):
@@ -99,7 +98,7 @@ class Squares(NamedTuple):
         return float(table @ self.inner @ table - 2.0 * table @ self.along + self.whole)
 
     def fitted(self, prior: Floats, strength: float) -> Floats:
-        """Return the table [5] of least error, with a ridge penalty of given strength about a prior table."""
+        """Return the table [5] of least error, with a ridge penalty of the given strength about a prior table."""
         if np.isinf(strength):
             return prior
         ridge = max(strength * float(np.trace(self.inner)) / len(prior), np.finfo(float).tiny) * np.eye(len(prior))
@@ -109,8 +108,8 @@ class Squares(NamedTuple):
 def fit_table(families: Sequence[Squares], prior: Floats) -> Floats:
     """Return the table [5] for a corpus: a ridge regression about a prior table.
 
-    It takes the greatest strength whose error, on families left out of the fit, is within SURE standard errors over
-    families of the least error: so a corpus departs from the prior only where its clips agree.
+    It takes the greatest strength whose error, on families left out of the fit, is within N_STANDARD_ERRORS standard
+    errors over families of the least error. So a corpus departs from the prior only if its clips agree.
     Source: Hastie, Tibshirani, Friedman, "The elements of statistical learning" (2009), sections 3.4.1 and 7.10.
 
     Args:
