@@ -1,11 +1,13 @@
-"""Anatomy: the angles by which people describe a body's joints, their ranges, and the weight of its parts.
+"""Anatomy: the anatomical angles of a body's joints, their ranges, and the masses of its segments.
 
-A joint's rotation is a *swing* and a *twist*. The twist is the turn about the bone's own length (`long`); the swing
-tips the bone, by a rotation vector at right angles to it whose two coefficients are flexion and abduction, under
-whatever names the joint has for them. Unlike three turns in sequence this has no order to remember and no gimbal lock
-within 180 degrees; for movement in one plane it is the angle that a goniometer reads. A limb is twisted, then swung;
-pelvis, spine and head have the twist outermost: they lean in the frame they have turned to. Source: Baerlocher and
-Boulic, "Parametrization and range of motion of the ball-and-socket joint", Deformable Avatars (2001).
+A joint's rotation is a *swing* and a *twist*. The twist turns the bone about its own length (`long`). The swing tips
+the bone, by a rotation vector at right angles to it. Its two coefficients are flexion and abduction, or the joint's own
+names for them. Unlike three turns in sequence, this has no order to remember and no gimbal lock within 180 degrees. For
+movement in one plane it is the angle that a goniometer reads. A limb is twisted, then swung. Pelvis, spine and head
+have the twist outermost: they lean in the frame that they have turned to.
+
+Source: Baerlocher and Boulic, "Parametrization and range of motion of the ball-and-socket joint", Deformable Avatars
+(2001).
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ class Angle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     Attributes:
         about: the axis about which it is positive on the left side: "x", "-z".
         range: least and greatest angle, degrees.
-        opposite: the name of its negative, as extension is flexion's.
+        opposite: name of the negative angle, such as extension for flexion.
     """
 
     about: str
@@ -46,19 +48,19 @@ class Angle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     @property
     def sign(self) -> float:
-        """1 or -1: the sense of a positive angle about the axis."""
+        """1 or -1: the sign of a positive angle about the axis."""
         return -1.0 if self.about.startswith("-") else 1.0
 
 
 class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A joint, or both of a pair, written for the left one.
+    """A joint; for a pair of joints, the left one.
 
     Attributes:
         angles: by name.
         long: the axis of the twist.
-        outer: whether the twist is applied after the swing, not before it.
+        outer: whether the twist is applied after the swing, instead of before it.
         rest: degrees about z from the skeleton's rest pose to the pose in which all angles are 0.
-        against: the joint in whose frame the angles are measured, if not the parent.
+        against: the joint in whose frame the angles are measured; "" for the parent.
         mass: mass of the segment, as a share of the body's.
         centre: centre of mass of the segment in the joint's frame, metres.
     """
@@ -75,12 +77,14 @@ class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 class Leg(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The joints of a leg that can be placed on the floor: two bones and a foot that bends at its ball.
 
+    Joints are named without their side.
+
     Attributes:
-        hip: the joint at the top of the thigh; this and the next are names without a side.
+        hip: the joint at the top of the thigh.
         knee: the joint between the two long bones.
-        ankle: the joint that the foot turns about.
+        ankle: the joint between shank and foot.
         toes: the ball of the foot.
-        heel: place of the heel in the left ankle's frame, metres: not a joint, but it touches the floor.
+        heel: position of the heel in the left ankle's frame, metres; the heel is a contact point, not a joint.
     """
 
     hip: str
@@ -98,10 +102,10 @@ class Anatomy:
         skeleton: the tree of joints.
         layers: the joints, without their sides, that each layer of a score moves: the columns of a phrase.
         joints: each joint's anatomy by name; a pair's without its side.
-        groups: joints that share angles, as `head` is cervical and atlantal: group -> joint -> angle -> the share of it
-            that the joint takes.
+        groups: joints that share angles, such as `head` for cervical and atlantal: group -> joint -> angle -> the
+            joint's share.
         leg: the joints of a leg that can stand; None on a body without such legs.
-        path: the file that the anatomy was read from.
+        path: the anatomy's file.
     """
 
     skeleton: Skeleton
@@ -139,11 +143,11 @@ class Anatomy:
     def rotations(self, degrees: Mapping[str, Floats]) -> Floats:
         """Return local rotations [T, J, 4] from angles.
 
-        Angles that are measured against another frame than the parent's are converted.
+        Angles measured in another frame than the parent's are converted.
 
         Args:
-            degrees: by the joints' names in the skeleton, angles [T, 3] about x, y and z (see `Joint`), right joints'
-                as their left partners'; joints that are not given are at 0.
+            degrees: angles [T, 3] about x, y and z (see `Joint`), by the joints' names in the skeleton; a right joint
+                has the angles of its mirror image. Missing joints are at 0.
         """
         count = len(next(iter(degrees.values())))
         vectors = np.zeros((count, len(self.skeleton), 3))
@@ -161,7 +165,7 @@ class Anatomy:
 
         Args:
             rotations: local rotations [..., J, 4].
-            joints: those whose angles are wanted; the others' are 0. None for all.
+            joints: indices of the joints to compute; the others' angles are 0. None for all.
         """
         wanted = np.arange(len(self.skeleton)) if joints is None else np.array(joints, dtype=np.intp)
         out = np.zeros((*rotations.shape[:-1], 3))
@@ -169,7 +173,7 @@ class Anatomy:
         return out
 
     def degrees_of(self, joints: Indices, rotations: Floats) -> Floats:
-        """Return the angles of some joints alone [..., n, 3], by their numbers [n]; see `degrees`."""
+        """Return the angles of some joints only [..., n, 3], by their indices [n]; see `degrees`."""
         turned = rotations[..., joints, :]
         for index, frame in self._measured_elsewhere:
             for place in np.flatnonzero(joints == index):
@@ -188,7 +192,7 @@ class Anatomy:
 
     @property
     def has_masses(self) -> bool:
-        """Whether the weight of its parts is known."""
+        """Whether the masses of its segments are known."""
         return bool(self._segments[0].any())
 
     def centre_of_mass(self, rotations: Floats, root: Floats) -> Floats:
@@ -197,9 +201,9 @@ class Anatomy:
         return self.masses_of(self.skeleton).centre(self.skeleton.positions(rotations, root), turned)
 
     def masses_of(self, skeleton: Skeleton) -> Masses:
-        """Return the masses of a body with this anatomy, in its own proportions or in others."""
+        """Return the masses of a body with this anatomy, in the anatomy's own proportions or others."""
         shares, centres = self._segments
-        same = skeleton is self.skeleton  # that may be flat, and of no height
+        same = skeleton is self.skeleton  # it may be flat, without height
         return Masses(shares, centres if same else centres * (skeleton.height / self.skeleton.height))
 
     @cached_property
@@ -246,8 +250,8 @@ class Masses(NamedTuple):
     """The masses of a body's segments.
 
     Attributes:
-        shares: of the body's mass [J].
-        centres: of mass in the joints' frames [J, 3], metres.
+        shares: each segment's share of the body's mass [J].
+        centres: each segment's centre of mass in its joint's frame [J, 3], metres.
     """
 
     shares: Floats
@@ -257,7 +261,7 @@ class Masses(NamedTuple):
         """Return the body's centre of mass [..., 3], metres.
 
         Args:
-            places: of the joints, and whatever points after them [..., P, 3], metres.
+            places: positions of the joints, then of any other points [..., P, 3], metres.
             turned: orientations of the joints in the world [..., J, 4].
         """
         from motionmind.body.kinematics import weigh  # numba is slow to import
@@ -269,13 +273,13 @@ class Masses(NamedTuple):
 
 
 class Conventions(NamedTuple):
-    """The conventions by which joints have angles (see `Joint`).
+    """The conventions of the joints' angles (see `Joint`).
 
     Attributes:
         long: axis of each joint's twist, 0, 1 or 2 [J].
         outer: whether the twist is applied after the swing [J].
-        rest: degrees about z from the rest pose to that of angles 0 [J].
-        mirrored: whether the joint is a right one, and has the angles of its mirror image [J].
+        rest: degrees about z from the rest pose to the pose of angles 0 [J].
+        mirrored: whether the joint is on the right, and has the angles of its mirror image [J].
     """
 
     long: Ints
@@ -284,7 +288,7 @@ class Conventions(NamedTuple):
     mirrored: Bools
 
     def of(self, joints: Indices) -> Conventions:
-        """Return those of some joints."""
+        """Return the conventions of some joints."""
         return Conventions(self.long[joints], self.outer[joints], self.rest[joints], self.mirrored[joints])
 
 

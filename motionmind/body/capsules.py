@@ -1,12 +1,11 @@
-"""A body's limbs as capsules, and how deep they are in each other.
+"""A body's limbs as capsules, and their penetration depths.
 
-A capsule is a segment with a radius at each end. People have them: bodies with the joints of human23, whatever joints
-lie between and beyond. Of other bodies it is not known how thick they are: they have no capsules, and nothing of them
-is ever inside anything else.
+A capsule is a segment with a radius at each end. A body with the joints of human23, and any joints between and beyond
+them, has capsules. The thickness of other bodies is unknown: they have no capsules, and never penetrate themselves.
 
-The radii are about two thirds of a limb's own, for flesh gives way and recordings err. They were chosen so that the
-dancers of `cmu-05` and `cmu-16` have hardly ever a leg more than 3 cm inside the other (0.6 and 0 % of windows of a
-second; of `cmu-135`, on which nothing was chosen, 0.5 %). Thighs begin below the hips, where they touch anyhow.
+The radii are about two thirds of a limb's, as flesh is soft and recordings are inexact. They were chosen on `cmu-05`
+and `cmu-16`, where one leg is more than 3 cm inside the other in only 0.6 and 0 % of one-second windows. In `cmu-135`,
+which had no part in the choice, it is 0.5 %. Capsules of thighs begin below the hips, where thighs touch anyway.
 """
 
 from __future__ import annotations
@@ -33,8 +32,8 @@ class _Shape(NamedTuple):
 
     Attributes:
         start, end: the joints, without a side; an `end` with "_tip" is the far end of the chain that begins there.
-        begins, ends: where between them it lies, as shares of the way.
-        radii: its radii at both ends, metres, of a person 1.70 m tall.
+        begins, ends: its range between them, as shares of their distance.
+        radii: its radii at both ends, metres, for a person 1.70 m tall.
     """
 
     start: str
@@ -63,10 +62,10 @@ class Capsules(NamedTuple):
     """The capsules of a body.
 
     Attributes:
-        names: of the capsules [C], as "left_thigh".
-        points: the points between which each lies, as `Skeleton.positions_and_tips` counts them [C, 2].
-        shares: how far its ends are from the first of them to the second [C, 2].
-        radii: at both ends [C, 2], metres.
+        names: names of the capsules, such as "left_thigh" [C].
+        points: indices in `Skeleton.positions_and_tips` of the two points that each lies between [C, 2].
+        shares: positions of its ends between these points, 0 to 1 [C, 2].
+        radii: radii at both ends [C, 2], metres.
     """
 
     names: tuple[str, ...]
@@ -75,14 +74,14 @@ class Capsules(NamedTuple):
     radii: Floats
 
     def place(self, positions: Floats) -> Floats:
-        """Return the ends [..., C, 2, 3], metres, from the `positions_and_tips` [..., 2 J, 3] of the skeleton."""
+        """Return the ends [..., C, 2, 3], metres, given the `positions_and_tips` [..., 2 J, 3] of the skeleton."""
         first, second = (np.take(positions, self.points[:, end : end + 1], axis=-2) for end in range(2))
         return np.asarray(first + self.shares[..., None] * (second - first))
 
     def pairs(self) -> Ints:
         """Return the pairs of capsules that could pass through each other [P, 2].
 
-        They are a leg and the other; an arm and the other; forearms and hands with trunk, head and legs.
+        They are one leg with the other, one arm with the other, and forearms and hands with trunk, head and legs.
         """
         return _pairs(self.names).copy()
 
@@ -103,7 +102,7 @@ def _pairs(names: tuple[str, ...]) -> Ints:
 
 @remembered
 def capsules_of(skeleton: Skeleton) -> Capsules:
-    """Return the capsules of a body; none if it is no person."""
+    """Return the capsules of a body; none unless it has the joints of human23."""
     names, parents = skeleton.names, skeleton.parents
     if not set(human23().names) <= set(names):
         return Capsules((), np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2)))
@@ -126,16 +125,16 @@ def capsules_of(skeleton: Skeleton) -> Capsules:
 
 
 def penetration(skeleton: Skeleton, rotations: Floats) -> dict[tuple[str, str], Floats]:
-    """Return how deep limbs are in each other [...], metres, by pairs of them; 0 where they are apart.
+    """Return the penetration depth [...] of each pair of limbs, metres; 0 where they are apart.
 
-    A pair's depth is by how much the sum of the radii exceeds the distance where the capsules' axes are nearest.
+    The depth is the excess of the sum of the radii over the distance, where the capsules' axes are nearest.
 
     Args:
         skeleton: the body.
         rotations: local rotations [..., J, 4].
 
     Returns:
-        Depths by the names of both limbs, as ("left_shank", "right_shank"); nothing for a body without capsules.
+        Depths by the names of both limbs, such as ("left_shank", "right_shank"); empty for a body without capsules.
     """
     capsules = capsules_of(skeleton)
     pairs = capsules.pairs()
@@ -144,10 +143,10 @@ def penetration(skeleton: Skeleton, rotations: Floats) -> dict[tuple[str, str], 
 
 
 def legs_depth(skeleton: Skeleton, rotations: Floats) -> Floats:
-    """Return how deep a body's two legs are in each other [...], metres; 0 where they are apart.
+    """Return the greatest penetration depth of a body's two legs [...], metres; 0 where they are apart.
 
     Args:
-        skeleton: the body; one without capsules has its legs always apart.
+        skeleton: the body; without capsules, its legs are always apart.
         rotations: local rotations [..., J, 4].
     """
     capsules = capsules_of(skeleton)
@@ -171,16 +170,16 @@ def _sided(side: str, parts: Collection[str]) -> set[str]:
 
 @jit
 def pair_depths(ends: Floats, radii: Floats, pairs: Ints) -> tuple[Floats, Floats, Floats]:
-    """Return how deep pairs of capsules are in each other [T, P], metres, in which direction the first lies, and where.
+    """Return the depths, directions and nearest points of pairs of capsules.
 
-    Depths are negative where the pair is apart; directions are unit vectors from the nearest point of the second's
-    axis to the first's [T, P, 3], or 0 where they meet. Last come the shares of the way along both axes at which these
-    points are [T, P, 2].
+    Depths [T, P], metres, are negative where a pair is apart. Directions [T, P, 3] are unit vectors from the nearest
+    point of the second capsule's axis to the nearest point of the first's, or 0 where the axes meet. Nearest points are
+    given as shares of the length of both axes [T, P, 2].
 
     Args:
-        ends: of the capsules' axes [T, C, 2, 3], metres.
-        radii: at both ends [C, 2], metres.
-        pairs: numbers of capsules [P, 2].
+        ends: ends of the capsules' axes [T, C, 2, 3], metres.
+        radii: radii at both ends [C, 2], metres.
+        pairs: indices of capsules [P, 2].
     """
     depths, directions = np.empty((len(ends), len(pairs))), np.zeros((len(ends), len(pairs), 3))
     shares = np.empty((len(ends), len(pairs), 2))
@@ -198,5 +197,5 @@ def pair_depths(ends: Floats, radii: Floats, pairs: Ints) -> tuple[Floats, Float
 
 @jit
 def radius_at(radii: Floats, share: float) -> float:
-    """Return a capsule's radius, metres, at a share of the way between its ends, from its radii there [2]."""
+    """Return a capsule's radius, metres, at a share of its length, given the radii at its ends [2]."""
     return float(radii[0] + share * (radii[1] - radii[0]))

@@ -1,11 +1,11 @@
-"""One foot, one floor: how high a body's points are, where the floor is, and whether feet stay where they stand.
+"""Contact with the floor: heights of a body's points, the height of the floor, and sliding of feet.
 
-Two sets of points are in use, and the argument `heels` chooses between them:
+The argument `heels` chooses between two sets of points:
 
 - `heels=True`: joints, tips and heels. The engine places its movement by these, so that heels do not sink into the
   floor. Only bodies with a known anatomy have heels; they are points of the ankle's segment, not joints.
-- `heels=False`: joints and tips alone. The published measures of skating and sliding, and the floor that they refer
-  to, are defined on the joints that a recording has.
+- `heels=False`: joints and tips only. The published measures of skating and sliding, and the floor that they refer to,
+  are defined on the joints of a recording.
 
 Movement is given as in `Motion`: local rotations [..., J, 4] and root positions [..., 3]; all lengths are metres.
 """
@@ -24,18 +24,18 @@ from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.limbs import limb_of_points, limbs_of
 from motionmind.body.skeleton import Points, Skeleton, place, places_of, points_of, remembered
 
-RATE = 30.0  # frames a second at which feet are measured
-LOW = 0.05  # metres above the floor below which a foot should stand
+RATE = 30.0  # frames a second, to measure feet
+LOW = 0.05  # metres above the floor: a lower foot should stand
 FAR = 0.025  # metres that a standing foot may move from one frame to the next
-TALL = 1.0  # metres: of bodies at least as tall it is known how far a foot may move
+TALL = 1.0  # metres: the limits of feet hold for bodies of at least this height
 
 
 class Heel(NamedTuple):
     """A heel: a point of the ankle's segment, not a joint.
 
     Attributes:
-        ankle: number of the ankle.
-        place: place of the heel in the ankle's frame [3], metres.
+        ankle: index of the ankle.
+        place: position of the heel in the ankle's frame [3], metres.
     """
 
     ankle: int
@@ -65,9 +65,9 @@ def lowest_height(skeleton: Skeleton, rotations: Floats, root: Floats, *, heels:
 
 
 def limb_heights(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
-    """Return the height of each limb's lowest point, and last the trunk's [..., limbs + 1], metres, heels included.
+    """Return the height of the lowest point of each limb, then of the trunk [..., limbs + 1], metres; heels count.
 
-    Limbs are those of `limbs_of`; the trunk's height is infinite where every joint belongs to a limb.
+    Limbs are as in `limbs_of`; the trunk's height is infinite if every joint belongs to a limb.
 
     Args:
         skeleton: the body.
@@ -85,9 +85,9 @@ def limb_heights(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
 
 
 def lowest_point(anatomy: Anatomy, rotations: Floats, root: Floats) -> tuple[Floats, Indices]:
-    """Return the height [T] of the lowest point of an anatomy's own body, metres, and the joint [T] it belongs to.
+    """Return the height [T] of the lowest point of an anatomy's own body, metres, and the point's joint [T].
 
-    Heels are included, and belong to the ankles.
+    Heels count, as points of the ankles.
 
     Args:
         anatomy: the body.
@@ -103,9 +103,9 @@ def lowest_point(anatomy: Anatomy, rotations: Floats, root: Floats) -> tuple[Flo
 def contact_points(
     skeleton: Skeleton, rotations: Floats, root: Floats, *, heels: bool = True
 ) -> tuple[Floats, Indices]:
-    """Return the places [..., P, 3] of all points that can touch the floor, metres, and the joint [P] of each.
+    """Return the positions [..., P, 3] of all points that can touch the floor, metres, and the joint of each [P].
 
-    They are the joints, then the tips, then the heels of a body that is known to have them.
+    These are the joints, then the tips, then the heels of a body with a known anatomy.
 
     Args:
         skeleton: the body.
@@ -118,13 +118,13 @@ def contact_points(
 
 
 class Posed(NamedTuple):
-    """A movement in the world: what touches the floor, the centre of mass and legs that bend are found from it.
+    """A movement in the world, from which contacts, the centre of mass and bent legs are computed.
 
     Attributes:
         rotations: local rotations [T, J, 4].
         turned: orientations of the joints in the world [T, J, 4].
-        places: of the points that can touch the floor [T, P, 3], metres: joints, tips and heels.
-        joints: the joint that each point belongs to [P].
+        places: positions of the points that can touch the floor [T, P, 3], metres: joints, tips and heels.
+        joints: the joint of each point [P].
     """
 
     rotations: Floats
@@ -143,12 +143,12 @@ class Posed(NamedTuple):
 
 
 def pose(skeleton: Skeleton, rotations: Floats, root: Floats | None = None) -> Posed:
-    """Return a movement of local rotations [T, J, 4] in the world, or about its root.
+    """Place a movement in the world by forward kinematics.
 
     Args:
         skeleton: the body.
         rotations: local rotations [T, J, 4].
-        root: positions of the root [T, 3], metres; None for 0.
+        root: positions of the root [T, 3], metres; None for the origin.
     """
     points, joints = _with_heels(skeleton)
     turned = skeleton.global_rotations(rotations)
@@ -166,8 +166,7 @@ def _without_heels(skeleton: Skeleton) -> tuple[Points, Indices]:
 
 
 def _contacts(skeleton: Skeleton, anatomy: Anatomy | None) -> tuple[Points, Indices]:
-    """Return all joints, all tips and, given an anatomy with legs, both heels; and the joint [P] that each belongs
-    to."""
+    """Return all joints, all tips and, given an anatomy with legs, both heels; and the joint of each [P]."""
     ankles, heels = (
         ((), ()) if anatomy is None else _heel_points(anatomy, skeleton is anatomy.skeleton, skeleton.height)
     )
@@ -178,7 +177,7 @@ def _contacts(skeleton: Skeleton, anatomy: Anatomy | None) -> tuple[Points, Indi
 
 
 def heels_of(skeleton: Skeleton) -> dict[str, Heel]:
-    """Return the heels of a body that is known to have them, by name, in the order of `contact_points`."""
+    """Return the heels of a body by name, in the order of `contact_points`; none without a known anatomy."""
     anatomy = anatomy_of(skeleton)
     if anatomy is None:
         return {}
@@ -191,8 +190,13 @@ def heels_of(skeleton: Skeleton) -> dict[str, Heel]:
 def _heel_points(
     anatomy: Anatomy, is_own: bool, height: float
 ) -> tuple[tuple[int, ...], tuple[tuple[float, ...], ...]]:
-    """Return the ankles of a body with an anatomy, one a side, and the heels' places in their frames, metres: none
-    without legs. A body that is not the anatomy's own has some height, metres."""
+    """Return the ankles, one a side, and the positions of the heels in their frames, metres; none without legs.
+
+    Args:
+        anatomy: the anatomy.
+        is_own: whether the body is the anatomy's own.
+        height: height of any other body, metres.
+    """
     if anatomy.leg is None:
         return (), ()
     place = np.array(anatomy.leg.heel)
@@ -209,7 +213,7 @@ def _heel_points(
 def floor_height(lowest: Floats) -> float:
     """Return the height of the floor under movement, metres, from the heights [T] of the body's lowest point.
 
-    A recording's own zero is often off: the floor is the 5 % quantile of the lowest point's height.
+    A recording's zero is often off, so the floor is the 5 % quantile of the lowest point's height.
     """
     return float(np.quantile(lowest, 0.05))
 
@@ -231,9 +235,9 @@ def find_floor(skeleton: Skeleton, rotations: Floats, root: Floats, *, heels: bo
 
 @remembered
 def find_feet(skeleton: Skeleton) -> list[int]:
-    """Return the joints that end in feet: a person's toes, all legs of an insect.
+    """Return the joints that end in feet: a person's toes, the last joints of an insect's legs.
 
-    A foot is a leaf of the tree whose end is, at rest, within a tenth of the body's height of the lowest point.
+    A foot is a leaf of the tree. At rest, its end is within a tenth of the body's height of the lowest point.
     """
     at_rest = skeleton.rest[:, 1]
     ends = np.minimum(at_rest[: len(skeleton)], at_rest[len(skeleton) :])
@@ -246,10 +250,9 @@ def skating(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float = 
 
     Source: Karunratanakul, Preechakul, Suwajanakorn and Tang, "Guided motion diffusion for controllable human motion
     synthesis", ICCV (2023), with the same limits but two differences. Frames are at 30 a second, not 20, so the limit
-    is 0.75 m/s, not 0.5. And a foot is both ends of its last bone, so that one that turns on its ball or its tip
-    stands: it skates where it has an end below 5 cm in both frames and every such end moves too far, level. A foot
-    that swings past near the floor, as in walking, counts too: compare with the corpus's own movement. Heels do not
-    count.
+    is 0.75 m/s, not 0.5. And both ends of a foot's last bone count: a foot that turns on its ball or its tip stands. A
+    foot skates if it has an end below 5 cm in both frames and every such end moves too far horizontally. A foot that
+    swings past near the floor, as in walking, counts too: compare with the corpus's own movement. Heels do not count.
 
     Args:
         skeleton: the body.
@@ -264,8 +267,8 @@ def skating(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float = 
 def foot_slides(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float | Floats = 0.0) -> Floats:
     """Return how far each foot near the floor slides to the next frame [T - 1, feet], metres; 0 where it is higher.
 
-    A foot is near the floor where one of its ends (see `skating`) is below 5 cm in both frames; of two such ends that
-    counts which moves least, level.
+    A foot is near the floor if one of its ends (see `skating`) is below 5 cm in both frames. Of two such ends, the one
+    that moves less horizontally counts.
 
     Args:
         skeleton: the body.
@@ -277,21 +280,20 @@ def foot_slides(skeleton: Skeleton, rotations: Floats, root: Floats, floor: floa
 
 
 def slides_between(skeleton: Skeleton, places: Floats, floor: float | Floats) -> Floats:
-    """Return what `foot_slides` does, of a body whose joints and tips, and whatever points after them, are at places
-    [T, P, 3], metres."""
+    """Return the `foot_slides`, given places [T, P, 3] of joints and tips, then of any other points, metres."""
     moved, height = _foot_ends(skeleton, places, floor)
     least = np.where(height < LOW, moved, np.inf).min(axis=-1)
     return np.where(np.isfinite(least), least, 0.0)
 
 
 def feet_that_stay(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float = 0.0) -> Bools:
-    """Return which feet stay in their places on the floor from the first frame to the last [feet].
+    """Return whether each foot stays in place on the floor from the first frame to the last [feet].
 
-    Such a foot is near the floor in every frame (see `foot_slides`), and slides no further than 5 cm in all.
+    Such a foot is near the floor in every frame (see `foot_slides`), and slides at most 5 cm in all.
 
     Args:
         skeleton: the body.
-        rotations: local rotations [T, J, 4], of two frames at least.
+        rotations: local rotations [T, J, 4], for at least two frames.
         root: positions of the root joint [T, 3], metres.
         floor: height of the floor, metres.
     """
@@ -301,10 +303,10 @@ def feet_that_stay(skeleton: Skeleton, rotations: Floats, root: Floats, floor: f
 
 
 def foot_slide(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float = 0.0) -> float:
-    """Return how far feet slide, cm a frame at 30 frames a second: the mean over frames and feet of v (2 - 2^(h / H)).
+    """Return the mean slide over frames and feet, v (2 - 2^(h / H)), in cm a frame at 30 frames a second.
 
-    Here v is how far a foot moves level, h its height and H = 2.5 cm: the factor falls from 1 on the floor to 0 at H
-    and above. Of a foot's two ends (see `skating`) below H, the one that slides least counts; heels do not. Source:
+    Here v is a foot's horizontal displacement, h its height and H = 2.5 cm. The factor falls from 1 on the floor to 0
+    at H and above. Of a foot's two ends (see `skating`) below H, the one that slides less counts; heels do not. Source:
     Zhang, Starke, Komura and Saito, "Mode-adaptive neural networks for quadruped motion control", ACM TOG 37(4)
     (2018).
 
@@ -321,8 +323,11 @@ def foot_slide(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float
 
 
 def _foot_ends(skeleton: Skeleton, places: Floats, floor: float | Floats) -> tuple[Floats, Floats]:
-    """Return how far both ends of each foot's last bone move, level, to the next frame, and the greater of their
-    heights above the floor in the two frames: [T - 1, feet, 2] each, metres; from places of joints and tips."""
+    """Return the displacements and heights of both ends of each foot's last bone, [T - 1, feet, 2] each, metres.
+
+    Displacements are horizontal, from each frame to the next; heights are the greater of the two frames' heights above
+    the floor. `places` are as in `slides_between`.
+    """
     feet = np.array(find_feet(skeleton), dtype=np.intp)
     ends = places[:, np.stack([feet, feet + len(skeleton)], axis=-1)]
     moved = np.hypot(np.diff(ends[..., 0], axis=0), np.diff(ends[..., 2], axis=0))

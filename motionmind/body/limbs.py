@@ -1,12 +1,12 @@
-"""Partitions of a body's joints, each for a purpose of its own.
+"""Partitions of a body's joints, each with its own purpose.
 
-- `limbs_of`: limbs by the skeleton's tree alone, from the last fork to each leaf. For everything physical: which limb
-  stands, which is a leg. Where an arm forks into thumb and fingers these are limbs, and the arm belongs to the trunk.
-- `limb_of_points`: the same, as a number for each joint and tip; what belongs to no limb is the trunk.
-- `parts_of`: the whole body, its lower and upper half, and trunk and limbs: overlapping parts in three sizes, over
-  which the mean of walks is taken (`motionmind.walks.mean_walk`). Its limbs are those of `limbs_of`.
-- `sided_parts`: limbs by side, from the names of joints: a whole arm from the clavicle with all its fingers is one
-  part. For what a viewer sees as one limb: shuffling limbs against each other, phrases of a limb.
+- `limbs_of`: limbs by the skeleton's tree alone, from the last fork to each leaf. Physics uses them: which limb stands,
+  which is a leg. If an arm forks into thumb and fingers, these are the limbs, and the arm belongs to the trunk.
+- `limb_of_points`: the same, as an index for each joint and tip; points of no limb belong to the trunk.
+- `parts_of`: overlapping parts in three sizes, for the mean of corpus walks (`motionmind.walks.mean_walk`): the whole
+  body, its lower and upper half, and trunk and limbs. The limbs are those of `limbs_of`.
+- `sided_parts`: limbs by side, from the names of joints: a whole arm, from the clavicle to all its fingers, is one
+  part. These are the limbs that a viewer sees, for shuffling limbs against each other and for phrases of a limb.
 
 The first three follow from the tree and work on any body. The last needs the sides, and differs wherever a limb
 branches or joints of one side hang from a common stem; neither can stand in for the other.
@@ -27,7 +27,7 @@ TRUNK = "trunk"
 
 
 def stem_of(skeleton: Skeleton) -> list[int]:
-    """Return the joints from the root to the first fork; a rig may have a root or two of its own above the pelvis."""
+    """Return the joints from the root to the first fork; a rig may have roots of its own above the pelvis."""
     out = [0]
     while len(children := skeleton.children(out[-1])) == 1:
         out += children
@@ -44,7 +44,7 @@ def limbs_of(skeleton: Skeleton) -> list[list[int]]:
 
 @lru_cache(maxsize=64)
 def _limbs_of(parents: tuple[int, ...]) -> tuple[tuple[int, ...], ...]:
-    """Return the joints of each limb of a tree of joints, by the number of each one's parent."""
+    """Return the joints of each limb of a tree of joints, given the index of each joint's parent."""
     limbs, children = [], Counter(parents)
     for leaf in (joint for joint in range(1, len(parents)) if joint not in children):
         limb = [leaf]
@@ -56,9 +56,9 @@ def _limbs_of(parents: tuple[int, ...]) -> tuple[tuple[int, ...], ...]:
 
 @remembered
 def limb_of_points(skeleton: Skeleton) -> Ints:
-    """Return the number in `limbs_of` of the limb of each joint, then of each tip [2 J].
+    """Return the index in `limbs_of` of the limb of each joint, then of each tip [2 J].
 
-    Points of no limb belong to the trunk, whose number is the number of limbs.
+    Points of no limb belong to the trunk; its index is the number of limbs.
     """
     limbs = limbs_of(skeleton)
     out = np.full(len(skeleton), len(limbs), dtype=np.int64)
@@ -72,9 +72,9 @@ def limb_of_points(skeleton: Skeleton) -> Ints:
 def parts_of(skeleton: Skeleton) -> tuple[Ints, ...]:
     """Return the joints of parts of a body in three sizes; each joint is in one part of each size.
 
-    In this order: the whole; the part that carries the body, and the part that is carried (if any); the trunk, which is
-    the joints of no limb, and the limbs. The carrying part is the root, down to the first fork, and the limbs that hang
-    there: pelvis and legs.
+    In this order: the whole; the carrying part, and the carried part (if any); the trunk, with the joints of no limb,
+    and the limbs. The carrying part is the root, down to the first fork, and the limbs that start there: pelvis and
+    legs.
     """
     limbs, stem = limbs_of(skeleton), stem_of(skeleton)
     every = list(range(len(skeleton)))
@@ -86,10 +86,10 @@ def parts_of(skeleton: Skeleton) -> tuple[Ints, ...]:
 
 
 def sided_parts(skeleton: Skeleton) -> dict[str, Ints]:
-    """Return the joints of each sided limb, under the name of its first joint, and those of the trunk (`TRUNK`).
+    """Return the joints of each sided limb, by the name of its first joint, and of the trunk (`TRUNK`).
 
-    A sided limb is a branch of joints of the left or the right side, from where it leaves the middle: two arms and two
-    legs on a person, from the clavicles and the hips; six legs and two feelers on an insect.
+    A sided limb is a branch of left or right joints, from the middle of the body outward. A person has two arms and two
+    legs, from the clavicles and the hips; an insect has six legs and two feelers.
     """
     sides = sides_of(skeleton)
     parts: dict[str, list[int]] = {TRUNK: []}

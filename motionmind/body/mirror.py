@@ -1,8 +1,8 @@
 """Mirror movement: exchange left and right on any body whose rest pose is symmetric.
 
-A joint's axes are the world's when the body is at rest. Let M be the reflection along the lateral axis, and let each
-joint's partner stand, at rest, where M puts the joint. Then the mirror image of a posture has the rotation M q M at
-each joint, with q the partner's local rotation: M commutes with every step of forward kinematics.
+At rest, every joint's axes are the world's. Let M be the reflection along the lateral axis, and let M map each joint's
+rest position to its partner's. Then the mirror image of a posture has the rotation M q M at each joint, with q the
+partner's local rotation: M commutes with every step of forward kinematics.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.errors import SkeletonError
 from motionmind.geometry import rotations as rot
 
-# Measured bodies are not quite symmetric: bones differ from left to right by up to 1.2 cm in one dancer's recordings,
-# by 2.5 cm in other people's.
 LEFT, RIGHT, MIDDLE = "left", "right", "middle"
-TOLERANCE = 0.05  # of the distance from the root to the farthest joint
+# Of the distance from the root to the farthest joint. Measured bodies are not quite symmetric: left and right bones
+# differ by up to 1.2 cm in one dancer's recordings, by 2.5 cm in other people's.
+TOLERANCE = 0.05
 _X, _Y, _Z = 0, 1, 2
 
 
@@ -30,8 +30,8 @@ class Sides:
     """The joints and the axis that a mirror exchanges on a body.
 
     Attributes:
-        partners: index of each joint's mirror image [J]; a joint in the middle is its own.
-        axis: the axis from right to left when the body is at rest: 0 for x, 1 for y, 2 for z.
+        partners: index of each joint's partner [J]; a joint in the middle is its own partner.
+        axis: the lateral axis at rest: 0 for x, 1 for y, 2 for z.
     """
 
     partners: Indices
@@ -39,15 +39,15 @@ class Sides:
 
     @property
     def world(self) -> int:
-        """The world's axis along which the body is reflected: the lateral one, except that it is never the vertical."""
+        """The world's axis along which to reflect the body: the lateral axis, or x if that axis is vertical."""
         return _X if self.axis == _Y else self.axis
 
 
 def mirrored(motion: Motion) -> Motion:
-    """Return the movement with left and right exchanged; applied twice, the movement itself.
+    """Return the movement with left and right exchanged; applying this twice returns the original movement.
 
-    The body is mirrored too, so each joint is exactly where its partner appears in the mirror, even if the two sides
-    differ a little. The mirror stands at the world's origin.
+    The body is mirrored too, so each joint is exactly at the mirror image of its partner, even if the two sides differ
+    a little. The mirror plane contains the world's origin.
 
     Args:
         motion: movement on any body that `find_sides` accepts.
@@ -58,8 +58,8 @@ def mirrored(motion: Motion) -> Motion:
     sides = find_sides(motion.skeleton)
     rotations = rot.mirror(motion.rotations[:, sides.partners], sides.axis)
     if sides.axis != sides.world:
-        # The root turns between a frame that is reflected along one axis and a world that is along another:
-        # W q M = (W q W) (W M), and two reflections in a row are half a turn about the third axis.
+        # The root's rotation maps a frame reflected along one axis (M) to a world reflected along another (W):
+        # W q M = (W q W) (W M), and the two reflections W M are a half turn about the third axis.
         turn = np.zeros(4)
         turn[3 - sides.axis - sides.world] = 1.0
         rotations[:, 0] = rot.mul(rot.mirror(motion.rotations[:, 0], sides.world), turn)
@@ -75,17 +75,17 @@ def mirrored(motion: Motion) -> Motion:
 
 
 def find_sides(skeleton: Skeleton) -> Sides:
-    """Pair the joints of a body by their names along the tree, and check the pairs by their places at rest.
+    """Pair the joints of a body by their names along the tree, and check the pairs by their positions at rest.
 
-    Names may mark sides by words or letters, before, after or within: left_hip, LeftHip, lhip, LHipJoint, thigh.L,
-    hand_l, "Bip01 L Thigh". Of the axes that fit all pairs the lateral axis is the one along which they lie furthest
-    apart; a body without pairs is accepted if it has no breadth in x.
+    Names may mark sides by words or letters at any place: left_hip, LeftHip, lhip, LHipJoint, thigh.L, hand_l,
+    "Bip01 L Thigh". The lateral axis is the axis that fits all pairs and along which they are farthest apart. A body
+    without pairs is accepted if it has no extent in x.
 
     Args:
         skeleton: the body.
 
     Raises:
-        SkeletonError: a joint has no partner, or two partners are no mirror images of each other.
+        SkeletonError: a joint has no partner, or two partners are not mirror images of each other.
     """
     partners = _pair(skeleton)
     paired = partners != np.arange(len(skeleton))
@@ -113,11 +113,11 @@ def _mirrored_body(skeleton: Skeleton, sides: Sides) -> Skeleton:
     return replace(skeleton, offsets=skeleton.offsets[sides.partners] * sign, tips=skeleton.tips[sides.partners] * sign)
 
 
-# --- by their names ---------------------------------------------------------------------------------------------------
+# --- pairing by name --------------------------------------------------------------------------------------------------
 
 
 def _pair(skeleton: Skeleton) -> Indices:
-    """Return each joint's partner [J]: the child of its parent's partner whose name is that of the other side."""
+    """Return each joint's partner [J]: the child of its parent's partner with the name of the other side."""
     names = skeleton.names
     partners = np.zeros(len(skeleton), dtype=np.intp)
     for joint, name in enumerate(names):
@@ -161,13 +161,13 @@ def other_side(name: str) -> set[str]:
 def sides_of(skeleton: Skeleton) -> list[str]:
     """Return LEFT, RIGHT or MIDDLE for each joint [J].
 
-    A joint is sided if another joint has the name of its other side, or if "left" or "right" is a word of its name;
-    else it is on its parent's side. Names are read as `find_sides` reads them: lfemur and thigh.L as well as left_hip.
+    A joint is sided if another joint has its name for the other side, or if "left" or "right" is a word of its name;
+    otherwise it is on its parent's side. Names are read as by `find_sides`: lfemur and thigh.L as well as left_hip.
     """
     names, found = set(skeleton.names), list[str]()
     for name, parent in zip(skeleton.names, skeleton.parents, strict=True):
         others = other_side(name) & names
-        if others:  # "l" and "left" stand before "r" and "right"
+        if others:  # "l" and "left" sort before "r" and "right"
             found.append(LEFT if name.lower() < min(others).lower() else RIGHT)
         else:
             found.append(_side_in(name) or (found[parent] if parent >= 0 else MIDDLE))
@@ -191,16 +191,16 @@ def _exchanged(found: re.Match[str]) -> str:
 
 
 def _side_in(name: str) -> str:
-    """Return LEFT or RIGHT if that is a word of the name by itself, which rules out the middle; else ""."""
+    """Return LEFT or RIGHT if a word of the name says so, which rules out the middle; else ""."""
     words = (word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name))
     return next((LEFT if word in ("left", "l") else RIGHT for word in words if word in _OPPOSITE), "")
 
 
-# --- by where they stand ----------------------------------------------------------------------------------------------
+# --- checking by position ---------------------------------------------------------------------------------------------
 
 
 def _asymmetry(skeleton: Skeleton, partners: Indices, off: Floats) -> str:
-    """Describe the joint that is furthest from its partner's mirror image, along the axis that fits best."""
+    """Describe the joint that is farthest from its partner's mirror image, along the axis that fits best."""
     axis = int(off.max(axis=1).argmin())
     joint = int(off[axis].argmax())
     name, other = skeleton.names[joint], skeleton.names[partners[joint]]

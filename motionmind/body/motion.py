@@ -39,20 +39,20 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SAME_TIME_S = 1e-6  # times no further apart count as equal
-# Seconds over which a velocity is taken. In a dancer's recordings, at 30 and at 120 frames a second, a line over this
-# time is nearest to the movement on both sides of its end: a shorter one has more noise, a longer one is out of date.
+# Time over which a line is fitted for a velocity. In a dancer's recordings, at 30 and 120 frames a second, this time
+# fits the movement on both sides of its end best: a shorter one has more noise, a longer one is out of date.
 VELOCITY_SPAN_S = 1.0 / 15.0
 
 
 @dataclass(frozen=True, eq=False)
 class Posture:
-    """One moment of a body.
+    """A posture of a body.
 
     Attributes:
         skeleton: the body.
         rotations: unit quaternions x, y, z, w [J, 4], each local to the parent's frame.
         root: position of the root joint [3], metres.
-        recorded: credits of the movement that it was taken from, as of Motion.
+        recorded: credits of the movement that it was taken from, as in Motion.
 
     >>> import numpy as np
     >>> from motionmind import Posture, human23
@@ -91,8 +91,8 @@ class Insertion:
 
     Attributes:
         times: times [M + 1] of the postures that its M moves join, seconds; the first is A's, the last B's.
-        bridged: moves of joints that no corpus attests: the joint's name, and the number of the move from 0.
-        credits: whose movement it is made of; empty where that is not known, and where nothing moves.
+        bridged: moves of joints that no corpus attests: the joint's name, and the index of the move.
+        credits: credits of the movement that it is made of; empty if unknown, or if nothing moves.
 
     >>> import numpy as np
     >>> from motionmind import Insertion
@@ -137,10 +137,11 @@ class Motion:
         root: positions of the root joint [T, 3], metres.
         times: seconds, strictly increasing [T].
         name: the clip's name.
-        insertions: the stretches that the engine made, in order of time; empty for movement that is all recorded.
+        insertions: the stretches that the engine made, in order of time; empty if all movement is recorded.
         keyframed: whether each frame is a posture that someone chose, as in a score; False for frames of a recording,
             and for movement between keyframes.
-        recorded: credits of what the engine did not make, in shares that add up to 1; empty if only its name is known.
+        recorded: credits of the movement that the engine did not make, in shares that sum to 1; empty if only its name
+            is known.
 
     >>> import numpy as np
     >>> from motionmind import Motion, Posture, human23
@@ -199,7 +200,7 @@ class Motion:
         """Return the posture at index `frame`; negative indices count from the end.
 
         Raises:
-            MotionMindError: there is no such frame; the message names those there are.
+            MotionMindError: there is no such frame; the message gives the range.
         """
         check_integer("frame", frame)
         if not -len(self) <= frame < len(self):
@@ -224,14 +225,14 @@ class Motion:
         return replace(part, insertions=kept) if kept else part
 
     def inserted(self) -> Bools:
-        """Return which frames [T] the engine made: those between the A and the B of an insertion."""
+        """Return whether the engine made each frame [T]: the frames between the A and the B of an insertion."""
         found = np.zeros(len(self), dtype=bool)
         for one in self.insertions:
             found |= (self.times > one.times[0] + SAME_TIME_S) & (self.times < one.times[-1] - SAME_TIME_S)
         return found
 
     def bridged(self) -> Bools:
-        """Return, for each frame and joint [T, J], whether the joint is within a move that no corpus attests."""
+        """Return whether each joint, in each frame [T, J], is within a move that no corpus attests."""
         found = np.zeros((len(self), len(self.skeleton)), dtype=bool)
         for one in self.insertions:
             for joint, move in one.bridged:
@@ -243,9 +244,9 @@ class Motion:
 
     @property
     def credits(self) -> tuple[Credit, ...]:
-        """Shares of time by clip: insertions by their credits, and all else by `own_credits`.
+        """Shares of time by clip: insertions by their credits, all else by `own_credits`.
 
-        It is empty for a posture that the engine came back to without moving.
+        Empty for an insertion that lasts no time.
         """
         start, end = float(self.times[0]), float(self.times[-1])
         if start == end:
@@ -261,7 +262,7 @@ class Motion:
 
     @property
     def own_credits(self) -> tuple[Credit, ...]:
-        """Shares of what the engine did not make: `recorded`, or given movement of this name."""
+        """Credits of the movement that the engine did not make: `recorded`, or the motion's name."""
         return self.recorded or (Credit(1.0, self.name or "movement"),)
 
     @cached_property
@@ -279,14 +280,14 @@ class Motion:
     def resample(self, rate: float) -> Motion:
         """Return the motion at `rate` postures a second, from its first time on; rotations by slerp, root linearly.
 
-        Frames that fall on a frame of the source are that frame. A motion shorter than one step keeps its first
-        posture. Jitter of the source's clock of up to a thousandth of a step does not lose the last posture.
+        A frame at the time of a source frame equals that frame. A motion shorter than one step keeps its first posture.
+        The last posture survives jitter of the source's clock of up to a thousandth of a step.
 
         Args:
             rate: postures a second, at most FASTEST.
 
         Raises:
-            MotionMindError: the rate is out of that range, or gives too many frames (as `at`).
+            MotionMindError: the rate is out of range, or gives too many frames (as for `at`).
         """
         check_real("rate", rate)
         if not 0.0 < rate <= FASTEST:
@@ -299,15 +300,15 @@ class Motion:
         return self.at(self.times[0] + np.arange(steps + 1) / rate)
 
     def _check_size(self, frames: float) -> None:
-        """Check that so many frames may be made of these; of a recording, however long, about as many may."""
+        """Check the size of a result of `frames` frames; always allow up to twice as many as this motion has."""
         if frames > 2.0 * len(self):
             check_size(frames, len(self.skeleton), self.name)
 
     def at(self, times: Floats) -> Motion:
-        """Return the motion at increasing `times` [N], seconds: rotations by slerp, root linearly; still beyond it.
+        """Return the motion at increasing `times` [N], seconds: rotations by slerp, root linearly; still outside it.
 
         Raises:
-            MotionMindError: there are too many of them (`check_size`), and more than twice as many as there are frames.
+            MotionMindError: the result is too large (`check_size`), and has more than twice as many frames.
         """
         times = as_floats("times", times)
         self._check_size(len(times))
@@ -335,11 +336,11 @@ class Motion:
         return self.skeleton.positions(self.rotations, self.root)
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return the movement as a pandas table: a row a frame, by its time in seconds.
+        """Return the movement as a pandas table: one row per frame, indexed by time in seconds.
 
-        Columns are pairs of a joint and a value: `x`, `y` and `z` are where the joint is, in metres; `qx`, `qy`, `qz`
-        and `qw` its rotation, local to its parent; `degrees` is how far it is turned from rest, 0 to 180.
-        `table["left_knee", "degrees"]` is one curve, `table.xs("degrees", axis=1, level="value")` has those of all
+        Columns are pairs of a joint and a value: `x`, `y` and `z` are the joint's position, in metres; `qx`, `qy`, `qz`
+        and `qw` its rotation, local to its parent; `degrees` its angle from rest, 0 to 180.
+        `table["left_knee", "degrees"]` is one curve; `table.xs("degrees", axis=1, level="value")` has the curves of all
         joints.
 
         Raises:
@@ -369,8 +370,8 @@ class Velocity:
     """The velocity with which a body passes a posture.
 
     Attributes:
-        rotations: angular velocities of the joints [J, 3], radians a second, each in the joint's own frame: a moment dt
-            later the joint's rotation is `q exp(dt rotations)`.
+        rotations: angular velocities of the joints [J, 3], radians a second, each in the joint's own frame: after a
+            short time dt the joint's rotation is `q exp(dt rotations)`.
         root: velocity of the root joint [3], metres a second, in the world's axes.
 
     >>> import numpy as np
@@ -390,26 +391,26 @@ class Velocity:
 
     @classmethod
     def at_start(cls, motion: Motion) -> Velocity:
-        """Return the velocity with which a motion begins: see `at_end`."""
+        """Return the velocity at the start of a motion; see `at_end`."""
         check_type("motion", motion, Motion)
         return cls._about(motion, 0, motion.times <= motion.times[0] + VELOCITY_SPAN_S + SAME_TIME_S, 1)
 
     @classmethod
     def at_end(cls, motion: Motion) -> Velocity:
-        """Return the velocity with which a motion ends.
+        """Return the velocity at the end of a motion.
 
-        It is the slope of the line through the last frame that is nearest, by least squares, to the frames of the last
-        1/15 s, or to the last but one if that is earlier. Rotations are taken as rotation vectors from the last frame.
+        It is the slope of the least-squares line through the last frame, fitted to the frames of the last 1/15 s, or to
+        the last but one if that is earlier. Rotations are taken as rotation vectors from the last frame.
 
         Raises:
-            MotionMindError: there is one frame only.
+            MotionMindError: there is only one frame.
         """
         check_type("motion", motion, Motion)
         return cls._about(motion, -1, motion.times >= motion.times[-1] - VELOCITY_SPAN_S - SAME_TIME_S, -2)
 
     @classmethod
     def _about(cls, motion: Motion, end: int, near: Bools, neighbour: int) -> Velocity:
-        """Return the slope, at the frame `end`, of a motion's frames `near` [T] to it and of the one next to it."""
+        """Return the slope at the frame `end`, from a motion's frames `near` it [T] and the frame next to it."""
         if len(motion) < 2:
             raise MotionMindError(f"{motion.name or 'the motion'} has one frame, which shows no velocity: two at least")
         near[neighbour] = True
