@@ -1,4 +1,4 @@
-"""Diagnosis of a request without a path: the blocked joints, their states in A and B, and possible remedies."""
+"""Diagnose a request without a path: the blocked joints, their states in A and B, and possible remedies."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from motionmind.search.problem import Model, Rules
 
 @dataclass(frozen=True)
 class Remedy:
-    """A change that would give a joint a path, and the fewest moves that such a path takes."""
+    """A change that would give a joint a path, and the fewest moves of such a path."""
 
     what: str
     moves: int
@@ -47,10 +47,10 @@ class BlockedJoint:
         joint: its name.
         start: name of its state in A.
         goal: name of its state in B.
-        needs: fewest moves that it needs; None where no number suffices.
+        needs: fewest moves that it needs; None if no number suffices.
         ahead: number of states reachable from its state in A, itself included.
         behind: number of states from which its state in B is reachable.
-        gap: where `needs` is None, the nearest pair of states from these two sets.
+        gap: the nearest pair of states from these two sets, if `needs` is None.
         remedies: changes that would give it a path.
     """
 
@@ -120,9 +120,9 @@ def diagnose(
 ) -> Diagnosis:
     """Find the joints without a path from states `start` [L] to `goal` [L] under `rules`, and remedies for them.
 
-    Try these remedies for each joint: bridges, if `strict` forbade them; learning the corpus backwards too, or mirrored
-    too, as far as its states allow; and coarser states. A joint may wait at its goal, so a path exists if each joint
-    has a path that is short enough.
+    The remedies tried for each joint are bridges, if `strict` forbade them; learning the corpus backwards too; learning
+    it mirrored too, as far as its states allow; and coarser states. A joint may wait at its goal, so a path exists if
+    each joint has a short enough path.
     """
     faults = []
     for chain in range(len(grammar.chains)):
@@ -156,7 +156,7 @@ def diagnose(
 def _remedies(
     graph: csr_array, grammar: Grammar, corpus: Corpus, space: StateSpace, chain: int, a: int, b: int, strict: bool
 ) -> Iterator[tuple[str, int | None]]:
-    """Yield each change that might lead a chain from state `a` to `b`, with the moves it then needs, None if stuck."""
+    """Yield each change that might lead a chain from state `a` to `b`, with the moves it then needs; None if stuck."""
     if strict:
         first, last = grammar.transitions.starts[chain], grammar.transitions.starts[chain + 1]
         indptr = grammar.bridges.indptr[first : last + 1]
@@ -179,7 +179,7 @@ def _remedies(
 def _mirrored(grammar: Grammar, corpus: Corpus, space: StateSpace, chain: int) -> csr_array | None:
     """Mirror the moves of a chain's partner onto the chain's own states.
 
-    Return None if the body has no mirror image, or the chain's image is more than its partner's reflection.
+    Return None if the body has no mirror image, or if the chain's image is not simply its partner's reflection.
     """
     graph = grammar.transitions
     if grammar.chains[chain] == FACING:

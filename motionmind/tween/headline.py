@@ -1,4 +1,4 @@
-"""A tween in a few words: the facts that a choreographer wants first, and the flaws that make a viewer wince."""
+"""Summarise a tween in a few words: the facts that a choreographer wants first, and the flaws that a viewer sees."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from motionmind.errors import enumerated
 from motionmind.learned.plausibility import Sighting
 from motionmind.tween.result import Tween
 
-# Words for what a movement shows a viewer: its greatest value, the corpus's greatest and the part of the body; and the
-# digits and the kind that format a number.
+# By measure: a message with the movement's greatest value, the corpus's limit and the body part; then the digits and the
+# kind of number for both values.
 _MEASURE_WORDS = {
-    "balance": ("it leans {0} m over what it stands on, in the corpus {1} at most", 2, "f"),
-    "bounce": ("it bounces: its mass is accelerated by {0} m/s^2, in the corpus by {1} at most", 0, "f"),
-    "flight": ("it floats: in the air it lacks {0} of gravity, in the corpus {1} at most", 0, "%"),
-    "crossed_limbs": ("limbs are {0} m deep in each other, in the corpus {1} at most", 3, "f"),
-    "sliding": ("feet slide: near the floor one moves in {0} of a second, in the corpus in {1} at most", 0, "%"),
-    "pace": ("{2} moves at {0} times the corpus's fast pace; the corpus itself at {1} times at most", 1, "f"),
+    "balance": ("leans {0} m beyond its support; corpus limit {1} m", 2, "f"),
+    "bounce": ("bounces: vertical acceleration {0} m/s^2; corpus limit {1} m/s^2", 0, "f"),
+    "flight": ("floats: {0} of gravity is missing in the air; corpus limit {1}", 0, "%"),
+    "crossed_limbs": ("limbs penetrate each other by {0} m; corpus limit {1} m", 3, "f"),
+    "sliding": ("feet slide: one moves near the floor in {0} of a second; corpus limit {1}", 0, "%"),
+    "pace": ("{2} moves at {0} times its fastest usual speed; corpus limit {1} times", 1, "f"),
 }
-# Words for residuals of the solve, and the visible thresholds in centimetres and degrees.
+# Messages for residuals of the solve, and the thresholds of visibility in centimetres and degrees.
 _RESIDUAL_WORDS = {
-    "Contacts": ("a part that stands is {0:.0f} cm off its place at {1:.1f} s", 4.0),
-    "Floor": ("a part is {0:.0f} cm under the floor at {1:.1f} s", 2.0),
+    "Contacts": ("a standing part is {0:.0f} cm off its place at {1:.1f} s", 4.0),
+    "Floor": ("a part is {0:.0f} cm below the floor at {1:.1f} s", 2.0),
     "Limits": ("a joint is {0:.0f} degrees beyond its limit at {1:.1f} s", 8.0),
 }
 
 
 def headline(tween: Tween) -> str:
-    """Summarise a tween in a line: its length, whether the corpus attests its moves, the proof, and the feet.
+    """Summarise a tween in a line: length, whether the corpus attests its moves, proof, and feet that stay in place.
 
     >>> from motionmind import Engine
     >>> from motionmind.tween.headline import headline
@@ -48,7 +48,7 @@ def headline(tween: Tween) -> str:
 
 
 def beyond(tween: Tween) -> list[str]:
-    """List, one per line, the ways in which a tween exceeds everything in the corpus and makes a viewer wince."""
+    """List the visible flaws of a tween, one message each: measures beyond the corpus, residuals, and a far bridge."""
     said = [shown_beyond(name, one) for name, one in tween.shown.items() if one.is_beyond]
     said += [
         _RESIDUAL_WORDS[one.term][0].format(one.most, one.at)
@@ -58,18 +58,17 @@ def beyond(tween: Tween) -> list[str]:
     if tween.bridges:
         far = max(tween.bridges, key=lambda bridge: bridge.degrees)
         if far.degrees >= 30.0:  # nobody notices a smaller bridge
-            said.append(
-                f"{displayed(far.joint)} turns by {far.degrees:.0f} degrees as in no clip, in move {far.move + 1}"
-            )
+            turn = f"{displayed(far.joint)} turns by {far.degrees:.0f} degrees in move {far.move + 1}"
+            said.append(f"{turn}, as in no clip")
     return said
 
 
 def shown_beyond(name: str, one: Sighting) -> str:
-    """Describe a measure that exceeds everything in the corpus, and by how much.
+    """Describe a measure that exceeds the corpus's limit.
 
     Args:
         name: name of the measure, one of `motionmind.learned.plausibility.MEASURES`.
-        one: the movement's sighting of it, which exceeds the corpus's.
+        one: the movement's value, which exceeds the limit.
     """
     words, digits, kind = _MEASURE_WORDS[name]
     for more in range(4):  # extra digits to tell the two numbers apart

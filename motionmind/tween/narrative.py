@@ -1,4 +1,4 @@
-"""A report in words: for each move, each joint's part, its likelihood, its source and its cost."""
+"""Explain a report move by move: each joint's states, likelihood, source and cost."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class JointStep(msgspec.Struct, frozen=True):
         after: name of the state after it.
         moved: whether the two states differ.
         degrees: angle between them.
-        how: the kind of move: attested by the corpus, a wait at the goal, or a bridge.
-        likelihood: P(next state | state), as counted in the corpus; 0 where it attests no such move.
-        cost: nats for the move.
-        coordination: nats for the new state given its parent's.
-        guide: nats for the departure of the new state from the orientation that corpus walks expect.
+        how: whether the corpus attests the move, or it is a wait at the goal, or a bridge.
+        likelihood: P(next state | state), as counted in the corpus; 0 if it attests no such move.
+        cost: cost of the move, nats.
+        coordination: cost of the new state given its parent's, nats.
+        guide: cost of the new state's departure from the orientation that corpus walks expect, nats.
         followed: whether the motion is within the tolerance of both states.
         source: a place in the corpus that attests the move; None if there is none, or the motion does not follow.
     """
@@ -54,7 +54,7 @@ class ExplainedMove(msgspec.Struct, frozen=True):
         move: its number, from 1.
         begins: start of the move, seconds from the beginning.
         ends: end of the move, seconds from the beginning.
-        cost: nats.
+        cost: its cost, nats.
         joints: every joint's part in it [L].
     """
 
@@ -69,13 +69,13 @@ class Explanation(msgspec.Struct, frozen=True):
     """A tween move by move, with the parts that add up to its cost.
 
     Attributes:
-        status: as in the report.
-        cost: nats.
-        lower_bound: nats.
-        gap: share of the cost.
+        status: status of the search, as in the report.
+        cost: cost of the path, nats.
+        lower_bound: proven lower bound of the cost, nats.
+        gap: gap between the two, as a share of the cost.
         seconds: length of the motion.
         moved: part of the cost for the joints' moves, nats.
-        coordinated: part of the cost for how joints coordinate, nats.
+        coordinated: part of the cost for the coordination of joints, nats.
         guided: part of the cost for departures from the corpus walks, nats.
         tolls: part of the cost for the number of moves, nats.
         moves: the moves.

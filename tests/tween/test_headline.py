@@ -20,10 +20,10 @@ from motionmind.tween.result import Tween
 @pytest.mark.parametrize(
     ("value", "said"),
     [
-        (0.35, "it leans 0.35 m over what it stands on, in the corpus 0.22 at most"),
-        (0.2249, "it leans 0.225 m over what it stands on, in the corpus 0.216 at most"),
-        (0.2162, "it leans 0.2162 m over what it stands on, in the corpus 0.2160 at most"),
-        (0.216 + 1e-9, "it leans 0.21600 m over what it stands on, in the corpus 0.21600 at most"),
+        (0.35, "leans 0.35 m beyond its support; corpus limit 0.22 m"),
+        (0.2249, "leans 0.225 m beyond its support; corpus limit 0.216 m"),
+        (0.2162, "leans 0.2162 m beyond its support; corpus limit 0.2160 m"),
+        (0.216 + 1e-9, "leans 0.21600 m beyond its support; corpus limit 0.21600 m"),
     ],
 )
 def test_what_exceeds_the_corpus_by_little_gets_the_digits_that_show_it(value: float, said: str) -> None:
@@ -95,20 +95,20 @@ def test_a_viewer_winces_at_what_the_corpus_never_shows_and_at_far_bridges(
 ) -> None:
     assert beyond(tween) == []
     for name, sighting, said in (
-        ("balance", Sighting(0.31, 0.1, "m"), "it leans 0.31 m over what it stands on, in the corpus 0.10 at most"),
+        ("balance", Sighting(0.31, 0.1, "m"), "leans 0.31 m beyond its support; corpus limit 0.10 m"),
         (
             "sliding",
             Sighting(0.8, 0.4, ""),
-            "feet slide: near the floor one moves in 80% of a second, in the",
+            "feet slide: one moves near the floor in 80% of a second; corpus",
         ),
-        ("pace", Sighting(3.0, 1.5, "", "left_hip"), "left_hip moves at 3.0 times the corpus's fast pace"),
+        ("pace", Sighting(3.0, 1.5, "", "left_hip"), "left_hip moves at 3.0 times its fastest usual speed"),
     ):
         (sentence,) = beyond(shown(tween, name, sighting))
         assert sentence.startswith(said)
         assert beyond(shown(tween, name, replace(sighting, value=0.0))) == []
     near, far = Bridge("neck", 0, 29.0, 29.0), Bridge("left_hip", 2, 108.2, 108.2)
     assert beyond(replace(tween, bridges=(near,))) == []
-    assert beyond(replace(tween, bridges=(near, far))) == ["left_hip turns by 108 degrees as in no clip, in move 3"]
+    assert beyond(replace(tween, bridges=(near, far))) == ["left_hip turns by 108 degrees in move 3, as in no clip"]
 
 
 @pytest.fixture
