@@ -168,7 +168,7 @@ def take_files(
     on_taken: Callable[[Taken], None],
     on_odd: Callable[[str], None],
 ) -> Iterator[Recording]:
-    """Have workers take all files without a shard; then yield the recordings in the order of the files.
+    """Let workers take all files without a shard; then yield the recordings in the order of the files.
 
     Files on another skeleton than most are left out; of equally frequent skeletons the first counts.
 

@@ -13,7 +13,7 @@ from motionmind.errors import enumerated
 from motionmind.learned.plausibility import Sighting
 from motionmind.tween.result import Tween
 
-# By measure: a message with the movement's greatest value, the corpus's limit and the body part; then the digits and the
+# By measure: a message with the movement's greatest value, the corpus's limit and the body part; then the digits and
 # kind of number for both values.
 _MEASURE_WORDS = {
     "balance": ("leans {0} m beyond its support; corpus limit {1} m", 2, "f"),
@@ -91,7 +91,7 @@ def seen_in(tween: Tween) -> str:
 
 def _proof(tween: Tween) -> str:
     """Describe the proof of the cost."""
-    kind = "of those that differ so much" if tween.differs else "of its kind"
+    kind = "with this difference" if tween.differs else "of its kind"
     if tween.status == "sampled":
         return "drawn at random"
     if tween.status == "optimal":

@@ -124,7 +124,7 @@ def test_the_command_line_prints_a_table_and_says_where_there_are_no_more(run: R
     lines = [line for line in printed if not line.lstrip().startswith("beware")]
     assert [line.split()[0] for line in lines] == ["1", "2", "3", "moves", "1", "2", "3", "written"]
     assert lines[0].endswith("; proven the best of its kind; the left foot stays in place")
-    assert " of those that differ so much" in lines[1]
+    assert " with this difference" in lines[1]
     assert "; follows " not in lines[0]
     assert all("; follows " in line for line in lines[1:3])
     shares = [int(word.rstrip("%,")) for word in lines[2].split()[-2:]]

@@ -59,7 +59,7 @@ def test_it_says_length_making_proof_and_feet(tween: Tween) -> None:
             "; ended early, proven to cost at most 50% more than the best of its kind",
         ),
         ({"status": "sampled"}, "; drawn at random"),
-        ({"differs": (0.3,)}, "; proven the best of those that differ so much"),
+        ({"differs": (0.3,)}, "; proven the best with this difference"),
         ({"bridges": (Bridge("neck", 0, 5.0, 5.0),)}, ", seen in ballet but for 1 move of neck; "),
         (
             {"bridges": tuple(Bridge(name, 0, 5.0, 5.0) for name in "abcd")},
