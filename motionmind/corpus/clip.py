@@ -8,7 +8,7 @@ from typing import Literal
 
 Repair = Literal["put back", "reconstructed", "none"]
 
-FLIP_DEGREES = 45.0  # that a joint turns in one frame where its recording is at fault, unless another angle is given
+FLIP_DEGREES = 45.0  # default: a joint that turns farther in one frame is a fault of the recording
 MIRRORED = " (mirrored)"  # after the name of a clip
 
 

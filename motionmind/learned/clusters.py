@@ -22,12 +22,12 @@ from motionmind.geometry.distances import squared_distance, squared_turn
 from motionmind.jit import jit
 from motionmind.learned.neighbours import node_bounds
 
-CLUSTER_RADIUS_RAD = 0.2  # radius of a cluster, RMS radians per joint
-N_TREE_DIMENSIONS = 6  # dimensions of the tree; more gain little
-MAX_FOUNDERS_COMPARED = 32  # most founders compared with a posture, nearest projections first
-N_POSTURES_PER_BLOCK = 2048  # postures compared at a time
-N_POSTURES_FOR_DIRECTIONS = 4096  # postures from which the directions are computed
-SLACK_RAD2 = 1e-6  # allowance for rounding in squared distances of projections
+CLUSTER_RADIUS_RAD = 0.2  # RMS over joints
+N_TREE_DIMENSIONS = 6  # more gain little
+MAX_FOUNDERS_COMPARED = 32  # with a posture, nearest projections first
+N_POSTURES_PER_BLOCK = 2048  # compared at a time
+N_POSTURES_FOR_DIRECTIONS = 4096
+SLACK_RAD2 = 1e-6  # for rounding in squared distances of projections
 # Squared distances, radians^2, that differ by less are a tie. Rounding makes differences of 1e-15, by which two dozen
 # of the 13,932 memberships in recordings of one dancer (cmu-05) differed between two processors.
 TIE_RAD2 = 1e-12

@@ -20,7 +20,7 @@ from motionmind.executors.workshop import Workshop
 
 @dataclass(frozen=True, eq=False)
 class Gauge:
-    """Measurements of C clips, at FPS frames per second, from which the pace of their corpus is fitted.
+    """Measurements of C clips, at SAMPLED_FPS, from which the pace of their corpus is fitted.
 
     Attributes:
         starts: first step, resting frame and window of each clip, then their totals [C + 1, 3].

@@ -15,7 +15,7 @@ from motionmind.geometry.distances import squared_distance, squared_turn
 from motionmind.jit import jit, read_only
 from motionmind.learned.neighbours import CODE_OF_ONE, MAX_LEAF_SAMPLES, Neighbours
 
-N_LEAVES_VISITED = 48  # leaves visited per search
+N_LEAVES_VISITED = 48  # per search
 NEARER_THAN_CENTRE_RATIO = 0.6  # radii by which a ball's nearest sample is likely to be nearer than its centre
 
 

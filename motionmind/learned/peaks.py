@@ -13,17 +13,17 @@ from motionmind._typing import Floats, Ints
 from motionmind.learned.percentiles import Percentile
 from motionmind.learned.sampled import SAMPLED_FPS
 
-PEAK_PERCENTILE = 99.0  # percentile of frames, or windows
-PEAK_WINDOWS_S = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0  # window lengths, seconds
-STRIDE_FRAMES = 6  # frames from window to window
-MIN_WINDOWS = 10  # least number of windows; with fewer, the peaks of shorter windows apply
+PEAK_PERCENTILE = 99.0  # of frames, or windows
+PEAK_WINDOWS_S = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
+STRIDE_FRAMES = 6  # from window to window
+MIN_WINDOWS = 10  # with fewer, the peaks of shorter windows apply
 _WINDOW_STRIDES = [
     round(seconds * SAMPLED_FPS / STRIDE_FRAMES) for seconds in PEAK_WINDOWS_S
 ]  # of the windows, in strides
 
 
 class Peaks:
-    """The peaks of stretches of movement added one after the other, at FPS frames per second.
+    """The peaks of stretches of movement, added one after the other, at SAMPLED_FPS.
 
     Args:
         lengths: numbers of steps of all stretches to be added [n].
@@ -49,7 +49,7 @@ class Peaks:
                 windows.add(np.lib.stride_tricks.sliding_window_view(parts, size, axis=0).max(axis=-1))
 
     def values(self, most: Floats, least: Floats) -> Floats:
-        """Return the peaks of windows of each of LENGTHS [6, K + 1].
+        """Return the peaks of windows of each of PEAK_WINDOWS_S [6, K + 1].
 
         Args:
             most: peaks to use if there are too few windows of any length [K + 1].

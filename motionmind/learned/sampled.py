@@ -13,8 +13,8 @@ from motionmind.corpus.clip import Clip
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry.splines import natural_spline, rotation_spline
 
-SAMPLED_FPS = 30.0  # default frame rate of measurements
-BLOCK_FRAMES = 3840  # frames resampled at a time
+SAMPLED_FPS = 30.0  # for measurements
+BLOCK_FRAMES = 3840  # resampled at a time
 
 
 class Sampled:
