@@ -3,8 +3,9 @@
 `squared_distance` of two postures is the squared Euclidean distance between their rotation matrices [m, 3, 3], each
 divided by the square root of 2. A projection onto few directions never increases it. So a k-d tree of the projections
 (Bentley, "Multidimensional binary search trees used for associative searching", CACM 18:509, 1975) lists candidate
-founders of clusters, which are compared until no other can be nearer. Where postures differ in all joints, candidates
-are many: at most LOOKED_AT are compared, and the nearest may be missed. In corpora of some thousand postures none is.
+founders of clusters, which are compared until no other can be nearer. If postures differ in all joints, there are many
+candidates. At most MAX_FOUNDERS_COMPARED are compared, so the nearest may be missed; in corpora of some thousand
+postures it never is.
 """
 
 from __future__ import annotations
@@ -36,8 +37,8 @@ TIE_RAD2 = 1e-12
 def clusters_of(skeleton: Skeleton, orientations: Floats, workshop: Workshop | None = None) -> Int32s:
     """Cluster the postures of each body part: [N, P], with parts as in `parts_of` and clusters numbered from 0.
 
-    In order, a posture founds a cluster unless a founder lies within ALIKE. Then each posture joins its nearest
-    founder, or the first of several equally near (TIE).
+    In order, a posture founds a cluster unless a founder lies within CLUSTER_RADIUS_RAD. Then each posture joins its
+    nearest founder, or the first of several equally near ones (TIE_RAD2).
 
     Args:
         skeleton: the body.
