@@ -33,11 +33,11 @@ from motionmind.learned.sampled import BLOCK_FRAMES, Sampled
 
 MEASURES = (*SEEN, "pace", "sliding")
 UNITS_AND_MEANINGS = {
-    "balance": ("m", "how far the body leans over what it stands on, on one limb and at ease"),
-    "bounce": ("m/s^2", "greatest acceleration of the body's mass, up or down"),
+    "balance": ("m", "how far the body, calm on one limb, leans beyond its support"),
+    "bounce": ("m/s^2", "greatest vertical acceleration of the body's mass"),
     "flight": ("", "share of gravity that the body lacks in the air: 1 where it floats"),
-    "crossed_limbs": ("m", "how deep limbs are in each other"),
-    "pace": ("", "how many times as fast as its fastest the fastest part of the body is"),
+    "crossed_limbs": ("m", "greatest penetration depth of limbs"),
+    "pace": ("", "greatest ratio of a part's speed to its fastest usual speed"),
     "sliding": ("", "greatest share of a second in which a foot near the floor slides"),
 }
 STRETCH_S = 1.0
