@@ -7,8 +7,7 @@ import numpy as np
 from motionmind._typing import Bools, Floats
 from motionmind.jit import jit
 
-SURELY_FALLS_M = 0.1  # metres beyond the allowed overhang at which a body surely falls
-WALKING_MPS = 0.5  # metres a second: a body that travels faster falls from foot to foot, as walkers do
+WALKING_MPS = 0.5  # a body that travels faster falls from foot to foot, as walkers do
 
 
 def walks(root: Floats, fps: float) -> bool:
@@ -29,7 +28,7 @@ def is_beyond(points: Floats, touches: Bools, centre: Floats, overhang: float) -
 
 
 def falls_without(points: Floats, low: Bools, feet: Bools, centre: Floats, overhang: float) -> Floats:
-    """Return the degree to which a body would fall without each foot [N, feet], 0 to 1 (it surely falls).
+    """Return the degree to which a body would fall without each foot [N, feet]: 0 if balanced, 1 if it surely falls.
 
     Args:
         points: level positions of the body's points [N, P, 2], metres.
@@ -41,7 +40,7 @@ def falls_without(points: Floats, low: Bools, feet: Bools, centre: Floats, overh
     out = np.zeros((len(centre), len(feet)))
     for number, own in enumerate(feet):
         far = np.linalg.norm(centre - nearest_in_support(points, low & ~own, centre), axis=1)
-        out[:, number] = np.clip((far - overhang) / SURELY_FALLS_M, 0.0, 1.0)
+        out[:, number] = np.clip((far - overhang) / 0.1, 0.0, 1.0)  # surely at 0.1 m
     return out
 
 

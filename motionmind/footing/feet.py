@@ -11,11 +11,11 @@ from motionmind.body.legs import find_hinge, find_legs
 from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.jit import jit
 
-FOOT_END_GRIP_M = 0.015  # metres above the lower end of a foot at which the other end's grip has fallen to 1/e
+GRIP_HEIGHT_M = 0.015  # above the floor, or a foot's lowest point, at which a point's grip has fallen to 1/e
 
 
 class Foot(NamedTuple):
-    """A leg that can be placed; its foot is everything beyond the shank.
+    """A leg with a foot, which is everything beyond the shank.
 
     Attributes:
         limb: number of the limb.
@@ -51,7 +51,7 @@ def _find_feet(skeleton: Skeleton) -> list[Foot]:
 
 
 def foot_points(foot: Foot, joints: Indices, count: int) -> Bools:
-    """Return which points of a body are a foot's [P]: its joints, tips and heel, or the tip of a leg without a foot.
+    """Return whether each point belongs to a foot [P]: joints, tips and heel, or the tip of a leg without a foot.
 
     Args:
         foot: the foot.
@@ -67,9 +67,9 @@ def foot_points(foot: Foot, joints: Indices, count: int) -> Bools:
 
 
 def track_of(foot: Foot, places: Floats, count: int) -> Floats:
-    """Return the level track of a foot relative to the root [N, 2], metres, on which a foot in stance or rolling stays.
+    """Return the level track of a foot relative to the root [N, 2], metres: constant while the foot stands or rolls.
 
-    The track moves as the last bone does: as its two ends, weighted by how low they are.
+    The track moves with the two ends of the last bone, weighted by how low they are.
 
     Args:
         foot: the foot.
@@ -78,21 +78,21 @@ def track_of(foot: Foot, places: Floats, count: int) -> Floats:
     """
     ends = places[:, [foot.leg[-1], count + foot.leg[-1]]]
     height, level = ends[..., 1], ends[..., [0, 2]]
-    holds = _hold(np.maximum(height[1:], height[:-1]))
-    # A foot that rolls to and fro returns to its place only roughly: over the whole movement, it moves as the end that
+    grips = _grip(np.maximum(height[1:], height[:-1]))
+    # A foot that rolls to and fro returns to its place only roughly, so the total displacement is that of the end that
     # is low in the first and in the last frame.
-    both, out = _hold(height[0] + height[-1]), np.empty((len(places), 2))
-    _write_track(np.ascontiguousarray(ends), holds, both @ level[0], both @ (level[-1] - level[0]), out)
+    both, out = _grip(height[0] + height[-1]), np.empty((len(places), 2))
+    _write_track(np.ascontiguousarray(ends), grips, both @ level[0], both @ (level[-1] - level[0]), out)
     return out
 
 
 @jit
-def _write_track(ends: Floats, holds: Floats, first: Floats, whole: Floats, out: Floats) -> None:
+def _write_track(ends: Floats, grips: Floats, first: Floats, whole: Floats, out: Floats) -> None:
     """Write the level track of a foot [N, 2], metres.
 
     Args:
         ends: positions of both ends of its last bone [N, 2, 3], metres.
-        holds: grip of each end between frames [N - 1, 2].
+        grips: grip of each end between frames [N - 1, 2].
         first: start of the track [2].
         whole: its displacement over all frames [2].
         out: the track.
@@ -101,15 +101,15 @@ def _write_track(ends: Floats, holds: Floats, first: Floats, whole: Floats, out:
     out[0] = 0.0
     for t in range(last):
         for k in range(2):
-            moved = holds[t, 0] * (ends[t + 1, 0, 2 * k] - ends[t, 0, 2 * k])
-            out[t + 1, k] = out[t, k] + (moved + holds[t, 1] * (ends[t + 1, 1, 2 * k] - ends[t, 1, 2 * k]))
+            moved = grips[t, 0] * (ends[t + 1, 0, 2 * k] - ends[t, 0, 2 * k])
+            out[t + 1, k] = out[t, k] + (moved + grips[t, 1] * (ends[t + 1, 1, 2 * k] - ends[t, 1, 2 * k]))
     for k in range(2):
         drift = whole[k] - out[last, k]
         for t in range(last + 1):
             out[t, k] = first[k] + (out[t, k] + (1.0 if t == last else t * (1.0 / last)) * drift)
 
 
-def _hold(height: Floats) -> Floats:
-    """Return the grip of each end of a foot [..., 2], by its height [..., 2], metres; both add up to 1."""
-    share = np.exp(-(height - height.min(axis=-1, keepdims=True)) / FOOT_END_GRIP_M)
+def _grip(height: Floats) -> Floats:
+    """Return the grip of the two ends of a foot [..., 2] from their heights [..., 2], metres; the grips add up to 1."""
+    share = np.exp(-(height - height.min(axis=-1, keepdims=True)) / GRIP_HEIGHT_M)
     return np.asarray(share / share.sum(axis=-1, keepdims=True))

@@ -18,19 +18,20 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import mass_of, size_of
 from motionmind.body.tempo import runs_of
 
-FLIGHT_CERTAIN_SHARE = 0.5  # share of the corpus's walks that are in the air where a given posture is
-FLIGHT_POSSIBLE_SHARE = 0.05  # share of them from which a movement may be
-AIRBORNE_FROM_M = 0.04  # metres above the floor from which a given posture is in the air, if walks there are
-SHORTEST_FLIGHT_S, LONGEST_FLIGHT_S = 0.15, 0.8  # seconds: duration of a flight
-SHORTEST_PUSH_OFF_S = 0.25  # seconds: shortest push-off or landing
-SLOW_FALL_S = 0.1  # seconds for which a fall may be slower than that, as where legs are drawn up
+FLIGHT_CERTAIN_SHARE = 0.5  # of corpus walks in the air, above which a given posture is in the air
+FLIGHT_POSSIBLE_SHARE = 0.05  # the same, above which a movement may be in the air
+SHORTEST_PUSH_OFF_S = 0.25  # or landing
 
 
 class Flight(NamedTuple):
     """An interval in the air, from the last frame on the floor before it to the first after it.
 
-    A flight that begins or ends in a given posture has that frame instead. `rates` are the vertical velocities at both
-    frames, m/s; None on the floor, or if unknown.
+    A flight that begins or ends in a given posture has that frame instead.
+
+    Attributes:
+        start: first frame.
+        end: last frame.
+        rates: vertical velocities at both, m/s; None on the floor, or if unknown.
     """
 
     start: int
@@ -56,8 +57,8 @@ def find_flights(
         standing: height of the centre of mass if the lowest point were on the floor [N], metres.
         masses: its height in the first and in the last frame [2], metres.
         hovering: whether the first and the last posture are in the air.
-        rates: its vertical velocities there, metres a second; None where unknown.
-        gravity: metres a second squared.
+        rates: its vertical velocities there, m/s; None where unknown.
+        gravity: m/s^2.
         fps: frames a second.
     """
     last = len(aloft) - 1
@@ -82,7 +83,7 @@ def find_flights(
             continue
         share, frames = aloft[start:stop], np.arange(start, stop)
         height = float(share @ leaps[start:stop] / share.sum())
-        seconds = min(2.0 * np.sqrt(2.0 * height / gravity), LONGEST_FLIGHT_S)
+        seconds = min(2.0 * np.sqrt(2.0 * height / gravity), 0.8)  # no longer flight
         # Walks jump at different times: this is the expected number of flights in this interval.
         count = round(share.sum() / (seconds * fps))
         middles = np.interp((np.arange(count) + 0.5) / max(count, 1), np.cumsum(share) / share.sum(), frames)
@@ -91,7 +92,8 @@ def find_flights(
             top = float(np.clip(middle, begin + half, max(end - half, begin + half)))
             # The inner rounding keeps rounding errors from deciding ties midway between two frames.
             flight = Flight(round(round(top - half, 6)), round(round(top + half, 6)), (None, None))
-            if half >= 0.5 * SHORTEST_FLIGHT_S * fps and flight.end - flight.start > 2:
+            # No flight is shorter than 0.15 s.
+            if half >= 0.5 * 0.15 * fps and flight.end - flight.start > 2:
                 out.append(flight)
                 begin = flight.end + push
     return [*out, second] if second else out
@@ -100,15 +102,15 @@ def find_flights(
 def _time_of_fall(
     standing: Floats, mass: float, rate: float | None, longest: float, gravity: float, fps: float
 ) -> tuple[int, float]:
-    """Return the number of frames since a body in the air took off, and its vertical velocity in the air.
+    """Return the number of frames since take-off of a body in the air, and its upward velocity now, m/s.
 
     Args:
-        standing: height of the centre of mass on the floor, from the frame in the air back [N], metres.
+        standing: height of the centre of mass if the body stood [N], metres, backwards from the frame in the air.
         mass: its height in the air, metres.
         rate: its upward velocity there, m/s; None for the top of the flight, or as near it as the time and a take-off
             in a whole frame allow.
         longest: maximum number of frames.
-        gravity: metres a second squared.
+        gravity: m/s^2.
         fps: frames a second.
     """
     seconds = np.arange(len(standing)) / fps
@@ -134,7 +136,7 @@ def _time_of_fall(
 
 
 def flying_frames(flights: list[Flight], hovering: tuple[bool, bool], count: int) -> Bools:
-    """Return whether nothing bears the body in each frame [count]; `hovering` states it of the first and the last."""
+    """Return whether nothing supports the body in each frame [count]; `hovering` gives the first and the last frame."""
     out = np.zeros(count, dtype=np.bool_)
     for flight in flights:
         out[flight.start + 1 : flight.end] = True
@@ -144,9 +146,9 @@ def flying_frames(flights: list[Flight], hovering: tuple[bool, bool], count: int
 
 
 def find_falls(skeleton: Skeleton, posed: Posed, given: Bools, fps: float) -> tuple[Floats, list[tuple[int, int]]]:
-    """Return the centre of mass [N, 3], metres, and the first frame of each fall and the frame after its last.
+    """Return the centre of mass [N, 3], metres, and the falls: the first frame of each and the frame after its last.
 
-    Without known masses there are no falls.
+    Without known masses there are no falls, and the root stands in for the centre of mass.
 
     Args:
         skeleton: the body.
@@ -162,16 +164,17 @@ def find_falls(skeleton: Skeleton, posed: Posed, given: Bools, fps: float) -> tu
         return posed.places[:, 0], []
     fall = np.zeros(len(low))
     fall[1:-1] = -(fps**2) * np.diff(mass[:, 1], 2) / GRAVITY
-    return mass, _falls(fall, up, (bool(off_floor[0]), bool(off_floor[-1])), round(SLOW_FALL_S * fps))
+    # A fall may be slower for 0.1 s, as when the legs draw up.
+    return mass, _falls(fall, up, (bool(off_floor[0]), bool(off_floor[-1])), round(0.1 * fps))
 
 
 def _falls(fall: Floats, up: Bools, in_air: tuple[bool, bool], pauses: int) -> list[tuple[int, int]]:
     """Return the first frame of each fall and the frame after its last.
 
-    A pause lies between two falls, or between a fall and an end in the air.
+    A pause, a slower part of a fall, lies between two falls, or between a fall and an end in the air.
 
     Args:
-        fall: downward acceleration of the mass, in gravities [N].
+        fall: downward acceleration of the centre of mass [N], in units of gravity.
         up: whether the body is off the floor in a frame that may change [N].
         in_air: whether it is off the floor in the first and in the last frame, which may not change.
         pauses: largest number of frames in a pause.

@@ -10,19 +10,12 @@ import numpy as np
 from motionmind._typing import Bools, Floats
 from motionmind.body.contact import Posed
 from motionmind.body.skeleton import Skeleton
-from motionmind.footing.bearing import lowest, points_of_feet
 from motionmind.footing.feet import Foot
 from motionmind.footing.flight import FLIGHT_CERTAIN_SHARE, FLIGHT_POSSIBLE_SHARE
 from motionmind.footing.root import root_trajectory, stand, steps_easily
+from motionmind.footing.shape import lowest, points_of_feet
 from motionmind.geometry.splines import natural_spline
 from motionmind.walks.minimal import departure
-
-HEIGHT_SD_M = (
-    0.03,
-    0.04,
-)  # metres, standard deviations of the height at a given posture: of walks in stance, and in flight
-LEAP_FROM_M = 0.18  # metres above walks in stance from which a posture is in the air, though no walk is
-STANCE_ABOVE_FLOOR_M = 0.015  # metres by which feet in stance are above a recording's floor
 
 
 class Stance(NamedTuple):
@@ -49,7 +42,7 @@ class Stance(NamedTuple):
     overhang: float
 
     def scaled(self, by: float) -> Stance:
-        """Return the stance of a body of another size."""
+        """Return the stance for a body `by` times as large."""
         lengths = ("clearance", "leaps", "drift", "overhang")
         return self._replace(**{name: by * getattr(self, name) for name in lengths})
 
@@ -69,7 +62,7 @@ class Given(NamedTuple):
     rates: tuple[Floats | None, Floats | None]
 
     def scaled(self, by: float) -> Given:
-        """Return the postures of a body of another size."""
+        """Return the same for a body `by` times as large."""
         first, last = self.rates
         return Given(
             {move: by * height for move, height in self.low.items()},
@@ -120,6 +113,26 @@ class Ground(NamedTuple):
         return Ground(*(known[frames] for known in self))
 
 
+class Stretch(NamedTuple):
+    """A movement of N frames between two given postures.
+
+    Attributes:
+        frames: slice of the whole movement.
+        posed: the movement relative to its root.
+        ground: the ground under it.
+        moving: whether the velocity is given at the first and at the last frame; if not, low feet rest there.
+        passing: whether the body passes these frames at any velocity; if not, a foot in the air there takes its time.
+        rates: vertical velocities of the root there, m/s; None where unknown.
+    """
+
+    frames: slice
+    posed: Posed
+    ground: Ground
+    moving: tuple[bool, bool]
+    passing: tuple[bool, bool]
+    rates: tuple[float | None, float | None]
+
+
 def find_ground(
     skeleton: Skeleton, posed: Posed, times: Floats, stance: Stance, given: Given, feet: list[Foot], gravity: float
 ) -> Ground:
@@ -147,7 +160,7 @@ def find_ground(
     held = _at(0.5 * (times[1:] + times[:-1]), half_steps, stance.stands)
     easily = steps_easily(lowest(posed.places, points_of_feet(skeleton, posed.joints, feet)), fps)
     clear = np.maximum(heights - floor, 0.0)
-    root = root_trajectory(skeleton, posed, clear, held, drifts, *given.ends, times[-1], easily)
+    root = root_trajectory(skeleton, posed, clear, held, drifts, given.ends, times[-1], easily)
     root = stand(skeleton, posed.rotations, _with_rates(root, times, given.rates), heights)
     root[0], root[-1] = given.ends
     for end, beside, sign in ((0, 1, 1.0), (-1, -2, -1.0)):  # a body in the air keeps its velocity
@@ -168,7 +181,7 @@ def _at(times: Floats, known: Floats, values: Floats) -> Floats:
 def _with_rates(root: Floats, times: Floats, rates: tuple[Floats | None, Floats | None]) -> Floats:
     """Return positions of the root [N, 3] with the given level velocities at both ends.
 
-    Feet in stance near an end do not show how the body passes it, and may carry it elsewhere.
+    Feet in stance near an end do not determine how the body passes it.
     """
     steps, level = np.diff(root, axis=0) / (times[1] - times[0]), np.array([1.0, 0.0, 1.0])
     first, last = (
@@ -180,35 +193,36 @@ def _with_rates(root: Floats, times: Floats, rates: tuple[Floats | None, Floats 
 def _hovering(stance: Stance, ends: Floats) -> Bools:
     """Return whether the first and the last posture are in the air [2], from their lowest points' heights [2], metres.
 
-    A posture is in the air where most walks are; or where some are, and its height above the floor under the other end
-    makes flight likelier than stance, because much of a corpus stands in the crouch of a jump; or where it is higher
-    than any step.
+    A posture is in the air if most corpus walks are there, or if it is higher than any step. Much of a corpus stands
+    in the crouch of a jump, so a posture is also in the air if some walks are there and its height above the floor
+    under the other end makes flight likelier than stance.
     """
     aloft, leaps, clearance = stance.aloft[[0, -1]], stance.leaps[[0, -1]], stance.clearance[[0, -1]]
     surely = aloft > FLIGHT_CERTAIN_SHARE
     standing = np.maximum(clearance - aloft * leaps, 0.0) / np.maximum(1.0 - aloft, 1e-9)
     floor = np.where(surely, np.minimum(ends, 0.0), np.maximum(np.minimum(ends, 0.0), ends - clearance))[::-1]
     taller, lower = ends - floor - standing, leaps - (ends - floor)
-    stands = (1.0 - aloft) / HEIGHT_SD_M[0] * np.exp(-0.5 * (np.maximum(taller, 0.0) / HEIGHT_SD_M[0]) ** 2)
-    flies = aloft / HEIGHT_SD_M[1] * np.exp(-0.5 * (np.maximum(lower, 0.0) / HEIGHT_SD_M[1]) ** 2)
+    stance_sd, flight_sd, leap = 0.03, 0.04, 0.18  # m: of walks' heights; and the least height of an unseen leap
+    stands = (1.0 - aloft) / stance_sd * np.exp(-0.5 * (np.maximum(taller, 0.0) / stance_sd) ** 2)
+    flies = aloft / flight_sd * np.exp(-0.5 * (np.maximum(lower, 0.0) / flight_sd) ** 2)
     as_high = (flies > stands) & (taller > np.abs(lower))  # a posture far from both may be on a floor of its own
-    return np.asarray(surely | ((aloft > FLIGHT_POSSIBLE_SHARE) & as_high) | (taller > LEAP_FROM_M))
+    return np.asarray(surely | ((aloft > FLIGHT_POSSIBLE_SHARE) & as_high) | (taller > leap))
 
 
 def _floor_under(half_steps: Floats, clearance: Floats, ends: Floats, hovering: Bools) -> Floats:
     """Return the floor's height at the half steps [2 T + 1], metres: 0, or as the `ends`' lowest points [2] show.
 
-    A recording's own zero is often off. The floor of an end below 0 is as low; that of an end higher than the corpus's
-    bodies in such a stance is higher. The floor includes the height of their feet above it, up to UNEVEN, or a body
-    would sink as it leaves the end. An end in the air (`hovering` [2]) does not show its floor: the other end's holds.
+    A recording's own zero is often off. An end below 0 has a floor as low; an end higher than the corpus's bodies in
+    such a stance has a higher floor. That floor includes up to 0.015 m of the height of their feet above it, or a body
+    would sink as it leaves the end. An end in the air (`hovering` [2]) does not show its floor and takes the other's.
     """
-    above = np.maximum(np.minimum(ends, 0.0), ends - np.maximum(clearance[[0, -1]] - STANCE_ABOVE_FLOOR_M, 0.0))
+    above = np.maximum(np.minimum(ends, 0.0), ends - np.maximum(clearance[[0, -1]] - 0.015, 0.0))
     above = np.where(hovering, np.minimum(ends, 0.0 if hovering.all() else above[::-1]), above)
     return np.asarray(np.interp(half_steps, half_steps[[0, -1]], above))
 
 
 def _eased(times: Floats, values: Floats, at: Floats) -> Floats:
-    """Interpolate keys [N] without overshoot, with a cubic ease in and out on each piece."""
+    """Interpolate keys [N] without overshoot: ease in and out of each with a cubic."""
     i = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
     s = (at - times[i]) / (times[i + 1] - times[i])
     return np.asarray(values[i] + (values[i + 1] - values[i]) * s * s * (3.0 - 2.0 * s))

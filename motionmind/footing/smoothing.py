@@ -1,4 +1,4 @@
-"""Smoothing: running means and maxima of values over time."""
+"""Smoothing: running means and maxima of values over time, and smooth steps."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _Values = TypeVar("_Values", Bools, Floats)
 
 
 def smoothed(values: Floats, seconds: float, fps: float) -> Floats:
-    """Return the weighted mean around each value [N], within some seconds; the first and the last stay the same."""
+    """Return the weighted mean around each value [N], within `seconds`; the first and the last value stay."""
     width = min(max(round(seconds * fps), 1), len(values) - 1)
     # Point reflection at both ends keeps them in place.
     before, after = 2.0 * values[0] - values[width:0:-1], 2.0 * values[-1] - values[-2 : -width - 2 : -1]
@@ -28,6 +28,12 @@ def bell(width: int) -> Floats:
     out: Floats = weights / weights.sum()
     out.setflags(write=False)
     return out
+
+
+def smoothstep(share: Floats) -> Floats:
+    """Return the cubic step 3 s^2 - 2 s^3 of a share s, clipped to 0 and 1."""
+    share = np.clip(share, 0.0, 1.0)
+    return np.asarray(share * share * (3.0 - 2.0 * share))
 
 
 def sliding_max(values: _Values, reach: int) -> _Values:

@@ -1,4 +1,4 @@
-"""Collision term of the solve: limbs that overlap no more than usual, legs on either side of a plane."""
+"""Collision term of the solve: limbs overlap no more than usual, and a plane keeps the legs apart."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from motionmind.body.capsules import LEG, capsules_of, pair_depths
 from motionmind.body.tempo import runs_of
 from motionmind.footing.smoothing import sliding_max
 from motionmind.synth.kinematics import Rows, State
-from motionmind.synth.one_sided import BOUND_TOLERANCE_RATIO, OneSided, once_per_state
+from motionmind.synth.one_sided import BOUND_TOLERANCE, OneSided, once_per_state
 from motionmind.synth.system import Normal
 
-LEGS_NEAR_M = 0.06  # between legs that may pass through each other within a frame
-SIDE_CHANGE_COSINE = 0.2  # cosine between the directions from leg to leg below which they have changed sides
+LEGS_NEAR_M = 0.06  # legs this near may pass through each other within a frame
+MAX_SIDE_CHANGE_COSINE = 0.2  # between the directions from leg to leg before and after they change sides
 
 
 @dataclass
 class Collision(OneSided):
     """Keep limbs, as capsules, from overlapping more than they do in the corpus or at an end.
 
-    While two legs overlap, a plane keeps them apart. It lies between them as they meet and as they part. Where these
-    are opposite sides, as when a leg passes from in front of the other to behind it, the plane turns through the line
+    While two legs overlap, a plane keeps them apart. It separates them as they meet and as they part. If they change
+    sides in between, as when a leg passes from in front of the other to behind it, the plane turns through the line
     from hip to hip, so that the legs open.
 
     Attributes:
         usual: overlap allowed to each pair of `Capsules.pairs` [P], metres.
         spread: standard deviation of the excess, metres.
-        around: frames before legs meet and after they part in which the plane turns, too.
+        around: frames before legs meet and after they part in which the plane may turn.
     """
 
     unit: ClassVar[str] = "cm"
@@ -42,16 +42,15 @@ class Collision(OneSided):
     _on_plane: Bools = field(default_factory=lambda: np.zeros((0, 0), dtype=np.bool_))
 
     def separate(self, state: State) -> None:
-        """Find the planes between legs that overlap, or change sides between two frames: normals from right to left
-        [N, 3], 0 for none."""
+        """Find the planes between legs that overlap or change sides between two frames, given by their normals."""
         deep, ways, _, _ = self._deep(state)
         legs, planes = self._legs(state), np.zeros((len(deep), 3))
         nearest = np.flatnonzero(legs)[deep[:, legs].argmax(axis=1)]
         frames, skeleton = np.arange(len(deep)), state.body.skeleton
         away, closest = ways[frames, nearest], deep[frames, nearest]
         sides = state.places[:, skeleton.index("left_hip")] - state.places[:, skeleton.index("right_hip")]
-        sides /= np.maximum(np.linalg.norm(sides, axis=1, keepdims=True), BOUND_TOLERANCE_RATIO)
-        passes = (np.sum(away[1:] * away[:-1], axis=1) < SIDE_CHANGE_COSINE) & (
+        sides /= np.maximum(np.linalg.norm(sides, axis=1, keepdims=True), BOUND_TOLERANCE)
+        passes = (np.sum(away[1:] * away[:-1], axis=1) < MAX_SIDE_CHANGE_COSINE) & (
             np.minimum(closest[1:], closest[:-1]) > -LEGS_NEAR_M
         )
         meets = closest > 0.0
@@ -60,20 +59,21 @@ class Collision(OneSided):
         for begin, end in runs_of(sliding_max(meets, self.around)):
             before, after = away[max(begin - 1, 0)], away[min(end, len(away) - 1)]
             share = np.linspace(0.0, 1.0, end - begin + 2)[1:-1, None]
-            if before @ after < SIDE_CHANGE_COSINE:
+            if before @ after < MAX_SIDE_CHANGE_COSINE:
                 first, last = np.maximum(1.0 - 2.0 * share, 0.0), np.maximum(2.0 * share - 1.0, 0.0)
                 planes[begin:end] = first * before + (1.0 - first - last) * sides[begin:end] + last * after
             else:
                 planes[begin:end] = (1.0 - share) * before + share * after
-        planes /= np.maximum(np.linalg.norm(planes, axis=1, keepdims=True), BOUND_TOLERANCE_RATIO)
+        planes /= np.maximum(np.linalg.norm(planes, axis=1, keepdims=True), BOUND_TOLERANCE)
         if len(self._planes):  # legs that have come apart stay on their sides
             planes = np.where(np.any(planes != 0.0, axis=1, keepdims=True), planes, self._planes)
         self._planes = planes
-        # Later a pair that comes near would count with its whole distance from the plane at once, and steps be refused.
+        # Choose the pairs now: a pair that joined later would count with its whole distance from the plane at once, and
+        # the solve would refuse steps.
         self._on_plane = legs & np.any(planes != 0.0, axis=1, keepdims=True) & (deep > -LEGS_NEAR_M)
 
     def _legs(self, state: State) -> Bools:
-        """Return which pairs are of the two legs [P]."""
+        """Return whether each pair consists of two legs' capsules [P]."""
         capsules = capsules_of(state.body.skeleton)
         return np.asarray(np.array([name.endswith(LEG) for name in capsules.names])[capsules.pairs()].all(axis=1))
 
@@ -115,14 +115,14 @@ class Collision(OneSided):
     def add(self, state: State, normal: Normal) -> None:
         """Add the rows; see `Term.add`."""
         deep, ways, at = self._over(state)
-        pushes = deep > BOUND_TOLERANCE_RATIO
+        pushes = deep > BOUND_TOLERANCE
         self._rows(state, pushes, ways, at).add_alike(state, normal, deep[pushes], self.spread)
         normal.cost += float(np.sum(deep[pushes] ** 2)) * self.spread**-2.0
 
     def foresee(self, state: State, step: Floats, normal: Normal) -> bool:
         """Add the rows that a step breaks; see `OneSided.foresee`."""
         deep, ways, at = self._over(state)
-        chosen = (deep <= BOUND_TOLERANCE_RATIO) & (deep > -LEGS_NEAR_M)
+        chosen = (deep <= BOUND_TOLERANCE) & (deep > -LEGS_NEAR_M)
         rows = self._rows(state, chosen, ways, at)
         return rows.add_broken(state, step, normal, deep[chosen], self.spread)
 

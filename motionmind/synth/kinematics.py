@@ -20,7 +20,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
 from motionmind.synth.system import Normal
 
-SERIES_BELOW_RAD2 = 1e-8  # rad^2: below this, series replace sin and cos
+MAX_SERIES_RAD2 = 1e-8  # squared angle up to which series replace sine and cosine
 
 
 class Body(NamedTuple):
@@ -299,9 +299,9 @@ def _right_jacobian(turned: Floats, axes: Floats) -> Floats:
     "Stochastic Models, Information Theory, and Lie Groups", volume 2 (2012), chapter 10.
     """
     square = np.sum(turned * turned, axis=-1)[..., None]
-    size = np.sqrt(np.maximum(square, SERIES_BELOW_RAD2))
-    b = np.where(square < SERIES_BELOW_RAD2, 0.5 - square / 24.0, (1.0 - np.cos(size)) / size**2)
-    c = np.where(square < SERIES_BELOW_RAD2, 1.0 / 6.0 - square / 120.0, (size - np.sin(size)) / size**3)
+    size = np.sqrt(np.maximum(square, MAX_SERIES_RAD2))
+    b = np.where(square < MAX_SERIES_RAD2, 0.5 - square / 24.0, (1.0 - np.cos(size)) / size**2)
+    c = np.where(square < MAX_SERIES_RAD2, 1.0 / 6.0 - square / 120.0, (size - np.sin(size)) / size**3)
     across = rot.cross(turned, np.broadcast_to(axes, turned.shape))
     return np.asarray(axes - b * across + c * rot.cross(turned, across))
 
@@ -313,7 +313,7 @@ def inverse_right_jacobian(turned: Floats, vectors: Floats) -> Floats:
     d = (1 - (|v| / 2) cot (|v| / 2)) / |v|^2. Source: as for `_right_jacobian`.
     """
     square = np.sum(turned * turned, axis=-1)[..., None]
-    half = 0.5 * np.sqrt(np.maximum(square, SERIES_BELOW_RAD2))
-    d = np.where(square < SERIES_BELOW_RAD2, 1.0 / 12.0 + square / 720.0, (1.0 - half / np.tan(half)) / (4.0 * half**2))
+    half = 0.5 * np.sqrt(np.maximum(square, MAX_SERIES_RAD2))
+    d = np.where(square < MAX_SERIES_RAD2, 1.0 / 12.0 + square / 720.0, (1.0 - half / np.tan(half)) / (4.0 * half**2))
     across = rot.cross(turned, vectors)
     return np.asarray(vectors + 0.5 * across + d * rot.cross(turned, across))

@@ -1,8 +1,8 @@
 """One-sided terms of the solve: each pushes only the excess over a bound.
 
-Where a bound is on a vector, such as a velocity, rows lead towards the nearest vector that is allowed, whose distance
-bounds the excess from above: such a step cannot raise the sum of squares. Rows along the excess alone overshoot as its
-direction turns. Source: Lange, "MM Optimization Algorithms" (2016), chapter 5, on distances to convex sets.
+The rows of a bounded vector, such as a velocity, lead to the nearest allowed vector. Its distance bounds the excess
+from above, so such a step cannot raise the sum of squares; rows along the excess alone overshoot as its direction
+turns. Source: Lange, "MM Optimization Algorithms" (2016), chapter 5, on distances to convex sets.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from motionmind.synth.kinematics import Rows, State, inverse_right_jacobian, row
 from motionmind.synth.system import Normal
 
 UP = np.array([0.0, 1.0, 0.0])
-BOUND_TOLERANCE_RATIO = 1e-6  # in a term's unit: tolerance of its bound
+BOUND_TOLERANCE = 1e-6  # in the unit of the term
 
 
 R = TypeVar("R")
 
 
 def once_per_state(method: Callable[[Any, State], R]) -> Callable[[Any, State], R]:
-    """Cache the result of a term's method for the last state, which `add` and `foresee` share."""
+    """Cache the result of a term's method for the last state, because `add` and `foresee` share it."""
     name = f"{method.__name__} found"
 
     @wraps(method)
@@ -47,8 +47,8 @@ def once_per_state(method: Callable[[Any, State], R]) -> Callable[[Any, State], 
 class OneSided(ABC):
     """A term whose rows push only beyond its bound.
 
-    Rows within the bound do not push, so a step may cross it. The solve adds the rows that a step would break, and
-    computes the step again. This is one iteration of a primal-dual active set. Source: Hintermüller, Ito, Kunisch,
+    Rows within the bound do not push, so a step may cross it. The solve then adds the rows that the step would break
+    and computes the step again: one iteration of a primal-dual active set. Source: Hintermüller, Ito, Kunisch,
     "The primal-dual active set strategy as a semismooth Newton method", SIAM Journal on Optimization 13 (2002).
     """
 
@@ -103,9 +103,9 @@ class VectorBound(OneSided):
 
 
 def beyond(vectors: Floats, most: Floats | float) -> Floats:
-    """Return the part of vectors [..., k] beyond a length [...]."""
+    """Return vectors [..., k] shortened by a length [...], at least to 0."""
     size = np.linalg.norm(vectors, axis=-1)
-    return np.asarray(vectors * np.maximum(1.0 - most / np.maximum(size, BOUND_TOLERANCE_RATIO), 0.0)[..., None])
+    return np.asarray(vectors * np.maximum(1.0 - most / np.maximum(size, BOUND_TOLERANCE), 0.0)[..., None])
 
 
 @dataclass
@@ -133,14 +133,14 @@ class Floor(OneSided):
         """Add the rows; see `Term.add`."""
         deep = self._deep(state)
         deep[[0, -1]] = -1.0
-        pushes = deep > BOUND_TOLERANCE_RATIO
+        pushes = deep > BOUND_TOLERANCE
         self._rows(pushes).add_alike(state, normal, deep[pushes], self.spread)
         normal.cost += float(np.sum(deep[pushes] ** 2)) * self.spread**-2.0
 
     def foresee(self, state: State, step: Floats, normal: Normal) -> bool:
         """Add the rows that a step breaks; see `OneSided.foresee`."""
         deep = self._deep(state)
-        above = deep <= BOUND_TOLERANCE_RATIO
+        above = deep <= BOUND_TOLERANCE
         above[[0, -1]] = False
         return self._rows(above).add_broken(state, step, normal, deep[above], self.spread)
 
@@ -160,12 +160,12 @@ class Balance(VectorBound):
         touches: whether each point supports the body [N, P].
         floor: height of the floor [N], metres.
         overhang: allowed distance of the centre of mass from the support, metres.
-        room: the same of the zero-moment point: half a foot's width, because points lie on its midline.
-        near: nearness to each end of the movement [2, N], 0 to 1: given postures may be out of balance.
+        room: the same of the zero-moment point: half a foot's width, because a foot's points lie on its midline.
+        near: nearness to each end of the movement [2, N], 0 to 1; an end out of balance widens the bounds.
         gravity: m/s^2.
         fps: frames a second.
         spread: standard deviation of the excess, metres.
-        reach: excess beyond which the pull is constant, metres: balance out of reach is not worth a jerk.
+        reach: excess beyond which the pull is constant, metres, so that a body far out of balance does not jerk.
     """
 
     unit: ClassVar[str] = "cm"
@@ -189,7 +189,7 @@ class Balance(VectorBound):
         return self._points(state, np.einsum("txi,ti->tx", state.mass_jacobian, step))
 
     def _points(self, state: State, mass: Floats) -> Floats:
-        """Return both points, given the centre of mass, or the changes of both, given its change [N, 3]."""
+        """Return both points from the centre of mass, or their changes from its change [N, 3]."""
         level = mass[:, [0, 2]]
         inner = level[1:-1]
         return np.stack([inner - self._levers(state)[:, None] * np.diff(level, 2, axis=0), inner])
@@ -226,7 +226,7 @@ class Balance(VectorBound):
                 normal.add_mass(first, ways, off[which, first, axis], weights[which, first])
 
     def cost(self, excess: Floats) -> float:
-        """Return the cost of an excess [2, N - 2, 2], which grows as its length far out."""
+        """Return the cost of an excess [2, N - 2, 2]: quadratic, then linear beyond the reach."""
         return float(np.sum(2.0 * (self.reach / self.spread) ** 2 * (self._eased(excess) - 1.0)))
 
     def gives(self, state: State) -> Floats:
@@ -261,7 +261,7 @@ class Limits(OneSided):
     def _excess(self, state: State) -> Floats:
         """Return rotation vectors from the nearest rotations within the limits [N, J, 3], in the joints' frames."""
         off = rot.log(rot.inv_mul(self._allowed(state, state.rotations), state.rotations))
-        return np.where(rot.norm(off)[..., None] > BOUND_TOLERANCE_RATIO, off, 0.0)
+        return np.where(rot.norm(off)[..., None] > BOUND_TOLERANCE, off, 0.0)
 
     def _rows(self, state: State, normal: Normal, off: Floats, chosen: Bools) -> None:
         chosen[[0, -1]] = False
@@ -284,7 +284,7 @@ class Limits(OneSided):
             turned[:, joint] = np.einsum("td,tdx->tx", step[:, columns], state.own_axes[:, own])
         then = rot.mul(state.rotations, rot.exp(turned))
         allowed = self._allowed(state, then)
-        chosen = (rot.angle(allowed, then) > BOUND_TOLERANCE_RATIO) & ~np.any(self._excess(state) != 0.0, axis=2)
+        chosen = (rot.angle(allowed, then) > BOUND_TOLERANCE) & ~np.any(self._excess(state) != 0.0, axis=2)
         self._rows(state, normal, rot.log(rot.inv_mul(allowed, state.rotations)), chosen)
         return bool(chosen.any())
 
@@ -364,9 +364,9 @@ class Travel(VectorBound):
 
     Attributes:
         order: 1 for its speed, 2 for its acceleration.
-        axes: 1 for each axis that counts [3], else 0.
+        axes: 1 for each bounded axis, 0 for the others [3].
         most: the bound, m/s or m/s^2.
-        free: where there is no bound, by difference [N - order].
+        free: whether a difference is unbounded [N - order].
         fps: frames a second.
         spread: standard deviation of the excess.
     """

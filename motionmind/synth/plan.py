@@ -1,4 +1,4 @@
-"""Plan the contacts of a body: stances, flights and the floor. A plan moves nothing; it writes terms of the solve."""
+"""Plan the contacts of a body: stances, flights and the floor, as terms of the solve."""
 
 from __future__ import annotations
 
@@ -9,68 +9,60 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.body.contact import Posed
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import standing_rises
 from motionmind.footing.balance import falls_without, is_beyond, walks
-from motionmind.footing.bearing import (
-    HOLDS_UP_SHARE,
-    LIMB_TOUCHES_M,
-    Bearing,
-    Shape,
-    find_bearing,
-    find_staying,
-    shape_of,
-)
-from motionmind.footing.feet import Foot
-from motionmind.footing.flight import AIRBORNE_FROM_M, FLIGHT_CERTAIN_SHARE, Flight, find_flights, flying_frames
-from motionmind.footing.ground import Ground
+from motionmind.footing.bearing import HOLDS_UP_SHARE, LIMB_TOUCHES_M, Bearing, find_bearing, find_staying
+from motionmind.footing.feet import GRIP_HEIGHT_M, Foot
+from motionmind.footing.flight import FLIGHT_CERTAIN_SHARE, Flight, find_flights, flying_frames
+from motionmind.footing.ground import Stretch
+from motionmind.footing.shape import Shape, shape_of
+from motionmind.footing.smoothing import smoothstep
+from motionmind.learned.carriage import FIRMNESS_HALVED_MPS
 from motionmind.synth.terms import Contacts
 
-POINT_GRIP_M = 0.015  # height above a foot's lowest point at which the grip of a point has fallen to 1/e
-STANCE_SD_M = 0.003  # standard deviation of the position of a point in stance
-STANCE_PLACE_SD_M = 0.1  # the same, level, of a stance that includes no given posture: the solve finds its place
-SWING_SD_M = 0.04  # the same, level, of a swinging foot
-SWING_HEIGHT_SD_M = 0.02  # the same, of its height
-LOW_SWING_SD_SHARE, FULL_SWING_SD_FROM_M = (
-    0.2,
-    0.08,
-)  # share of both at the floor, and height from which they apply in full
-HALF_FIRM_MPS = 0.3  # m/s: speed of a foot that the corpus counts as half firm
-SWING_GRIP_M = 0.02  # height of a swinging foot at which its grip has fallen to 1/e
-LOW_SWING_SPEED_SD_MPS = 0.15  # m/s, standard deviation of a swinging foot's level speed at the floor
-FIRM_FOOT_SPEED_SD_MPS = 0.03  # m/s, standard deviation of the firmest foot's speed
-SUPPORT_SPEED_SD_MPS = 0.1  # m/s, standard deviation of the speed of a supporting hand, knee or trunk
-STEP_RISE_SHARE = 0.33  # share of a step in which the foot rises, and in which it comes down
-STEP_HEIGHT_M = 0.105  # height of a step whose reference does not lift the foot; chosen on cmu-05 and cmu-16
-LONG_STEP_M = 0.3  # length of a step from which it is that high
-FOOT_COMES_DOWN_S = 0.3  # seconds for a foot given above the floor to come down
-STAYING_FOOT_HEIGHT_M = 0.12  # height above the floor up to which one foot may stay throughout (`find_staying`)
+STEP_HEIGHT_M = 0.105  # of a step from 0.3 m on whose reference does not lift the foot; chosen on cmu-05 and cmu-16
+FULL_SWING_M = 0.08  # height of a swinging foot from which its standard deviations apply in full
 
 
-class Stretch(NamedTuple):
-    """A movement of N frames between two given postures.
+class ContactSds(NamedTuple):
+    """Standard deviations of the contacts.
 
     Attributes:
-        frames: slice of the whole movement.
-        posed: the movement relative to its root.
-        ground: the ground under it.
-        moving: whether the velocity is given at the first and at the last frame.
-        passing: whether the body passes them, at whatever velocity.
-        rates: vertical velocities of the root there, m/s; None where unknown.
+        stance: position of a point in stance, metres.
+        stance_place: level position of a stance that includes no given posture, metres: the solve finds its place.
+        swing: level position of a swinging foot, metres.
+        swing_height: height of a swinging foot, metres.
+        low_swing: share of both at the floor.
+        low_swing_speed: level speed of a swinging foot at the floor, m/s.
+        firm_speed: speed of the firmest foot, m/s.
+        support_speed: speed of a supporting hand, knee or trunk, m/s.
     """
 
-    frames: slice
-    posed: Posed
-    ground: Ground
-    moving: tuple[bool, bool]
-    passing: tuple[bool, bool]
-    rates: tuple[float | None, float | None]
+    stance: float = 0.003
+    stance_place: float = 0.1
+    swing: float = 0.04
+    swing_height: float = 0.02
+    low_swing: float = 0.2
+    low_swing_speed: float = 0.15
+    firm_speed: float = 0.03
+    support_speed: float = 0.1
+
+
+SDS = ContactSds()
 
 
 class _Point(NamedTuple):
-    """Targets of a point [N, 3] and their spreads [N, 3], whether it stands [N], and its level displacements [N - 1, 2]
-    and theirs [N - 1], metres."""
+    """The contact of a point.
+
+    Attributes:
+        point: its number.
+        targets: target positions [N, 3], metres.
+        spreads: standard deviations of these [N, 3], metres.
+        stands: whether it stands [N].
+        moves: target displacements between frames [N - 1, 2], level, metres.
+        slips: standard deviations of these [N - 1], metres.
+    """
 
     point: int
     targets: Floats
@@ -95,7 +87,7 @@ class Plan:
         overhang: allowed distance of the centre of mass from the support, metres.
         fps: frames a second.
         falls: how far it would fall without each foot [N, feet], 0 to 1; None where unknown.
-        bearing: its support: stances of the feet, and other parts that bear weight.
+        bearing: its support: stances of the feet, and other parts on the floor.
     """
 
     stretch: Stretch
@@ -110,25 +102,14 @@ class Plan:
     falls: Floats | None
     bearing: Bearing = field(init=False)
 
-    def step(self) -> None:
+    def plan_steps(self) -> None:
         """Plan the steps."""
-        stretch = self.stretch
         self.bearing = find_bearing(
-            self.shape,
-            stretch.ground.root[:, [0, 2]],
-            self.mass[:, [0, 2]],
-            stretch.ground.firm,
-            self.flying,
-            self.staying,
-            stretch.moving,
-            stretch.passing,
-            self.feet,
-            self.fps,
-            self.falls,
+            self.shape, self.stretch, self.mass, self.flying, self.staying, self.feet, self.fps, self.falls
         )
 
-    def again(self, root: Floats, mass: Floats) -> bool:
-        """Plan the steps again if the body, as it now moves, would fall; return whether it would.
+    def replan_steps(self, root: Floats, mass: Floats) -> bool:
+        """Plan the steps again if the body would fall as it now moves, and return whether it would.
 
         Args:
             root: positions of the root [N, 3], metres.
@@ -144,7 +125,7 @@ class Plan:
             return False
         low = self.bearing.all_standing().touching(self.shape)
         self.falls = falls_without(points, low, self.shape.feet, centre, self.overhang)
-        self.step()
+        self.plan_steps()
         return True
 
     def contacts(self, root: Floats, steps: bool) -> Contacts:
@@ -183,27 +164,27 @@ class Plan:
             for stance in bearing.stances[k]:
                 own[stance.start : stance.end + 1] = stance.start > 0 and stance.end < len(root) - 1
             firm = np.clip(ground.firm[:, foot.limb], 1e-2, 1.0)
-            speed = np.hypot(HALF_FIRM_MPS * np.sqrt(1.0 / firm - 1.0), FIRM_FOOT_SPEED_SD_MPS)
+            speed = np.hypot(FIRMNESS_HALVED_MPS * np.sqrt(1.0 / firm - 1.0), SDS.firm_speed)
             high = np.maximum(shape.low[:, k] + root[:, 1] + off[:, k, 1] - ground.floor, 0.0)
-            free = np.where(self.flying, np.inf, np.clip(high / FULL_SWING_SD_FROM_M, LOW_SWING_SD_SHARE, 1.0))
+            free = np.where(self.flying, np.inf, np.clip(high / FULL_SWING_M, SDS.low_swing, 1.0))
             still = stands[1:] & stands[:-1]
-            slip = np.where(still, 0.5 * (speed[1:] + speed[:-1]), LOW_SWING_SPEED_SD_MPS) / self.fps
+            slip = np.where(still, 0.5 * (speed[1:] + speed[:-1]), SDS.low_swing_speed) / self.fps
             for point in np.flatnonzero(shape.feet[k]):
                 at = shape.places[:, point] + root + off[:, k]
-                hold = np.exp(-(shape.places[:, point, 1] - shape.low[:, k]) / POINT_GRIP_M)
-                firmly = STANCE_SD_M / np.sqrt(np.maximum(hold, 1e-3))
-                height = np.where(stands, firmly, SWING_HEIGHT_SD_M * free)
-                level = np.where(stands, np.where(own, STANCE_PLACE_SD_M, firmly), SWING_SD_M * free)
+                hold = np.exp(-(shape.places[:, point, 1] - shape.low[:, k]) / GRIP_HEIGHT_M)
+                firmly = SDS.stance / np.sqrt(np.maximum(hold, 1e-3))
+                height = np.where(stands, firmly, SDS.swing_height * free)
+                level = np.where(stands, np.where(own, SDS.stance_place, firmly), SDS.swing * free)
                 if not steps:
                     level[:] = np.inf
-                bears = np.where(stands, hold, np.where(self.flying, 0.0, hold * np.exp(-high / SWING_GRIP_M)))
+                bears = np.where(stands, hold, np.where(self.flying, 0.0, hold * np.exp(-high / 0.02)))  # 1/e at 0.02 m
                 both = np.minimum(bears[1:], bears[:-1])
                 slips = np.where((both > 1e-2) & steps, slip / np.sqrt(np.maximum(both, 1e-9)), np.inf)
                 moves = np.where(still[:, None], np.diff(at[:, [0, 2]], axis=0), 0.0)
                 yield _Point(int(point), at, np.stack([level, height, level], axis=1), stands, moves, slips)
 
     def _of_others(self, root: Floats) -> Iterator[_Point]:
-        """Yield the targets of supporting hands, knees or the trunk: on the floor, in their own places."""
+        """Yield the targets of supporting hands, knees or the trunk: on the floor, level where they are."""
         shape = self.shape
         rests = self.bearing.others > HOLDS_UP_SHARE
         for part in np.flatnonzero(rests.any(axis=0)):
@@ -211,8 +192,8 @@ class Plan:
                 at = shape.places[:, point] + root
                 at[:, 1] = self.stretch.ground.floor + shape.places[:, point, 1] - shape.low_others[:, part]
                 on = rests[:, part] & (shape.places[:, point, 1] < shape.low_others[:, part] + LIMB_TOUCHES_M)
-                spreads = np.where(on[:, None], [STANCE_PLACE_SD_M, STANCE_SD_M, STANCE_PLACE_SD_M], np.inf)
-                slips = np.where(on[1:] & on[:-1], SUPPORT_SPEED_SD_MPS / self.fps, np.inf)
+                spreads = np.where(on[:, None], [SDS.stance_place, SDS.stance, SDS.stance_place], np.inf)
+                slips = np.where(on[1:] & on[:-1], SDS.support_speed / self.fps, np.inf)
                 yield _Point(int(point), at, spreads, on, np.diff(at[:, [0, 2]], axis=0), slips)
 
     def _off(self, root: Floats) -> Floats:
@@ -233,36 +214,35 @@ class Plan:
             for stance in bearing.stances[k]:
                 here = slice(stance.start, stance.end + 1)
                 off[here, 0], off[here, 2] = level[here, k].T
-                wanted = np.zeros(count)
+                wanted = np.zeros(count)  # a foot given above the floor comes down in 0.3 s
                 for edge in {stance.start, stance.end} & {0, count - 1}:
-                    near = np.clip(1.0 - np.abs(np.arange(count) - edge) / (FOOT_COMES_DOWN_S * self.fps), 0.0, 1.0)
-                    wanted += height[edge, k] * _eased(near)
+                    near = np.clip(1.0 - np.abs(np.arange(count) - edge) / (0.3 * self.fps), 0.0, 1.0)
+                    wanted += height[edge, k] * smoothstep(near)
                 off[here, 1] = (wanted - height[:, k])[here]
             edges = [0, *(frame for stance in bearing.stances[k] for frame in (stance.start, stance.end)), count - 1]
             for begin, end in zip(edges[::2], edges[1::2], strict=True):
                 if end - begin < 2:
                     continue
                 part, share = slice(begin, end + 1), np.linspace(0.0, 1.0, end - begin + 1)
-                off[part] = off[begin] + _eased(share)[:, None] * (off[end] - off[begin])
+                off[part] = off[begin] + smoothstep(share)[:, None] * (off[end] - off[begin])
                 on_its_way = (begin == 0 and self.stretch.moving[0]) or (end == count - 1 and self.stretch.moving[1])
                 if on_its_way or not bearing.stances[k]:
                     continue
                 places = shape.tracks[part, k] + root[part][:, [0, 2]] + off[part][:, [0, 2]]
                 step = places[-1] - places[0]
-                far = min(float(np.linalg.norm(step)) / LONG_STEP_M, 1.0)
-                lift = np.where(
-                    borne[part, k], STEP_HEIGHT_M * far * _eased(np.minimum(share, share[::-1]) / STEP_RISE_SHARE), 0.0
-                )
+                far = min(float(np.linalg.norm(step)) / 0.3, 1.0)  # a step from 0.3 m on is long
+                rise = smoothstep(np.minimum(share, share[::-1]) / 0.33)  # the foot rises, and sinks, in a third
+                lift = np.where(borne[part, k], STEP_HEIGHT_M * far * rise, 0.0)
                 off[part, 1] += np.maximum(lift - height[part, k] - off[part, 1], 0.0)
                 # Near the floor a foot moves straight from place to place, whatever the reference does.
-                strays = places - places[0] - _eased(share)[:, None] * step
-                low = (1.0 - far) * (1.0 - _eased((height[part, k] + off[part, 1]) / FULL_SWING_SD_FROM_M))
+                strays = places - places[0] - smoothstep(share)[:, None] * step
+                low = (1.0 - far) * (1.0 - smoothstep((height[part, k] + off[part, 1]) / FULL_SWING_M))
                 off[part, 0], off[part, 2] = (off[part][:, [0, 2]] - low[:, None] * strays).T
         return out
 
 
 def _stacked(parts: list[Floats], shape: tuple[int, ...]) -> Floats:
-    """Return arrays as the columns of one; of this shape if there are none."""
+    """Stack arrays as columns; return zeros of this shape if there are none."""
     return np.stack(parts, axis=1) if parts else np.zeros(shape)
 
 
@@ -283,7 +263,7 @@ def plan_contacts(
         skeleton: the body.
         stretch: its movement.
         mass: its centre of mass relative to the root [N, 3], metres.
-        feet: those that may be placed.
+        feet: feet that may be placed.
         overhang: allowed distance of the centre of mass from the support, metres.
         gravity: m/s^2.
         fps: frames a second.
@@ -293,13 +273,14 @@ def plan_contacts(
     shape, root, count = shape_of(skeleton, stretch.posed, feet), stretch.ground.root, len(stretch.ground.root)
     standing = stretch.ground.floor - shape.lowest
     above = root[[0, -1], 1] - standing[[0, -1]]
-    staying = find_staying(shape, root[:, [0, 2]]) if above.max() < STAYING_FOOT_HEIGHT_M else None
+    # Up to 0.12 m above the floor a foot may stay throughout; from 0.04 m on a body is in the air where walks are.
+    staying = find_staying(shape, root[:, [0, 2]]) if above.max() < 0.12 else None
     hovers = tuple(
-        bool(staying is None and stretch.ground.aloft[end] > FLIGHT_CERTAIN_SHARE and above[end] > AIRBORNE_FROM_M)
+        bool(staying is None and stretch.ground.aloft[end] > FLIGHT_CERTAIN_SHARE and above[end] > 0.04)
         for end in (0, -1)
     )
     flights: list[Flight] = []
-    # A body that stands on the same limb, in one place, at both ends does not hop either.
+    # Nor does a body hop that stands on the same limb, in one place, at both ends.
     if flies and staying is None and standing_rises(skeleton, stretch.posed.rotations[[0, -1]], root[[0, -1]]) is None:
         rates = [
             None if rate is None else rate + float(step)
@@ -319,11 +300,5 @@ def plan_contacts(
         )
     flying = flying_frames(flights, (hovers[0], hovers[1]), count)
     plan = Plan(stretch, shape, flights, flying, feet, staying, mass, overhang, fps, falls)
-    plan.step()
+    plan.plan_steps()
     return plan
-
-
-def _eased(share: Floats) -> Floats:
-    """Return the smoothstep of a share, clipped to 0 and 1."""
-    share = np.clip(share, 0.0, 1.0)
-    return np.asarray(share * share * (3.0 - 2.0 * share))

@@ -1,4 +1,4 @@
-"""Damped Gauss-Newton over a whole movement, whatever its terms."""
+"""Damped Gauss-Newton over a whole movement, for any terms."""
 
 from __future__ import annotations
 
@@ -14,14 +14,9 @@ from motionmind.synth.one_sided import OneSided
 from motionmind.synth.system import Normal
 from motionmind.synth.terms import Term
 
-MAX_ITERATIONS_PER_PLAN = 4  # iterations after which the terms are planned again at the latest
-DIAGONAL_DAMPING = 0.3  # added to the diagonal, so that unknowns without rows stay
-MAX_STEP_M_RAD = 0.6  # metres and radians: largest change of an unknown in an iteration
-STEP_SHRINK_RATIO = 0.4  # factor that shortens a step after which the sum of squares is too great
-MAX_RISE_RATIO = 1.2  # factor by which a step may raise the sum of squares: limbs that meet push only from then on
-MAX_STEP_TRIES = 3  # step lengths tried
-MIN_GAIN_SHARE = 0.01  # share of the sum of squares: an iteration that gains less is the last
-CONVERGED_M_RAD = 0.004  # metres and radians: an iteration that changes every unknown by less is the last
+MAX_ITERATIONS_PER_PLAN = 4
+DAMPING_WEIGHT = 0.3  # on the diagonal, so that unknowns without rows stay
+CONVERGED_M_RAD = 0.004  # an iteration that changes every unknown by less is the last
 
 
 class Problem(NamedTuple):
@@ -59,8 +54,8 @@ def solve(
         problem: the movement.
         terms: its terms.
         x: initial unknowns [N, n]; those of fixed frames stay.
-        replan: may change the terms, given the movement so far; called every few iterations and where it has settled.
-            Returns whether it did.
+        replan: may change the terms, given the movement so far, and returns whether it did; called every
+            MAX_ITERATIONS_PER_PLAN iterations and on convergence.
         iterations: maximum number.
     """
     best = state = problem.state(x)
@@ -68,36 +63,39 @@ def solve(
     least = normal.cost
     for number in range(iterations):
         cost = normal.cost
-        step = normal.step(DIAGONAL_DAMPING, problem.fixed)
+        step = normal.step(DAMPING_WEIGHT, problem.fixed)
         broken = [term.foresee(state, step, normal) for term in terms if isinstance(term, OneSided)]
         if any(broken):
             normal.expand(state.mass_jacobian)
-            step = normal.step(DIAGONAL_DAMPING, problem.fixed)
-        # The root counts as a whole: which way the body faces must not matter.
+            step = normal.step(DAMPING_WEIGHT, problem.fixed)
+        # Take the length of the root's step, which does not depend on the direction in which the body faces.
         greatest = float(max(rot.norm(step[:, :3]).max(), np.abs(step[:, 3:]).max(initial=0.0)))
-        share = min(1.0, 2.0 * farthest, MAX_STEP_M_RAD / max(greatest, CONVERGED_M_RAD))
-        for _ in range(MAX_STEP_TRIES):
+        # No unknown changes by more than 0.6 m or rad.
+        share = min(1.0, 2.0 * farthest, 0.6 / max(greatest, CONVERGED_M_RAD))
+        for _ in range(
+            3
+        ):  # shorten a step that raises the sum of squares; not slightly, because limbs push as they meet
             there = problem.state(state.x + share * step)
             normal = _linearised(there, terms)
-            if normal.cost <= MAX_RISE_RATIO * cost:
+            if normal.cost <= 1.2 * cost:
                 break
-            share *= STEP_SHRINK_RATIO
+            share *= 0.4
         state, farthest = there, share
         if normal.cost < least:
             best, least = state, normal.cost
-        settled = share * greatest < CONVERGED_M_RAD or (
-            share == 1.0 and 0.0 <= cost - normal.cost < MIN_GAIN_SHARE * cost
-        )
+        gains_little = share == 1.0 and 0.0 <= cost - normal.cost < 0.01 * cost
+        settled = share * greatest < CONVERGED_M_RAD or gains_little
         if (settled or number % MAX_ITERATIONS_PER_PLAN == MAX_ITERATIONS_PER_PLAN - 1) and replan(best):
             state = best
             normal = _linearised(state, terms)
-            least = normal.cost  # of other terms
+            least = normal.cost  # of the new terms
         elif settled:
             break
     return best
 
 
 def _linearised(state: State, terms: Sequence[Term]) -> Normal:
+    """Return the normal equations of the terms, linearised at a state."""
     normal = Normal(*state.x.shape)
     for term in terms:
         term.add(state, normal)

@@ -1,8 +1,8 @@
 """Synthesis: from a reference movement to one that its feet carry, exact in the given postures.
 
-`motionmind.synth.plan` first plans stances and flights. `motionmind.synth.solve` then solves one least-squares problem
-over the root and the joints of all frames: its terms (`motionmind.synth.terms`) say what the movement should be like,
-and `WEIGHTS` how firmly. Every body is scaled to the size of a person, for which the weights were chosen.
+`motionmind.synth.plan` plans stances and flights. `motionmind.synth.solve` then solves one least-squares problem over
+the root and the joints of all frames. Its terms (`motionmind.synth.terms`) state properties of the movement, and
+`WEIGHTS` their standard deviations, chosen for a body the size of a person: every body is scaled to that size.
 """
 
 from __future__ import annotations
@@ -24,28 +24,23 @@ from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.body.support import size_of
 from motionmind.footing.corrections import Correction
 from motionmind.footing.feet import find_free_feet
-from motionmind.footing.ground import Given, Stance, find_ground
+from motionmind.footing.ground import Given, Stance, Stretch, find_ground
+from motionmind.footing.smoothing import smoothstep
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline
 from motionmind.synth.collision import Collision
 from motionmind.synth.gave import Gave
 from motionmind.synth.kinematics import Freedom, State, body_of
-from motionmind.synth.one_sided import BOUND_TOLERANCE_RATIO, Balance, Floor, Limits, Speed, Travel
-from motionmind.synth.plan import Plan, Stretch, plan_contacts
+from motionmind.synth.one_sided import BOUND_TOLERANCE, UP, Balance, Floor, Limits, Speed, Travel
+from motionmind.synth.plan import Plan, plan_contacts
 from motionmind.synth.solve import Problem, solve
 from motionmind.synth.terms import Ballistic, Contacts, Run, Term, Track
 from motionmind.synth.weights import WEIGHTS, Weights
 
-MOTIONLESS_JOINT_RAD = 2e-3  # a joint outside the legs that the reference turns less has no unknowns
-LONG_REACH_M = 0.3  # of a person: a joint outside the legs with a shorter reach has no unknowns
+MOTIONLESS_RAD = 2e-3  # a joint that leaves its first orientation by less does not move
 LEGS_PASS_S = 0.12  # before legs meet and after they part, in which the plane between them turns; chosen on cmu-05
-REGAINS_BALANCE_S = 0.5  # for a body given out of balance to come over its support
-WINDOW_FRAMES = 400  # frames solved at once
-WINDOW_OVERLAP_FRAMES = 60  # frames at the end of a window that the next one solves again
-MAX_ITERATIONS = 16, 10  # most iterations of a first solve, and of one that starts from another
-MAX_REPLANS = 2, 0  # times that steps are planned again, in the same
-LENGTH_UNITS = "cm", "m/s^2"  # units that scale with the body
-LEVEL = np.array([1.0, 0.0, 1.0])
+N_WINDOW_FRAMES = 400  # solved at once
+N_OVERLAP_FRAMES = 60  # at the end of a window, which the next window solves again
 
 
 class Bounds(NamedTuple):
@@ -56,8 +51,8 @@ class Bounds(NamedTuple):
         wished: joints that a request constrains: they stay close to the reference [J].
         loose: joints without limits [J].
         touches: overlap allowed to the pairs of `Capsules.pairs` [P], metres.
-        fastest: greatest speeds of the joints [J], rad/s, of the root how fast it tilts; None for no bound.
-        turns: greatest speed at which it turns about the vertical, rad/s.
+        fastest: greatest speeds of the joints [J], rad/s, the first of the root's tilt; None for no bound.
+        turns: greatest speed of the root about the vertical, rad/s.
         travels: greatest level speed of the root, m/s; infinite for no bound.
         rises: greatest speed at which it rises or sinks, m/s; infinite for no bound.
         pushes: greatest acceleration of the root in stance, m/s^2; infinite for no bound.
@@ -74,7 +69,7 @@ class Bounds(NamedTuple):
     pushes: float
 
     def scaled(self, by: float) -> Bounds:
-        """Return the bounds of a body of another size."""
+        """Return the bounds of a body `by` times as large."""
         travels, rises, pushes = (by * most for most in (self.travels, self.rises, self.pushes))
         return self._replace(touches=by * self.touches, travels=travels, rises=rises, pushes=pushes)
 
@@ -87,7 +82,7 @@ class Synthesis(NamedTuple):
         root: positions of the root [N, 3], metres.
         freedom: the degrees of freedom of the solve.
         x: their unknowns [N, n].
-        falls: how far the body would fall without each foot [N, feet], from 0 to 1.
+        falls: degree to which the body would fall without each foot [N, feet], 0 to 1.
         gave: largest residual of each term.
     """
 
@@ -99,7 +94,7 @@ class Synthesis(NamedTuple):
     gave: tuple[Gave, ...]
 
     def at(self, times: Floats, then: Floats) -> Synthesis:
-        """Return the start of a solve on a slower clock: this movement at other times [M] of its own [N], seconds."""
+        """Return this movement at `then` [M], to start a solve on a slower clock; `times` [N] are its own, seconds."""
         falls = np.zeros((len(then), self.falls.shape[1]))
         for foot, own in enumerate(self.falls.T):
             falls[:, foot] = np.interp(then, times, own)
@@ -117,7 +112,7 @@ def synthesise(
     before: Synthesis | None = None,
     weights: Weights = WEIGHTS,
 ) -> Synthesis:
-    """Return the movement near a reference that its feet carry; given postures are exact.
+    """Return the movement near a reference that its feet carry, exact in the given postures.
 
     Args:
         skeleton: the body.
@@ -139,14 +134,14 @@ def synthesise(
     root = size * state.root
     root[0], root[-1] = given.ends
     gave = tuple(
-        Gave(term, size * most if unit in LENGTH_UNITS else most, unit, float(times[frame]))
+        Gave(term, size * most if unit in ("cm", "m/s^2") else most, unit, float(times[frame]))
         for term, (most, unit, frame) in scene.gave.items()
     )
     return Synthesis(rot.normalise(state.rotations), root, scene.freedom, x, scene.falls(), gave)
 
 
 class _Scene:
-    """A movement of N frames to synthesise: what is known of it, its plans and its residuals."""
+    """A movement of N frames to synthesise: its input, its plans and its residuals."""
 
     def __init__(
         self,
@@ -168,12 +163,12 @@ class _Scene:
         self.posed = pose(skeleton, reference)
         self.ground = find_ground(skeleton, self.posed, times, stance, given, self.feet, gravity)
         self.body = body_of(skeleton)
-        # On another clock a joint that hardly moves may seem still.
+        # Keep the degrees of freedom: on another clock a joint that hardly moves may seem still.
         self.freedom = _freedom(skeleton, bounds.fixed, reference) if before is None else before.freedom
         self.stops = self.fps * stance.half_steps[2 * np.array(list(given.low))]
         moving = given.rates[0] is not None, given.rates[1] is not None
         self.fixed = np.zeros(len(times), dtype=np.bool_)
-        # A posture within rounding errors of a frame keeps that frame.
+        # Postures fix the frames around them; a posture within rounding errors of a frame fixes that frame.
         self.fixed[np.floor(self.stops + 1e-6).astype(int)] = True
         self.fixed[np.ceil(self.stops - 1e-6).astype(int)] = True
         self.fixed[[1, -2]] |= moving
@@ -192,31 +187,23 @@ class _Scene:
         self.plans = list(self._planned(x))
         if not self.plans:
             return x
-        starts = [
-            0,
-            *range(
-                WINDOW_FRAMES - WINDOW_OVERLAP_FRAMES,
-                count - WINDOW_OVERLAP_FRAMES,
-                WINDOW_FRAMES - WINDOW_OVERLAP_FRAMES,
-            ),
-        ]
+        stride = N_WINDOW_FRAMES - N_OVERLAP_FRAMES
+        starts = [0, *range(stride, count - N_OVERLAP_FRAMES, stride)]
+        iterations, replans = (16, 2) if self.before is None else (10, 0)
         for begin in starts:
-            frames = slice(begin, min(begin + WINDOW_FRAMES, count))
+            frames = slice(begin, min(begin + N_WINDOW_FRAMES, count))
             problem = self.problem(frames)
             if begin:
                 problem.fixed[:2] = True
             terms = self._terms(frames, self.ground.root[frames] + x[frames, :3])
-            which = 0 if self.before is None else 1
-            replan = self._replanner(frames, terms, MAX_REPLANS[which])
-            state = solve(problem, terms, x[frames], replan, MAX_ITERATIONS[which])
+            state = solve(problem, terms, x[frames], self._replanner(frames, terms, replans), iterations)
             x[frames] = state.x
+            # The next window solves the rest again.
+            last = count if frames.stop == count else frames.stop - N_OVERLAP_FRAMES
             for term in terms:
-                last = (
-                    count if frames.stop == count else frames.stop - WINDOW_OVERLAP_FRAMES
-                )  # the next window solves the rest again
                 off, name = term.gives(state)[: last - begin], type(term).__name__
                 worst = int(np.argmax(off))
-                if term.unit and off[worst] > self.gave.get(name, (BOUND_TOLERANCE_RATIO,))[0]:
+                if term.unit and off[worst] > self.gave.get(name, (BOUND_TOLERANCE,))[0]:
                     self.gave[name] = float(off[worst]), term.unit, begin + worst
         return x
 
@@ -272,8 +259,8 @@ class _Scene:
         if len(self.freedom.joints):
             terms.append(Limits(self.reference[self.fixed], bounds.loose, w.limits))
         if self.body.weighs and "balance" not in self.without:
-            away = np.arange(len(self.reference)) / (REGAINS_BALANCE_S * fps)
-            near = 1.0 - _eased(np.stack([away, away[::-1]]))
+            away = np.arange(len(self.reference)) / (0.5 * fps)  # a body given out of balance regains it in 0.5 s
+            near = 1.0 - smoothstep(np.stack([away, away[::-1]]))
             balance = self._touches(frames), floor, self.overhang, w.room, near[:, frames], self.gravity, fps, w.balance
             terms.append(Balance(*balance))
         if "limbs" not in self.without and len(capsules_of(self.skeleton).names):
@@ -281,7 +268,7 @@ class _Scene:
             terms.append(Collision(usual, w.collision, max(1, round(LEGS_PASS_S * fps))))
         if bounds.fastest is not None:
             terms.append(Speed(bounds.fastest, bounds.turns, fps, w.speed))
-        for axes, most in ((LEVEL, bounds.travels), (1.0 - LEVEL, bounds.rises)):
+        for axes, most in ((1.0 - UP, bounds.travels), (UP, bounds.rises)):
             if np.isfinite(most):
                 terms.append(Travel(1, axes, most, flying[1:] | flying[:-1], fps, w.travel))
         if np.isfinite(bounds.pushes):
@@ -302,7 +289,7 @@ class _Scene:
                 part = plan.stretch.frames
                 if steps and frames.start <= part.start and part.stop <= frames.stop:
                     here = slice(part.start - frames.start, part.stop - frames.start)
-                    plan.again(state.root[here], state.mass[here])
+                    plan.replan_steps(state.root[here], state.mass[here])
             for at, term in enumerate(terms):
                 if isinstance(term, Contacts):
                     terms[at] = self._contacts(frames, state.root)
@@ -333,13 +320,13 @@ class _Scene:
 def _freedom(skeleton: Skeleton, fixed: Bools, reference: Floats) -> Freedom:
     """Return the degrees of freedom of a solve: legs down to the foot, and other joints with a long reach.
 
-    A joint that must not change has none, nor has a joint outside the legs that the reference does not turn. Knees and
-    elbows are hinges.
+    A fixed joint has none, nor has a joint outside the legs that the reference does not turn. Knees and elbows are
+    hinges.
     """
-    moves = rot.angle(reference, reference[:1]).max(axis=0) > MOTIONLESS_JOINT_RAD
+    moves = rot.angle(reference, reference[:1]).max(axis=0) > MOTIONLESS_RAD
     joints, axes, legs, reach = [], [], _in_legs(skeleton), _reach(skeleton)
     # The first joint of a long limb is a collarbone.
-    chosen = reach > LONG_REACH_M
+    chosen = reach > 0.3  # m
     chosen[[limb[0] for limb in limbs_of(skeleton) if len(limb) > 3]] = False
     for joint in range(len(skeleton)):
         free = legs[joint] <= 1 if joint in legs else chosen[joint]
@@ -367,7 +354,7 @@ def _spreads(
             own, slow = weights.arm, weights.arms_s
         else:
             own, slow = weights.pelvis if joint == 0 else weights.trunk, weights.trunk_s
-        # Legs may leave constrained states, so that feet can stand.
+        # Legs may leave the states that a request constrains, so that feet can stand.
         spreads.append(weights.wished if wished[joint] and joint not in legs else own)
         seconds.append(slow)
     return np.array(spreads), np.array(spreads) / (np.array(seconds) * fps) ** 2
@@ -375,14 +362,14 @@ def _spreads(
 
 @remembered
 def _as_large_as_a_person(skeleton: Skeleton) -> Skeleton:
-    """Return the body scaled to the size of a person."""
+    """Scale a body to the size of a person."""
     size = size_of(skeleton)
     return replace(skeleton, offsets=skeleton.offsets / size, tips=skeleton.tips / size)
 
 
 @remembered
 def _in_legs(skeleton: Skeleton) -> dict[int, int]:
-    """Return the joints of the legs, each with its place below the knee: 0 for the knee, -1 above it."""
+    """Return the joints of the legs, with the number of joints from the knee down to each, -1 above the knee."""
     legs = find_legs(skeleton)[1]
     return {joint: max(place - knee, -1) for leg, knee in legs for place, joint in enumerate(leg)}
 
@@ -394,9 +381,3 @@ def _reach(skeleton: Skeleton) -> Floats:
     far = np.linalg.norm(skeleton.rest - skeleton.rest[: len(skeleton), None], axis=-1)
     carried = np.concatenate([above, above]).T  # joints, then their tips, as in `rest`
     return np.asarray(np.where(carried, far, 0.0).max(axis=1))
-
-
-def _eased(share: Floats) -> Floats:
-    """Return the smoothstep of a share, clipped to 0 and 1."""
-    share = np.clip(share, 0.0, 1.0)
-    return np.asarray(share * share * (3.0 - 2.0 * share))

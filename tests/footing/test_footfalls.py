@@ -10,16 +10,10 @@ import pytest
 
 from motionmind._typing import Bools, Floats
 from motionmind.footing.footfalls import (
-    CROSSING_COST_RATIO,
-    OWN_SIDE_SHARE,
-    QUICK_STEP_MPS,
+    COSTS,
     SHORTEST_STEP_S,
-    STANCE_DRIFT_M,
-    STANCE_SLIP_M,
-    STEP_COST_NATS,
-    SWING_FIRM_NATS_PER_S,
     _crossing,
-    _part,
+    _divide,
     find_stances,
     standing_costs,
 )
@@ -44,18 +38,18 @@ def cost_of(
         if stands[at]:
             own = track[here]
             if at == 0 and end == last:
-                far = max(float(np.linalg.norm(track[-1] - track[0])) - STANCE_SLIP_M, 0.0)
-                off = np.sum((own - own.mean(axis=0)) ** 2) + len(own) * (far / STANCE_SLIP_M * STANCE_DRIFT_M) ** 2
+                far = max(float(np.linalg.norm(track[-1] - track[0])) - COSTS.slip, 0.0)
+                off = np.sum((own - own.mean(axis=0)) ** 2) + len(own) * (far / COSTS.slip * COSTS.drift) ** 2
             elif at == 0 or end == last:
                 place = track[0] if at == 0 else track[-1]
                 inward = np.maximum(np.sum((own - place) * outward[here], axis=1), 0.0)
-                off = np.sum((own - place) ** 2) + CROSSING_COST_RATIO * np.sum(inward**2)
+                off = np.sum((own - place) ** 2) + COSTS.crossing * np.sum(inward**2)
             else:
-                across = 0.5 * OWN_SIDE_SHARE * (track[end] - track[at]) @ outward[(at + end) // 2]
+                across = 0.5 * COSTS.own_side * (track[end] - track[at]) @ outward[(at + end) // 2]
                 off = np.sum((own - own.mean(axis=0)) ** 2) + len(own) * across**2
-            total += stand[here].sum() / fps + float(off) / (STANCE_DRIFT_M**2 * fps)
+            total += stand[here].sum() / fps + float(off) / (COSTS.drift**2 * fps)
         else:
-            if (at == 0 and stand[0] < SWING_FIRM_NATS_PER_S) or (end == last and stand[-1] < SWING_FIRM_NATS_PER_S):
+            if (at == 0 and stand[0] < COSTS.swing_firm) or (end == last and stand[-1] < COSTS.swing_firm):
                 return np.inf
             inner = at > 0 and end < last
             least = max(2, round(SHORTEST_STEP_S * fps)) if inner else half[0] if at == 0 else half[1]
@@ -64,8 +58,8 @@ def cost_of(
             off = track[min(end + 1, last)] - track[max(at - 1, 0)]
             total += (
                 swing[here].sum() / fps
-                + float(off @ off) / ((end + 2 - at) / fps * QUICK_STEP_MPS**2)
-                + inner * STEP_COST_NATS
+                + float(off @ off) / ((end + 2 - at) / fps * COSTS.quick**2)
+                + inner * COSTS.step
             )
         at = end + 1
     return total
@@ -86,7 +80,7 @@ def test_time_is_parted_in_the_way_that_costs_least(seed: int) -> None:
     known = track, outward, stand, swing, half, fps
     best = min(product((True, False), repeat=frames), key=lambda one: cost_of(one, *known))
     crosses = _crossing(track, outward)
-    parted = _part(track, outward, crosses, stand / fps, swing / fps, max(2, round(SHORTEST_STEP_S * fps)), half, fps)
+    parted = _divide(track, outward, crosses, stand / fps, swing / fps, max(2, round(SHORTEST_STEP_S * fps)), half, fps)
     found = np.zeros(frames, dtype=bool)
     for start, end in parted:
         found[start : end + 1] = True

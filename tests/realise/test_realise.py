@@ -17,9 +17,9 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Corpus, Facing
 from motionmind.corpus.gather import gather
-from motionmind.footing.bearing import lowest, points_of_feet
 from motionmind.footing.feet import find_free_feet
 from motionmind.footing.root import LEAST_TRAVEL_SHARE, root_trajectory, stand, steps_easily
+from motionmind.footing.shape import lowest, points_of_feet
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.transitions import Transitions, count_transitions
@@ -75,8 +75,7 @@ def test_a_foot_that_stands_carries_the_body() -> None:
         np.zeros(30),
         np.ones((29, 6)),
         np.zeros((29, 3)),
-        -seen[0],
-        -seen[-1],
+        (-seen[0], -seen[-1]),
         1.0,
         np.ones(29),
     )
@@ -107,7 +106,14 @@ def test_in_the_air_a_body_travels_as_the_corpus_does_and_ends_where_it_is_to() 
     motion, drift = walk(12), np.random.default_rng(0).normal(size=(11, 3))
     a, b = np.zeros(3), np.array([1.0, 0.0, -2.0])
     flown = root_trajectory(
-        human23(), pose(human23(), motion.rotations), np.full(12, 3.0), np.ones((11, 6)), drift, a, b, 1.0, np.ones(11)
+        human23(),
+        pose(human23(), motion.rotations),
+        np.full(12, 3.0),
+        np.ones((11, 6)),
+        drift,
+        (a, b),
+        1.0,
+        np.ones(11),
     )
     missing = b - drift.sum(axis=0)
     added = np.diff(flown, axis=0) - drift
@@ -128,8 +134,7 @@ def test_a_little_way_that_is_missing_is_made_up_in_the_air_rather_than_on_the_f
         clearance,
         np.ones((20, 6)),
         np.zeros((20, 3)),
-        np.zeros(3),
-        np.array([0.01, 0.0, 0.0]),
+        (np.zeros(3), np.array([0.01, 0.0, 0.0])),
         1.0,
         np.ones(20),
     )
@@ -153,7 +158,7 @@ def test_a_far_way_is_gone_where_both_feet_are_low() -> None:
     np.testing.assert_allclose(steps_easily(heights[:, ::-1] + 1.0, 30.0), easily)
     np.testing.assert_array_equal(steps_easily(heights[:, :1], 30.0), np.ones(90))
     far = np.array([0.0, 0.0, 6.0])
-    root = root_trajectory(dancer, posed, still[:, 0], np.zeros((90, 6)), still[1:], still[0], far, 3.0, easily)
+    root = root_trajectory(dancer, posed, still[:, 0], np.zeros((90, 6)), still[1:], (still[0], far), 3.0, easily)
     steps = np.diff(root[:, 2])
     assert steps[36:54].max() < 0.4 * steps[[20, 70]].min()
     np.testing.assert_allclose(root[-1], far, atol=1e-12)

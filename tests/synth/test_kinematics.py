@@ -10,11 +10,11 @@ from moved import HUMAN, differences, freedom_of, moved, random_rotations, rando
 from motionmind.body.contact import contact_points
 from motionmind.body.support import centre_of_mass
 from motionmind.geometry import rotations as rot
-from motionmind.synth.kinematics import SERIES_BELOW_RAD2, Rows, State, body_of, rows_at
+from motionmind.synth.kinematics import MAX_SERIES_RAD2, Rows, State, body_of, rows_at
 from motionmind.synth.system import Normal
 
 # Of unknowns: none; on both sides of where sines give way to their series; as a solve has them; past half a turn.
-SIZES = [0.0, 0.3 * SERIES_BELOW_RAD2**0.5, SERIES_BELOW_RAD2**0.5, 0.1, 2.0]
+SIZES = [0.0, 0.3 * MAX_SERIES_RAD2**0.5, MAX_SERIES_RAD2**0.5, 0.1, 2.0]
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -72,7 +72,7 @@ def test_axes_are_how_fast_joints_turn(size: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("size", "rounding"), [(0.2 * SERIES_BELOW_RAD2**0.5, 1e-15), (5.0 * SERIES_BELOW_RAD2**0.5, 2e-12), (1.0, 1e-14)]
+    ("size", "rounding"), [(0.2 * MAX_SERIES_RAD2**0.5, 1e-15), (5.0 * MAX_SERIES_RAD2**0.5, 2e-12), (1.0, 1e-14)]
 )
 def test_axes_are_the_sum_of_their_series(size: float, rounding: float) -> None:
     """J(v) e = sum_k (-v x)^k e / (k + 1)!; closed forms lose digits near zero."""

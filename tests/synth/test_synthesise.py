@@ -242,7 +242,7 @@ def test_every_window_has_the_limits_of_all_given_postures(
 ) -> None:
     """And of no others, though windows keep the frames that the last one solved."""
     toy = Toy(np.concatenate([crouching(80, depth) for depth in (0.4, 0.2, 0.5)]), through=MappingProxyType({4: 0.0}))
-    monkeypatch.setattr(module, "WINDOW_FRAMES", 120)
+    monkeypatch.setattr(module, "N_WINDOW_FRAMES", 120)
     toy.made()
     assert len(solved) > 2
     assert solved[1].problem.fixed[:2].all()
@@ -348,7 +348,7 @@ def test_movements_that_are_solved_for_in_windows_are_those_solved_for_at_once(
 ) -> None:
     toy = Toy(np.concatenate([crouching(80, depth) for depth in (0.4, 0.2, 0.5)]), through=MappingProxyType({4: 0.0}))
     whole = toy.made()
-    monkeypatch.setattr(module, "WINDOW_FRAMES", 120)
+    monkeypatch.setattr(module, "N_WINDOW_FRAMES", 120)
     parts = toy.made()
     np.testing.assert_allclose(parts.root, whole.root, atol=0.003)
     places = [HUMAN.positions(made.rotations, made.root) for made in (whole, parts)]
@@ -369,7 +369,7 @@ def test_a_solve_goes_on_from_another() -> None:
 def test_a_solve_goes_on_at_other_times_though_a_joint_hardly_moves() -> None:
     """A joint that turns just enough to be free in one frame, which the slower clock does not have."""
     q = crouching()
-    q[15, HUMAN.index("right_shoulder")] = rot.exp(np.array([0.0, 1.02 * module.MOTIONLESS_JOINT_RAD, 0.0]))
+    q[15, HUMAN.index("right_shoulder")] = rot.exp(np.array([0.0, 1.02 * module.MOTIONLESS_RAD, 0.0]))
     toy = Toy(q)
     then = np.linspace(0.0, toy.times[-1], 36)
     slower = rot.normalise(rotation_spline(toy.times, q, then))
