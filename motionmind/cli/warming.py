@@ -378,8 +378,8 @@ def _realise(engine: Engine, carriage: Carriage) -> None:
     import numpy as np
 
     from motionmind.body.motion import Velocity
-    from motionmind.realise.realise import Style, Wishes
     from motionmind.realise.realise import realise as realise_path
+    from motionmind.realise.wishes import Style, Wishes
 
     clip = engine.corpus.motion(engine.corpus.clips[0])
     none = np.zeros(len(engine.space), dtype=np.bool_)

@@ -16,17 +16,17 @@ from motionmind.walks.expectation import Expectation
 from motionmind.walks.headings import correct_headings
 from motionmind.walks.stops import Stop
 
-# Distance that a chain may keep from its state at a move, in tolerances: where a request constrains the chain (below 1,
-# to leave room for the arc between two frames), and elsewhere.
+# Distance of a chain from its state at a move, in tolerances: where a request constrains the chain (below 1, to leave
+# room for the arc between two frames), and elsewhere.
 FIRM_PULL_RATIO, FREE_PULL_RATIO = 0.95, 3.0
 
 
-def allowed_off(chains: Floats, path: Int32s, grammar: Grammar, tolerances: Floats, wished: Bools) -> Floats:
+def allowed_distances(chains: Floats, path: Int32s, grammar: Grammar, tolerances: Floats, wished: Bools) -> Floats:
     """Return the distance that each chain may keep from its state at each move [T + 1, L], radians.
 
-    It is FIRMLY times the chain's tolerance where a request constrains the chain (`wished`). Elsewhere it is FREELY
-    times the tolerance, plus the walk's distance (at `chains`) beyond the tolerance of the nearest state: a vocabulary
-    without a state nearby must not distort the movement.
+    It is FIRM_PULL_RATIO times the chain's tolerance where a request constrains the chain (`wished`). Elsewhere it is
+    FREE_PULL_RATIO times the tolerance, plus the walk's distance (at `chains`) beyond the tolerance of the nearest
+    state: a vocabulary without a state nearby must not distort the movement.
     """
     starts, nearest = grammar.transitions.starts, np.empty(path.shape)  # cosines of half the angles
     for chain in range(len(tolerances)):
@@ -45,7 +45,7 @@ def bend_to_states(
     corpus: Corpus,
     within: Floats,
 ) -> Expectation:
-    """Bend a walk so that each chain is `within` radians [T + 1, L] of its state [T + 1, L, 4] at each move.
+    """Bend a walk until each chain is `within` radians [T + 1, L] of its state [T + 1, L, 4] at each move.
 
     `chains` are the walk's orientations at the moves [T + 1, L, 4]. The bend is 0 at the stops and where a chain is
     near enough already; a spline interpolates it between moves.

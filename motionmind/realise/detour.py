@@ -14,22 +14,21 @@ from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import postures_near
 
-N_DETOUR_POSTURES = 8  # postures of the corpus to try for each end
-N_CANDIDATES_RATIO = 4  # times as many candidates in a large corpus, whose trees use another metric
-UNRECORDED_MOVE_COST_RAD = 0.05  # RMS radians per joint: cost of each move that the recordings do not fill
+N_DETOUR_POSTURES = 8  # to try for each end
 
 
 def detour(corpus: Corpus, carriage: Carriage, ends: tuple[Floats, Floats], moves: int, own: int) -> Floats:
     """Return orientations of the joints at each move [moves + 1, J, 4], exact at both ends.
 
-    Choose the pair of recordings, one from near the first posture and one into the last, with the lowest cost: their
-    distance to each other, their distances to the ends, and the moves that they leave unfilled besides `own`.
+    Choose the pair of recordings with the lowest cost, one from near the first posture and one into the last: the sum
+    of their distance to each other, of their distances to the ends, and of a price for each move that they leave
+    unfilled besides `own`.
 
     Args:
         corpus: the recorded movement.
         carriage: its samples.
         ends: orientations of the chains in both postures [L, 4].
-        moves: number of moves of the detour, each as long as one of the corpus.
+        moves: number of moves of the detour, each as long as a move of the corpus.
         own: number of moves in which to join the two recordings.
     """
     joints = len(corpus.skeleton)
@@ -38,7 +37,7 @@ def detour(corpus: Corpus, carriage: Carriage, ends: tuple[Floats, Floats], move
     starts, stops = corpus.columns.starts[:-1], corpus.columns.starts[1:]
     near = [_nearest(carriage, shown, end) for end in (first, last)]
     spare = max(moves - own, 0)
-    best, way = np.inf, (0, 0, 0, 0)
+    best, chosen = np.inf, (0, 0, 0, 0)
     for i, first_off in zip(*near[0], strict=True):
         after = min(spare, int(stops[np.searchsorted(stops, i, side="right")] - 1 - i))
         for k, last_off in zip(*near[1], strict=True):
@@ -46,11 +45,11 @@ def detour(corpus: Corpus, carriage: Carriage, ends: tuple[Floats, Floats], move
             on = np.arange(after + 1)
             into = np.minimum(spare - on, before)
             apart = np.sqrt(np.mean(rot.angle(shown[i + on], shown[k - into]) ** 2, axis=-1))
-            costs = apart + first_off + last_off + UNRECORDED_MOVE_COST_RAD * (spare - on - into)
+            costs = apart + first_off + last_off + 0.05 * (spare - on - into)  # RMS rad per joint, for each move
             if costs.min() < best:
                 best, n = float(costs.min()), int(costs.argmin())
-                way = int(i), n, int(k), int(into[n])
-    i, n, k, m = way
+                chosen = int(i), n, int(k), int(into[n])
+    i, n, k, m = chosen  # n moves onwards from posture i, then m moves to posture k
     out = np.empty((moves + 1, joints, 4))
     out[: n + 1], out[moves - m :] = shown[i : i + n + 1], shown[k - m : k + 1]
     share = np.linspace(0.0, 1.0, moves - m - n + 1)[1:-1, None]
@@ -63,11 +62,9 @@ def _nearest(carriage: Carriage, shown: Floats, posture: Floats) -> tuple[Ints, 
     """Return the indices of the postures [N, J, 4] nearest to one [J, 4], and their distances, radians per joint."""
     some = np.arange(len(shown))
     if carriage.trees is not None:
-        some = np.sort(
-            postures_near(
-                carriage.trees, carriage.orientations, posture, N_CANDIDATES_RATIO * N_DETOUR_POSTURES, len(shown)
-            )
-        )
+        # Try four times as many, because the trees use another metric.
+        count = 4 * N_DETOUR_POSTURES
+        some = np.sort(postures_near(carriage.trees, carriage.orientations, posture, count, len(shown)))
     off = np.sqrt(np.mean(rot.angle(shown[some], posture) ** 2, axis=-1))
     order = np.argsort(off, kind="stable")[:N_DETOUR_POSTURES]
     return some[order], off[order]

@@ -1,14 +1,13 @@
-"""Retiming: slow a movement down where it would be faster than usual in the corpus; time leaps by gravity
-(`jump_in_time`).
+"""Retiming: slow a movement down where it is faster than usual in the corpus; time leaps by gravity (`jump_in_time`).
 
-The distance between the two postures alone sets the duration, before the path is known, but a joint may go there and
-back on the way. Where that would be faster than 99 % of the corpus's samples, the clock slows down smoothly over a few
-half steps, for the whole body, so that its joints stay together.
+Before the path is known, the distance between the two postures sets the duration, but a joint may go there and back on
+the way. Where that would be faster than 99 % of the corpus's samples, the clock of the whole body slows down smoothly
+over a few half steps, so that its joints stay together.
 
-The synthesis then adds movement of the feet and for balance, some of it quick. So the clock slows down once more where
-the result exceeds the peaks of corpus movement of that length (`motionmind.learned.pace.Pace.peaks`), where a joint is
-much faster than in nearly all samples, and where a foot near the floor is faster than usual. It does not slow down in
-free fall, but may where a body dips as fast with its feet on the floor.
+The synthesis then adds movement of the feet and for balance, some of it quick. So the clock slows down again where the
+result exceeds the peaks of corpus movement of that length (`motionmind.learned.pace.Pace.peaks`), where a joint is much
+faster than in nearly all samples, and where a foot near the floor is faster than usual. It keeps its speed in free
+fall, but not where a body dips as fast with its feet on the floor.
 """
 
 from __future__ import annotations
@@ -31,19 +30,14 @@ from motionmind.learned.pace import moved_in, steps_of, ways
 from motionmind.learned.peaks import accelerations
 from motionmind.walks.expectation import Expectation
 
-SPEED_HEADROOM_RATIO = 0.9  # share of the fastest speeds allowed: passages and the synthesis add to them later
-FINAL_PEAK_RATIO = 0.92  # share of the peaks allowed in the end; chosen on cmu-05
-JOINT_SPEED_RATIO = 1.13  # largest speed of a joint, relative to the 99th percentile in the corpus; for ballet
-JUMP_RISE_RATIO = 0.95  # share of the fastest rise allowed to a jump on the way
-SLOWDOWN_AROUND_S = 1.0 / 6.0  # seconds around an excess in which the clock slows down
-COMPARED_DURATION_RATIO = 1.1  # largest factor on a movement's duration when comparing it with movements as long
-SPARE_TIME_SHARE = 0.3  # share of the spare time of slow parts that fast parts may take
-MIN_CLOCK_CHANGE_RATIO = 1e-3  # smallest change of the clock worth making
-LEFT_FLOOR_M = 0.1  # metres, for a person: walks no higher than this have not left the floor
-TAKEOFF_LOWER_M = 0.1  # metres, for a person: do not hurry a take-off that is at most this much lower than possible
-MIN_HEIGHT_GAIN_M = 0.02  # metres, for a person: smallest gain in height worth a longer fall
-LEAP_JOINT_SPEED_RATIO = 2.5  # largest speed of a joint in a leap, relative to the 99th percentile in the corpus
-SLOWDOWN_FROM_END_S = 0.3  # seconds from an end with a given velocity in which the clock may begin to slow down
+SPEED_HEADROOM_RATIO = 0.9  # of the fastest speeds; passages and the synthesis add to speeds later
+JOINT_SPEED_RATIO = 1.13  # largest speed of a joint, relative to the 99th percentile in the corpus; chosen on ballet
+LEAP_JOINT_SPEED_RATIO = 2.5  # the same in a leap
+SLOWDOWN_AROUND_S = 1.0 / 6.0  # around an excess, in which the clock slows down
+SLOWDOWN_FROM_END_S = 0.3  # from an end with a given velocity, in which the clock may begin to slow down
+MIN_CLOCK_CHANGE_RATIO = 1e-3
+LEFT_FLOOR_M = 0.1  # for a person: walks no higher than this have not left the floor
+TAKEOFF_LOWER_M = 0.1  # for a person: do not hurry a take-off that is at most this much lower than possible
 
 
 def keep_pace(
@@ -73,7 +67,7 @@ def keep_pace(
     slower = np.ones(len(travel))
     step = np.searchsorted(times, 0.5 * (frames[1:] + frames[:-1])) - 1
     np.maximum.at(slower, step.clip(0, len(slower) - 1), (speeds / (SPEED_HEADROOM_RATIO * fastest)).max(axis=1))
-    # The maximum of five covers the mean of five: no half step slows down less than it needs.
+    # A maximum of five before the mean of five: each half step slows down at least as much as it needs.
     slower = _mean_around(sliding_max(slower, 2), np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0)
     middle = 0.5 * (times[1:] + times[:-1])
     for is_moving, since in zip(moving, (middle - times[0], times[-1] - middle), strict=True):
@@ -94,9 +88,9 @@ def jump_in_time(
 ) -> Floats:
     """Return the factor by which to stretch each half step [2 T], at most 1, so that jumps start from stretched legs.
 
-    If the first or the last posture is in the air, gravity decides how long the body takes between it and the floor. A
-    walk that takes longer would take off in a lower posture, such as a split. Speed the legs up instead, so that the
-    body takes off in the posture in which it stands highest.
+    If the first or the last posture is in the air, gravity sets the time between it and the floor. A slower walk would
+    take off in a lower posture, such as a split. Speed the legs up instead, so that the body takes off in the posture
+    in which it stands highest.
 
     Args:
         skeleton: the body.
@@ -132,7 +126,7 @@ def jump_in_time(
             if np.isinf(best):  # before this step it would leave the floor
                 best = min(high[step - 1], high[step]) + TAKEOFF_LOWER_M * size
             if high[step] > best and hurries <= LEAP_JOINT_SPEED_RATIO * share:
-                best, quicker = high[step] + MIN_HEIGHT_GAIN_M * size, (step, share)
+                best, quicker = high[step] + 0.02 * size, (step, share)  # a longer fall must gain 0.02 m
         if high[quicker[0]] > highest - TAKEOFF_LOWER_M * size:  # halfway down, legs would still be apart
             out[onward][: quicker[0]] = quicker[1]
     return out
@@ -146,7 +140,7 @@ def land_between(seconds: Floats, heights: Floats, size: float, moving: tuple[bo
         seconds: durations of the half steps [2 T].
         heights: heights of the lowest points above the floor at both ends [2], metres.
         size: size of the body (`motionmind.body.support.size_of`).
-        moving: whether the first and the last posture are passed at a given velocity.
+        moving: whether the velocity at the first and at the last posture is given.
     """
     takes = float(seconds.sum())
     rate = (heights[1] - heights[0]) / takes + 0.5 * GRAVITY * takes
@@ -155,12 +149,12 @@ def land_between(seconds: Floats, heights: Floats, size: float, moving: tuple[bo
     if top <= heights.max() + LEFT_FLOOR_M * size or takes >= needs:
         return np.ones(len(seconds))
     middles = np.cumsum(seconds) - 0.5 * seconds
-    free = _away(middles, [at for at, given in zip((0.0, takes), moving, strict=True) if given], np.inf)
+    free = _freedom(middles, [at for at, given in zip((0.0, takes), moving, strict=True) if given], np.inf)
     return np.asarray(1.0 + free * (needs - takes) / max(float(free @ seconds), 1e-9))
 
 
 def slower_steps(
-    motion: Motion, most: Floats, moving: tuple[bool, bool], slides: float = np.inf, lasts: bool = False
+    motion: Motion, most: Floats, moving: tuple[bool, bool], slides: float = np.inf, keeps_length: bool = False
 ) -> Floats:
     """Return the factor by which to stretch each step of a movement [N - 1] to respect the speed limits.
 
@@ -170,14 +164,14 @@ def slower_steps(
             and on the root's acceleration, heights/s^2 [J + 4].
         moving: whether the first and the last posture have a given velocity, which must not change.
         slides: limit on the speed of a foot near the floor, heights/s; only for bodies at least as tall as people.
-        lasts: whether to keep the total duration: slower steps then take their time from steps with slack.
+        keeps_length: whether to keep the total duration: slower steps then take time from steps with slack.
     """
     posed = pose(motion.skeleton, motion.rotations, motion.root)
-    slower, slack = _slower(motion, posed, most, slides, moving)
-    return _within(slower, slack, np.diff(motion.times)) if lasts else slower
+    slower, slack = _factors(motion, posed, most, slides, moving)
+    return _keep_duration(slower, slack, np.diff(motion.times)) if keeps_length else slower
 
 
-def _slower(
+def _factors(
     motion: Motion, posed: Posed, most: Floats, slides: float, moving: tuple[bool, bool]
 ) -> tuple[Floats, Floats]:
     """Return the factor by which to stretch each step of a movement [N - 1], at least 1, and the share of its time that
@@ -188,19 +182,19 @@ def _slower(
         posed: the same, in the world.
         most: limits, as in `slower_steps`.
         slides: speed of a foot near the floor, heights/s.
-        moving: whether the first and the last posture are passed at a given velocity.
+        moving: whether the velocity at the first and at the last posture is given.
     """
     times, body = motion.times, motion.skeleton
     middles, fps = 0.5 * (times[1:] + times[:-1]), 1.0 / float(times[1] - times[0])
     ends = [time for fixed, time in zip(moving, times[[0, -1]], strict=True) if fixed]
     free = np.minimum(
-        _away(middles, ends, fps), _away(middles, times[_falling(body, posed, fps)], fps, SHORTEST_PUSH_OFF_S)
+        _freedom(middles, ends, fps), _freedom(middles, times[_falling(body, posed, fps)], fps, SHORTEST_PUSH_OFF_S)
     )
     moved = moved_in(motion)
     shown = (fps * steps_of(motion) / most[:-1]).max(axis=1)
-    # Twice as slow a movement has a quarter of its accelerations; each is between two steps.
+    # At half the speed a movement has a quarter of its accelerations, each of which lies between two steps.
     changes = np.sqrt(accelerations(moved, fps) / most[-1])
-    changes[_braking(moved, moving, fps)] = 1.0  # the slower the rest, the more a body brakes from what is given
+    changes[_braking(moved, moving, fps)] = 1.0  # a slower clock would brake harder from a given velocity
     shown[1:], shown[:-1] = np.maximum(shown[1:], changes), np.maximum(shown[:-1], changes)
     if np.isfinite(slides) and body.height >= TALL:
         slid = slides_between(body, posed.places, _floor(times, posed.lowest, times))
@@ -222,7 +216,7 @@ def _mean_around(values: Floats, weights: Floats) -> Floats:
 
 
 def _braking(moved: Floats, moving: tuple[bool, bool], fps: float) -> Bools:
-    """Return whether a body slows down from a given velocity, or speeds up to one, between steps [N - 2].
+    """Return whether a body brakes from a given velocity, or speeds up to one, between steps [N - 2].
 
     Args:
         moved: displacements of the root in each step [N - 1, 3].
@@ -238,17 +232,16 @@ def _braking(moved: Floats, moving: tuple[bool, bool], fps: float) -> Bools:
     return out
 
 
-def _within(slower: Floats, slack: Floats, seconds: Floats) -> Floats:
+def _keep_duration(slower: Floats, slack: Floats, seconds: Floats) -> Floats:
     """Return the factor by which to stretch each step [N - 1] so that the total duration stays the same.
 
     Args:
         slower: factor by which each step should stretch [N - 1].
-        slack: share of its time that each can spare [N - 1]; if more than SPARES of the total is needed, nothing
-            changes.
+        slack: share of its time that each can spare [N - 1]; steps that need more than 0.3 of the total do not change.
         seconds: durations of the steps [N - 1].
     """
     more, spare = float((slower - 1.0) @ seconds), float(slack @ seconds)
-    if more > SPARE_TIME_SHARE * spare:
+    if more > 0.3 * spare:
         return np.ones(len(slower))
     return np.asarray(slower - slack * (more / max(spare, 1e-9)))
 
@@ -264,9 +257,11 @@ def _floor(times: Floats, low: Floats, at: Floats) -> Floats:
     return np.interp(at, times[[0, -1]], np.minimum(low[[0, -1]], 0.0))
 
 
-def _away(middles: Floats, times: Iterable[float], fps: float, beside: float = 0.0) -> Floats:
-    """Return 0 for steps whose middles [N] are within `beside` seconds of any of some times, rising to 1 over the next
-    SETTLES seconds."""
+def _freedom(middles: Floats, times: Iterable[float], fps: float, beside: float = 0.0) -> Floats:
+    """Return the freedom of steps to slow down [N], from the times of their middles [N].
+
+    It is 0 within `beside` seconds of any of the `times`, and rises to 1 over the next SLOWDOWN_FROM_END_S seconds.
+    """
     since = np.full(len(middles), np.inf)
     for time in times:
         since = np.minimum(since, np.abs(middles - time))

@@ -35,7 +35,7 @@ def usual(transitions: Transitions) -> float:
 def durations(path: Int32s, transitions: Transitions) -> Floats:
     """Return the duration of each move [T] of a path, seconds: the median over chains of the corpus's durations.
 
-    While some chains move, chains that hold or wait do not vote, because a hold can last any time. Bridges have no
+    While some chains move, chains that hold or wait do not vote, because a hold may have any duration. Bridges have no
     duration and never vote. A move without votes takes the median duration of all moves in the corpus.
 
     Args:

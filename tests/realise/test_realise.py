@@ -25,9 +25,10 @@ from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.learned.carriage import FIRMNESS_HALVED_MPS, Carriage, learn_carriage
 from motionmind.realise.bending import FIRM_PULL_RATIO
-from motionmind.realise.realise import Style, Wishes, realise
+from motionmind.realise.realise import realise
 from motionmind.realise.retime import SPEED_HEADROOM_RATIO, keep_pace
 from motionmind.realise.timeline import durations
+from motionmind.realise.wishes import Style, Wishes
 from motionmind.walks.expectation import Expectation
 from motionmind.walks.likelihood import P_CONTINUE, P_TELEPORT, squared_distances
 from motionmind.walks.marginals import posterior_marginals

@@ -21,8 +21,8 @@ from motionmind.errors import MotionMindError, NoPathError
 from motionmind.formats import read_posture
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
-from motionmind.realise import realise
-from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS
+from motionmind.realise import reference
+from motionmind.search.bounding import OPTIMAL_WITHIN_NATS
 from motionmind.tween.engine import Engine
 from motionmind.tween.modes import N_COMPARED, Modes, find_place
 from motionmind.tween.result import Tween
@@ -214,7 +214,7 @@ def test_no_joint_leaves_its_states_to_dance(
     ballet: Engine, ends: tuple[Posture, Posture], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls: list[tuple[tuple[Any, ...], Danced]] = []
-    danced_as = realise._danced
+    danced_as = reference._follow_passage
 
     def spy(*arguments: Any) -> Danced | None:
         found = danced_as(*arguments)
@@ -222,7 +222,7 @@ def test_no_joint_leaves_its_states_to_dance(
         calls.append((arguments, found))
         return found
 
-    monkeypatch.setattr(realise, "_danced", spy)
+    monkeypatch.setattr(reference, "_follow_passage", spy)
     ballet.tween(*ends, liveliness=1.0, pin={"left_elbow": "A"})
     ballet.tween(*ends[::-1], liveliness=1.0)
     assert len(calls) == 2

@@ -15,7 +15,8 @@ from motionmind.body.motion import Posture
 from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
 from motionmind.realise.bending import FREE_PULL_RATIO
-from motionmind.realise.realise import Style, Wishes, realise
+from motionmind.realise.realise import realise
+from motionmind.realise.wishes import Style, Wishes
 from motionmind.tween.engine import FOLLOWED_SLACK_DEG, Engine
 from motionmind.tween.result import Tween
 
