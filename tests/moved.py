@@ -51,7 +51,7 @@ def moved(state: State, step: Floats) -> State:
 def _turns(state: State) -> Floats:
     turned = np.zeros((*state.rotations.shape[:2], 3))
     for joint in np.unique(state.freedom.joints):
-        own, columns = state.freedom.of(joint)
+        own, columns = state.freedom.slices(joint)
         turned[:, joint] = state.x[:, columns] @ state.freedom.axes[own]
     return rot.exp(turned)
 

@@ -20,9 +20,9 @@ N_DETOUR_POSTURES = 8  # to try for each end
 def detour(corpus: Corpus, carriage: Carriage, ends: tuple[Floats, Floats], moves: int, own: int) -> Floats:
     """Return orientations of the joints at each move [moves + 1, J, 4], exact at both ends.
 
-    Choose the pair of recordings with the lowest cost, one from near the first posture and one into the last: the sum
-    of their distance to each other, of their distances to the ends, and of a price for each move that they leave
-    unfilled besides `own`.
+    Choose the pair of recordings, one from near the first posture and one into the last, that costs least. The cost is
+    their distance to each other plus their distances to the ends plus 0.05 for each move that they leave unfilled
+    besides `own`.
 
     Args:
         corpus: the recorded movement.

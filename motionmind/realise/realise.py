@@ -18,7 +18,7 @@ from motionmind.realise.reference import Reference, find_reference
 from motionmind.realise.retime import JOINT_SPEED_RATIO, SPEED_HEADROOM_RATIO, slower_steps
 from motionmind.realise.timeline import Timeline, stretch
 from motionmind.realise.wishes import Style, Wishes
-from motionmind.synth.gave import Gave
+from motionmind.synth.residual import Residual
 from motionmind.synth.synthesise import Bounds, Synthesis, synthesise
 from motionmind.walks.passages import Danced
 
@@ -32,13 +32,13 @@ class Realised(NamedTuple):
         motion: the motion.
         danced: passage of the corpus that it follows; None for none.
         left_out: share of walks that begin or end in samples that others represent (`mean_walk.MeanWalk`).
-        gave: largest residual of each term of the solve.
+        residuals: largest residual of each term of the solve.
     """
 
     motion: Motion
     danced: Danced | None
     left_out: float
-    gave: tuple[Gave, ...] = ()
+    residuals: tuple[Residual, ...] = ()
 
 
 def realise(path: Int32s, style: Style, wishes: Wishes) -> Realised:
@@ -128,7 +128,7 @@ def _synthesise(reference: Reference, style: Style, wishes: Wishes, final: Float
         before = made.at(was, then)
         stance = stance._replace(half_steps=np.interp(stance.half_steps, was, at))
     motion = replace(motion, insertions=(Insertion(clock.moves),))
-    return Realised(motion, reference.danced, reference.left_out, made.gave)
+    return Realised(motion, reference.danced, reference.left_out, made.residuals)
 
 
 def _motion_between(a: Posture, b: Posture, rotations: Floats, root: Floats, clock: Timeline) -> Motion:

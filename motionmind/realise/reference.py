@@ -220,7 +220,7 @@ def _with_velocities(
     arriving: Velocity | None,
     lasts: float,
 ) -> Floats:
-    """Return rotations [N, J, 4] with the given velocities at both ends, each of which decays within `lasts` seconds.
+    """Return rotations [N, J, 4] with the given velocities at both ends, which decay within `lasts` seconds.
 
     Rotations at the moves of the `stops`, and between the inner stops, do not change.
     """

@@ -5,9 +5,9 @@ the way. Where that would be faster than 99 % of the corpus's samples, the clock
 over a few half steps, so that its joints stay together.
 
 The synthesis then adds movement of the feet and for balance, some of it quick. So the clock slows down again where the
-result exceeds the peaks of corpus movement of that length (`motionmind.learned.pace.Pace.peaks`), where a joint is much
-faster than in nearly all samples, and where a foot near the floor is faster than usual. It keeps its speed in free
-fall, but not where a body dips as fast with its feet on the floor.
+result exceeds the peaks of corpus movement of that length (`motionmind.learned.pace.Pace.peaks`). The same holds where
+a joint is much faster than in nearly all samples, and where a foot near the floor is faster than usual. It
+keeps its speed in free fall, but not where a body dips as fast with its feet on the floor.
 """
 
 from __future__ import annotations
@@ -192,7 +192,7 @@ def _factors(
     )
     moved = moved_in(motion)
     shown = (fps * steps_of(motion) / most[:-1]).max(axis=1)
-    # At half the speed a movement has a quarter of its accelerations, each of which lies between two steps.
+    # At half the speed a movement has a quarter of its accelerations, each between two steps.
     changes = np.sqrt(accelerations(moved, fps) / most[-1])
     changes[_braking(moved, moving, fps)] = 1.0  # a slower clock would brake harder from a given velocity
     shown[1:], shown[:-1] = np.maximum(shown[1:], changes), np.maximum(shown[:-1], changes)

@@ -29,25 +29,25 @@ class Collision(OneSided):
 
     Attributes:
         usual: overlap allowed to each pair of `Capsules.pairs` [P], metres.
-        spread: standard deviation of the excess, metres.
+        sd: standard deviation of the excess, metres.
         around: frames before legs meet and after they part in which the plane may turn.
     """
 
     unit: ClassVar[str] = "cm"
 
     usual: Floats
-    spread: float
+    sd: float
     around: int
     _planes: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     _on_plane: Bools = field(default_factory=lambda: np.zeros((0, 0), dtype=np.bool_))
 
     def separate(self, state: State) -> None:
         """Find the planes between legs that overlap or change sides between two frames, given by their normals."""
-        deep, ways, _, _ = self._deep(state)
+        deep, directions, _, _ = self._deep(state)
         legs, planes = self._legs(state), np.zeros((len(deep), 3))
         nearest = np.flatnonzero(legs)[deep[:, legs].argmax(axis=1)]
         frames, skeleton = np.arange(len(deep)), state.body.skeleton
-        away, closest = ways[frames, nearest], deep[frames, nearest]
+        away, closest = directions[frames, nearest], deep[frames, nearest]
         sides = state.places[:, skeleton.index("left_hip")] - state.places[:, skeleton.index("right_hip")]
         sides /= np.maximum(np.linalg.norm(sides, axis=1, keepdims=True), BOUND_TOLERANCE)
         passes = (np.sum(away[1:] * away[:-1], axis=1) < MAX_SIDE_CHANGE_COSINE) & (
@@ -84,25 +84,25 @@ class Collision(OneSided):
         capsules = capsules_of(state.body.skeleton)
         pairs = capsules.pairs()
         ends = capsules.place(np.ascontiguousarray(state.places[:, : 2 * len(state.body.skeleton)]))
-        depths, ways, at = pair_depths(ends, capsules.radii, pairs)
+        depths, directions, at = pair_depths(ends, capsules.radii, pairs)
         share = np.linspace(0.0, 1.0, len(depths))[:, None]
         deep = depths - np.maximum((1.0 - share) * depths[0] + share * depths[-1], self.usual)
         axes = ends[:, pairs]
         where = axes[..., 0, :] + at[..., None] * (axes[..., 1, :] - axes[..., 0, :])
-        return deep, ways, at, where[:, :, 0] - where[:, :, 1]
+        return deep, directions, at, where[:, :, 0] - where[:, :, 1]
 
     def _over(self, state: State) -> tuple[Floats, Floats, Floats]:
         """Return the excess overlap of the pairs [N, P], metres; the directions along which they part [N, P, 3]; and
         the nearest points' shares of both axes [N, P, 2]."""
         if not len(self._planes):
             self.separate(state)
-        deep, ways, at, apart = self._deep(state)
+        deep, directions, at, apart = self._deep(state)
         beyond = np.linalg.norm(apart, axis=2) - np.einsum("tpk,tk->tp", apart, self._planes)
         deep = deep + np.where(self._on_plane, beyond, 0.0)
         deep[[0, -1]] = -1.0
-        return deep, np.where(self._on_plane[..., None], self._planes[:, None], ways), at
+        return deep, np.where(self._on_plane[..., None], self._planes[:, None], directions), at
 
-    def _rows(self, state: State, chosen: Bools, ways: Floats, at: Floats) -> Rows:
+    def _rows(self, state: State, chosen: Bools, directions: Floats, at: Floats) -> Rows:
         capsules = capsules_of(state.body.skeleton)
         frames, which = np.nonzero(chosen)
         pairs, at = capsules.pairs()[which], at[frames, which]
@@ -110,22 +110,22 @@ class Collision(OneSided):
         along = between[..., 0] + at * (between[..., 1] - between[..., 0])
         points = capsules.points[pairs].reshape(-1, 4)
         shares = np.stack([along[:, 0] - 1.0, -along[:, 0], 1.0 - along[:, 1], along[:, 1]], axis=1)
-        return Rows(frames, ways[frames, which], points, np.zeros_like(points), shares)
+        return Rows(frames, directions[frames, which], points, np.zeros_like(points), shares)
 
     def add(self, state: State, normal: Normal) -> None:
         """Add the rows; see `Term.add`."""
-        deep, ways, at = self._over(state)
+        deep, directions, at = self._over(state)
         pushes = deep > BOUND_TOLERANCE
-        self._rows(state, pushes, ways, at).add_alike(state, normal, deep[pushes], self.spread)
-        normal.cost += float(np.sum(deep[pushes] ** 2)) * self.spread**-2.0
+        self._rows(state, pushes, directions, at).add_uniform(state, normal, deep[pushes], self.sd)
+        normal.cost += float(np.sum(deep[pushes] ** 2)) * self.sd**-2.0
 
     def foresee(self, state: State, step: Floats, normal: Normal) -> bool:
         """Add the rows that a step breaks; see `OneSided.foresee`."""
-        deep, ways, at = self._over(state)
+        deep, directions, at = self._over(state)
         chosen = (deep <= BOUND_TOLERANCE) & (deep > -LEGS_NEAR_M)
-        rows = self._rows(state, chosen, ways, at)
-        return rows.add_broken(state, step, normal, deep[chosen], self.spread)
+        rows = self._rows(state, chosen, directions, at)
+        return rows.add_broken(state, step, normal, deep[chosen], self.sd)
 
-    def gives(self, state: State) -> Floats:
-        """Return the residual of each frame; see `Term.gives`."""
+    def residuals(self, state: State) -> Floats:
+        """Return the residual of each frame; see `Term.residuals`."""
         return np.asarray(100.0 * np.maximum(self._deep(state)[0].max(axis=1), 0.0))

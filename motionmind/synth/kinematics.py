@@ -30,21 +30,21 @@ class Body(NamedTuple):
         skeleton: the skeleton.
         owners: the joint whose segment carries each point [P].
         local: positions of the points in their joints' frames [P, 3], metres.
-        turns: whether a rotation of a joint moves a point [P, J]; none moves its own position.
-        above: `above[j, i]` is whether joint i is joint j or an ancestor of it [J, J].
-        shares: share of the body's mass in each segment [J]; all of it in the root where masses are unknown.
-        centres: centres of these masses in the joints' frames [J, 3], metres.
-        weighs: whether masses are known.
+        moves: `moves[p, j]` is whether a rotation of joint j moves point p [P, J]; no joint moves its own position.
+        ancestors: `ancestors[j, i]` is whether joint i is joint j or an ancestor of it [J, J].
+        mass_shares: share of the body's mass in each segment [J]; all of it in the root where masses are unknown.
+        mass_centres: centres of these masses in the joints' frames [J, 3], metres.
+        has_masses: whether masses are known.
     """
 
     skeleton: Skeleton
     owners: Indices
     local: Floats
-    turns: Bools
-    above: Bools
-    shares: Floats
-    centres: Floats
-    weighs: bool
+    moves: Bools
+    ancestors: Bools
+    mass_shares: Floats
+    mass_centres: Floats
+    has_masses: bool
 
 
 @remembered
@@ -52,18 +52,18 @@ def body_of(skeleton: Skeleton) -> Body:
     """Return the constants of a skeleton."""
     count = len(skeleton)
     places, owners = contact_points(skeleton, np.tile(rot.IDENTITY, (1, count, 1)), np.zeros((1, 3)))
-    above = np.zeros((count, count), dtype=np.bool_)
+    ancestors = np.zeros((count, count), dtype=np.bool_)
     for joint, parent in enumerate(skeleton.parents):
-        above[joint] = above[parent] if joint else False
-        above[joint, joint] = True
-    turns = above[owners]
-    turns[np.arange(count), np.arange(count)] = False
+        ancestors[joint] = ancestors[parent] if joint else False
+        ancestors[joint, joint] = True
+    moves = ancestors[owners]
+    moves[np.arange(count), np.arange(count)] = False
     masses = masses_of(skeleton)
     shares, centres = np.zeros(count), np.zeros((count, 3))
     shares[0] = 1.0
     if masses is not None:
         shares, centres = masses.shares, masses.centres
-    return Body(skeleton, owners, places[0] - places[0][owners], turns, above, shares, centres, masses is not None)
+    return Body(skeleton, owners, places[0] - places[0][owners], moves, ancestors, shares, centres, masses is not None)
 
 
 class Freedom(NamedTuple):
@@ -82,7 +82,7 @@ class Freedom(NamedTuple):
         """The number of unknowns of a frame, 3 + D."""
         return 3 + len(self.joints)
 
-    def of(self, joint: int) -> tuple[slice, slice]:
+    def slices(self, joint: int) -> tuple[slice, slice]:
         """Return the slices of a joint's angles and of its unknowns."""
         begin, end = np.searchsorted(self.joints, [joint, joint + 1]).tolist()
         return slice(begin, end), slice(3 + begin, 3 + end)
@@ -96,7 +96,8 @@ class State:
         rotations: local rotations [N, J, 4].
         root: positions of the root [N, 3], metres.
         places: positions of the body's points [N, P, 3], metres.
-        axes: rotation of the joint in the world per radian of each angle [N, D, 3].
+        global_rotations: rotations of the joints in the world [N, J, 4].
+        axes: derivative of the joint's rotation in the world by each angle [N, D, 3].
         own_axes: the same in the joint's own frame [N, D, 3].
     """
 
@@ -105,21 +106,22 @@ class State:
         joints, axes, moved = freedom.joints, freedom.axes, np.unique(freedom.joints)
         turned = np.zeros((len(x), len(body.skeleton), 3))
         for joint in moved:
-            own, columns = freedom.of(joint)
+            own, columns = freedom.slices(joint)
             turned[:, joint] = x[:, columns] @ axes[own]
         self.rotations = reference.copy()
         self.rotations[:, moved] = rot.mul(reference[:, moved], rot.exp(turned[:, moved]))
         self.root = root + x[:, :3]
-        self.turned = body.skeleton.global_rotations(self.rotations)
+        self.global_rotations = body.skeleton.global_rotations(self.rotations)
         owners, count = body.owners, len(body.skeleton)
         self.places = np.empty((len(x), len(owners), 3))
         self.places[:, :count] = body.skeleton.positions(self.rotations, self.root)
         tips = rot.mul_vec(
-            self.turned[:, owners[count:]], np.broadcast_to(body.local[count:], (len(x), len(owners) - count, 3))
+            self.global_rotations[:, owners[count:]],
+            np.broadcast_to(body.local[count:], (len(x), len(owners) - count, 3)),
         )
         self.places[:, count:] = self.places[:, owners[count:]] + tips
         self.own_axes = _right_jacobian(turned[:, joints], axes)
-        self.axes = rot.mul_vec(self.turned[:, joints], self.own_axes)
+        self.axes = rot.mul_vec(self.global_rotations[:, joints], self.own_axes)
 
     @cached_property
     def mass(self) -> Floats:
@@ -130,15 +132,15 @@ class State:
     def _moments(self) -> Floats:
         """Sum of mass share times position over each joint and its descendants [N, J, 3], metres."""
         body, count = self.body, len(self.body.skeleton)
-        centres = np.broadcast_to(body.centres, (len(self.x), count, 3))
-        own = self.places[:, :count] + rot.mul_vec(self.turned, centres)
-        return np.asarray(np.einsum("ij,tik->tjk", body.above * body.shares[:, None], own))
+        centres = np.broadcast_to(body.mass_centres, (len(self.x), count, 3))
+        own = self.places[:, :count] + rot.mul_vec(self.global_rotations, centres)
+        return np.asarray(np.einsum("ij,tik->tjk", body.ancestors * body.mass_shares[:, None], own))
 
     @cached_property
     def mass_jacobian(self) -> Floats:
         """Jacobian of the centre of mass [N, 3, 3 + D]."""
         body, joints = self.body, self.freedom.joints
-        below = body.above.T @ body.shares
+        below = body.ancestors.T @ body.mass_shares
         lever = self._moments[:, joints] - below[joints, None] * self.places[:, joints]
         out = np.zeros((len(self.x), 3, self.freedom.unknowns))
         out[:, range(3), range(3)] = 1.0
@@ -147,75 +149,83 @@ class State:
 
 
 class Rows(NamedTuple):
-    """Rows in the positions of points: sum_k shares[k] way . place(points[k], first + after[k]).
+    """Rows in the positions of points: sum_k coefficients[k] direction . place(points[k], first + offsets[k]).
 
     Attributes:
         first: first frame of each row [R].
-        ways: directions [R, 3].
+        directions: vectors [R, 3].
         points: point numbers [R, K].
-        after: frames from the first to that of each point [R, K], 0 to 2.
-        shares: coefficients of the points [R, K].
+        offsets: frames from the first to that of each point [R, K], 0 to 2.
+        coefficients: factors of the points [R, K].
     """
 
     first: Indices
-    ways: Floats
+    directions: Floats
     points: Indices
-    after: Indices
-    shares: Floats
+    offsets: Indices
+    coefficients: Floats
 
     def changes(self, state: State, step: Floats) -> Floats:
         """Return the first-order change of the rows [R] under a step [N, 3 + D]."""
         out = np.zeros(len(self.first))
-        _change(*self, *_of_state(state), step, out)
+        _change(self, _geometry_of(state), step, out)
         return out
 
     def add(self, state: State, normal: Normal, residual: Floats, weight: Floats) -> None:
-        """Add the squared rows to the normal equations, by residual and weight [R]."""
-        _add(*self, *_of_state(state), residual, weight, normal.blocks, normal.gradient)
+        """Add the squared rows to the normal equations, with their residuals [R] and weights [R]."""
+        _add(self, _geometry_of(state), residual, weight, normal.blocks, normal.gradient)
 
-    def add_alike(self, state: State, normal: Normal, residual: Floats, spread: float) -> None:
-        """Add the squared rows by residual [R], with one standard deviation."""
-        self.add(state, normal, residual, np.full(len(self.first), spread**-2.0))
+    def add_uniform(self, state: State, normal: Normal, residual: Floats, sd: float) -> None:
+        """Add the squared rows with their residuals [R], all of one standard deviation."""
+        self.add(state, normal, residual, np.full(len(self.first), sd**-2.0))
 
-    def add_broken(self, state: State, step: Floats, normal: Normal, residual: Floats, spread: float) -> bool:
-        """Add the rows whose residual [R] a step [N, 3 + D] makes positive; return whether there are any."""
+    def add_broken(self, state: State, step: Floats, normal: Normal, residual: Floats, sd: float) -> bool:
+        """Add the rows whose residuals [R] a step [N, 3 + D] makes positive, and return whether there are any."""
         broken = residual + self.changes(state, step) > 0.0
-        first, ways, points, after, shares = self
-        rows = Rows(first[broken], ways[broken], points[broken], after[broken], shares[broken])
-        rows.add_alike(state, normal, residual[broken], spread)
+        first, directions, points, offsets, coefficients = self
+        rows = Rows(first[broken], directions[broken], points[broken], offsets[broken], coefficients[broken])
+        rows.add_uniform(state, normal, residual[broken], sd)
         return bool(broken.any())
 
 
-def rows_at(first: Indices, ways: Floats, points: Indices) -> Rows:
+def rows_at(first: Indices, directions: Floats, points: Indices) -> Rows:
     """Return rows of one point [R] in one frame [R] each, along directions [R, 3]."""
     one = np.ones((len(first), 1))
-    return Rows(first, ways, points[:, None], np.zeros_like(one, dtype=np.int64), one)
+    return Rows(first, directions, points[:, None], np.zeros_like(one, dtype=np.int64), one)
 
 
-def _of_state(state: State) -> tuple[Floats, Floats, Indices, Bools]:
+class _Geometry(NamedTuple):
+    """The body at a state, as compiled functions take it.
+
+    Attributes:
+        places: positions of the points [N, P, 3], metres.
+        axes: axes of the angles in the world [N, D, 3].
+        joints: joint of each angle [D].
+        moves: whether each angle moves a point [P, D].
+    """
+
+    places: Floats
+    axes: Floats
+    joints: Indices
+    moves: Bools
+
+
+def _geometry_of(state: State) -> _Geometry:
+    """Return the geometry of a state."""
     joints = state.freedom.joints
-    return state.places, state.axes, joints, np.ascontiguousarray(state.body.turns[:, joints])
+    return _Geometry(state.places, state.axes, joints, np.ascontiguousarray(state.body.moves[:, joints]))
 
 
 @jit
-def _row(
-    t: int,
-    way: Floats,
-    point: int,
-    share: float,
-    places: Floats,
-    axes: Floats,
-    joints: Indices,
-    turns: Bools,
-    out: Floats,
-) -> None:
-    """Add a point's Jacobian along a direction, times its share, to a row [3 + D]."""
-    x, y, z = share * way[0], share * way[1], share * way[2]
+def _add_jacobian(t: int, direction: Floats, point: int, coefficient: float, body: _Geometry, out: Floats) -> None:
+    """Add a point's Jacobian along a direction, times a coefficient, to a row [3 + D]."""
+    places, axes, joints = body.places, body.axes, body.joints
+    x, y, z = coefficient * direction[0], coefficient * direction[1], coefficient * direction[2]
     out[0] += x
     out[1] += y
     out[2] += z
     for d in range(len(joints)):
-        if turns[point, d]:
+        if body.moves[point, d]:
             joint = joints[d]
             a, b, c = (
                 places[t, point, 0] - places[t, joint, 0],
@@ -227,34 +237,22 @@ def _row(
 
 
 @jit
-def _add(
-    first: Indices,
-    ways: Floats,
-    points: Indices,
-    after: Indices,
-    shares: Floats,
-    places: Floats,
-    axes: Floats,
-    joints: Indices,
-    turns: Bools,
-    residual: Floats,
-    weight: Floats,
-    blocks: Floats,
-    gradient: Floats,
-) -> None:
+def _add(rows: Rows, body: _Geometry, residual: Floats, weight: Floats, blocks: Floats, gradient: Floats) -> None:
+    """Add squared rows, with their residuals and weights [R], to `Normal.blocks` and `Normal.gradient`."""
     n = gradient.shape[1]
     row, at, held = np.zeros((3, n)), np.empty(3 * n, np.int64), np.empty(3 * n)
-    for r in range(len(first)):
+    for r in range(len(rows.first)):
         if weight[r] == 0.0:
             continue
         span = 0
-        for k in range(points.shape[1]):
-            span = max(span, after[r, k] + 1)
+        for k in range(rows.points.shape[1]):
+            span = max(span, rows.offsets[r, k] + 1)
         row[:span] = 0.0
-        for k in range(points.shape[1]):
-            t = first[r] + after[r, k]
-            _row(t, ways[r], points[r, k], shares[r, k], places, axes, joints, turns, row[after[r, k]])
-        count = 0
+        for k in range(rows.points.shape[1]):
+            offset = rows.offsets[r, k]
+            t, coefficient = rows.first[r] + offset, rows.coefficients[r, k]
+            _add_jacobian(t, rows.directions[r], rows.points[r, k], coefficient, body, row[offset])
+        count = 0  # entries that are not 0, by frame and unknown
         for a in range(span):
             for i in range(n):
                 if row[a, i] != 0.0:
@@ -262,32 +260,21 @@ def _add(
                     count += 1
         for p in range(count):
             a, i = at[p] // n, at[p] % n
-            t, weighted = first[r] + a, weight[r] * held[p]
+            t, weighted = rows.first[r] + a, weight[r] * held[p]
             gradient[t, i] += weighted * residual[r]
             for q in range(p, count):
                 blocks[t, i, at[q] - a * n] += weighted * held[q]
 
 
 @jit
-def _change(
-    first: Indices,
-    ways: Floats,
-    points: Indices,
-    after: Indices,
-    shares: Floats,
-    places: Floats,
-    axes: Floats,
-    joints: Indices,
-    turns: Bools,
-    step: Floats,
-    out: Floats,
-) -> None:
+def _change(rows: Rows, body: _Geometry, step: Floats, out: Floats) -> None:
+    """Add the first-order change of each row under a step [N, 3 + D] to `out` [R]."""
     row = np.empty(step.shape[1])
-    for r in range(len(first)):
-        for k in range(points.shape[1]):
-            t = first[r] + after[r, k]
+    for r in range(len(rows.first)):
+        for k in range(rows.points.shape[1]):
+            t = rows.first[r] + rows.offsets[r, k]
             row[:] = 0.0
-            _row(t, ways[r], points[r, k], shares[r, k], places, axes, joints, turns, row)
+            _add_jacobian(t, rows.directions[r], rows.points[r, k], rows.coefficients[r, k], body, row)
             for i in range(len(row)):
                 out[r] += row[i] * step[t, i]
 

@@ -15,11 +15,11 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from motionmind._typing import Bools, Floats, Indices
+from motionmind._typing import Bools, Floats
 from motionmind.body.limits import within_limits
 from motionmind.footing.balance import nearest_in_support
 from motionmind.geometry import rotations as rot
-from motionmind.synth.kinematics import Rows, State, inverse_right_jacobian, rows_at
+from motionmind.synth.kinematics import Rows, State, rows_at
 from motionmind.synth.system import Normal
 
 UP = np.array([0.0, 1.0, 0.0])
@@ -61,11 +61,11 @@ class VectorBound(OneSided):
     """A bound on vectors, whose rows lead towards the nearest allowed ones.
 
     Attributes:
-        spread: standard deviation of the excess, in the vectors' unit.
+        sd: standard deviation of the excess, in the vectors' unit.
     """
 
     unit: ClassVar[str]
-    spread: float
+    sd: float
 
     @abstractmethod
     def vectors(self, state: State) -> Floats:
@@ -85,7 +85,7 @@ class VectorBound(OneSided):
 
     def cost(self, excess: Floats) -> float:
         """Return the cost of an excess [..., k]."""
-        return float(np.sum(excess**2) * self.spread**-2.0)
+        return float(np.sum(excess**2) * self.sd**-2.0)
 
     def add(self, state: State, normal: Normal) -> None:
         """Add the rows; see `Term.add`."""
@@ -114,13 +114,13 @@ class Floor(OneSided):
 
     Attributes:
         floor: height of the floor [N], metres.
-        spread: standard deviation of the depth, metres.
+        sd: standard deviation of the depth, metres.
     """
 
     unit: ClassVar[str] = "cm"
 
     floor: Floats
-    spread: float
+    sd: float
 
     def _deep(self, state: State) -> Floats:
         return np.asarray(self.floor[:, None] - state.places[..., 1])
@@ -134,18 +134,18 @@ class Floor(OneSided):
         deep = self._deep(state)
         deep[[0, -1]] = -1.0
         pushes = deep > BOUND_TOLERANCE
-        self._rows(pushes).add_alike(state, normal, deep[pushes], self.spread)
-        normal.cost += float(np.sum(deep[pushes] ** 2)) * self.spread**-2.0
+        self._rows(pushes).add_uniform(state, normal, deep[pushes], self.sd)
+        normal.cost += float(np.sum(deep[pushes] ** 2)) * self.sd**-2.0
 
     def foresee(self, state: State, step: Floats, normal: Normal) -> bool:
         """Add the rows that a step breaks; see `OneSided.foresee`."""
         deep = self._deep(state)
         above = deep <= BOUND_TOLERANCE
         above[[0, -1]] = False
-        return self._rows(above).add_broken(state, step, normal, deep[above], self.spread)
+        return self._rows(above).add_broken(state, step, normal, deep[above], self.sd)
 
-    def gives(self, state: State) -> Floats:
-        """Return the residual of each frame; see `Term.gives`."""
+    def residuals(self, state: State) -> Floats:
+        """Return the residual of each frame; see `Term.residuals`."""
         return np.asarray(100.0 * np.maximum(self._deep(state).max(axis=1), 0.0))
 
 
@@ -164,7 +164,7 @@ class Balance(VectorBound):
         near: nearness to each end of the movement [2, N], 0 to 1; an end out of balance widens the bounds.
         gravity: m/s^2.
         fps: frames a second.
-        spread: standard deviation of the excess, metres.
+        sd: standard deviation of the excess, metres.
         reach: excess beyond which the pull is constant, metres, so that a body far out of balance does not jerk.
     """
 
@@ -177,7 +177,7 @@ class Balance(VectorBound):
     near: Floats
     gravity: float
     fps: float
-    spread: float
+    sd: float
     reach: float = 0.005
 
     def vectors(self, state: State) -> Floats:
@@ -218,19 +218,19 @@ class Balance(VectorBound):
         shares = np.zeros((2, len(levers), 3))
         shares[0] = np.stack([-levers, 1.0 + 2.0 * levers, -levers], axis=1)
         shares[1, :, 1] = 1.0
-        weights = self.spread**-2.0 / self._eased(excess)
+        weights = self.sd**-2.0 / self._eased(excess)
         for which in range(2):
             (first,) = np.nonzero(chosen[which])
             for axis in range(2):
-                ways = shares[which, first][:, :, None] * np.eye(3)[2 * axis]
-                normal.add_mass(first, ways, off[which, first, axis], weights[which, first])
+                directions = shares[which, first][:, :, None] * np.eye(3)[2 * axis]
+                normal.add_mass(first, directions, off[which, first, axis], weights[which, first])
 
     def cost(self, excess: Floats) -> float:
         """Return the cost of an excess [2, N - 2, 2]: quadratic, then linear beyond the reach."""
-        return float(np.sum(2.0 * (self.reach / self.spread) ** 2 * (self._eased(excess) - 1.0)))
+        return float(np.sum(2.0 * (self.reach / self.sd) ** 2 * (self._eased(excess) - 1.0)))
 
-    def gives(self, state: State) -> Floats:
-        """Return the residual of each frame; see `Term.gives`."""
+    def residuals(self, state: State) -> Floats:
+        """Return the residual of each frame; see `Term.residuals`."""
         out = np.zeros(len(state.x))
         out[1:-1] = 100.0 * np.linalg.norm(self.excess(state, self.vectors(state))[1], axis=1)
         return out
@@ -243,14 +243,14 @@ class Limits(OneSided):
     Attributes:
         given: local rotations of the given postures [G, J, 4].
         loose: joints without limits [J].
-        spread: standard deviation of the excess, radians.
+        sd: standard deviation of the excess, radians.
     """
 
     unit: ClassVar[str] = "degrees"
 
     given: Floats
     loose: Bools
-    spread: float
+    sd: float
 
     def _allowed(self, state: State, rotations: Floats) -> Floats:
         """Return the nearest rotations within the limits [N, J, 4]."""
@@ -266,21 +266,21 @@ class Limits(OneSided):
     def _rows(self, state: State, normal: Normal, off: Floats, chosen: Bools) -> None:
         chosen[[0, -1]] = False
         for joint in np.flatnonzero(chosen.any(axis=0)).tolist():
-            (frames,), (own, columns) = np.nonzero(chosen[:, joint]), state.freedom.of(joint)
+            (frames,), (own, columns) = np.nonzero(chosen[:, joint]), state.freedom.slices(joint)
             jacobian = state.own_axes[frames][:, None, own]
-            normal.add_joint(frames, columns, jacobian, off[frames, joint], self.spread**-2.0)
+            normal.add_joint(frames, columns, jacobian, off[frames, joint], self.sd**-2.0)
 
     def add(self, state: State, normal: Normal) -> None:
         """Add the rows; see `Term.add`."""
         off = self._excess(state)
         self._rows(state, normal, off, np.any(off != 0.0, axis=2))
-        normal.cost += float(np.sum(off[1:-1] ** 2)) * self.spread**-2.0
+        normal.cost += float(np.sum(off[1:-1] ** 2)) * self.sd**-2.0
 
     def foresee(self, state: State, step: Floats, normal: Normal) -> bool:
         """Add the rows that a step breaks; see `OneSided.foresee`."""
         turned = np.zeros((*state.rotations.shape[:2], 3))
         for joint in np.unique(state.freedom.joints).tolist():
-            own, columns = state.freedom.of(joint)
+            own, columns = state.freedom.slices(joint)
             turned[:, joint] = np.einsum("td,tdx->tx", step[:, columns], state.own_axes[:, own])
         then = rot.mul(state.rotations, rot.exp(turned))
         allowed = self._allowed(state, then)
@@ -288,121 +288,6 @@ class Limits(OneSided):
         self._rows(state, normal, rot.log(rot.inv_mul(allowed, state.rotations)), chosen)
         return bool(chosen.any())
 
-    def gives(self, state: State) -> Floats:
-        """Return the residual of each frame; see `Term.gives`."""
+    def residuals(self, state: State) -> Floats:
+        """Return the residual of each frame; see `Term.residuals`."""
         return np.asarray(np.degrees(rot.norm(self._excess(state)).max(axis=1)))
-
-
-@dataclass
-class Speed(VectorBound):
-    """Bound the angular speed of the joints; for the root, tilt and turn about the vertical separately.
-
-    Attributes:
-        most: greatest speeds of the joints [J], rad/s; for the root, of its tilt.
-        turns: greatest speed at which the root turns about the vertical, rad/s.
-        fps: frames a second.
-        spread: standard deviation of the excess, rad/s.
-    """
-
-    unit: ClassVar[str] = "degrees/s"
-
-    most: Floats
-    turns: float
-    fps: float
-    spread: float
-
-    @once_per_state
-    def vectors(self, state: State) -> Floats:
-        """Return the angular velocities [N - 1, J, 3] in the joints' frames, rad/s; that of the root in the world."""
-        joints, out = np.unique(state.freedom.joints), np.zeros((len(state.x) - 1, state.rotations.shape[1], 3))
-        before, after = state.rotations[:-1, joints], state.rotations[1:, joints]
-        out[:, joints] = self.fps * rot.log(rot.inv_mul(before, after))
-        out[:, 0] = rot.mul_vec(state.rotations[:-1, 0], out[:, 0])
-        return out
-
-    def change(self, state: State, step: Floats) -> Floats:
-        """Return their first-order change [N - 1, J, 3]; see `VectorBound.change`."""
-        out, every = np.zeros((len(step) - 1, state.rotations.shape[1], 3)), np.arange(len(step) - 1)
-        for joint in np.unique(state.freedom.joints).tolist():
-            columns = state.freedom.of(joint)[1]
-            pairs = np.stack([step[:-1, columns], step[1:, columns]], axis=1)
-            out[:, joint] = np.einsum("radx,rad->rx", self._jacobian(state, joint, every), pairs)
-        return out
-
-    def excess(self, state: State, vectors: Floats) -> Floats:
-        """Return the differences of velocities [N - 1, J, 3] from the nearest allowed, rad/s."""
-        excess, root = beyond(vectors, self.most), vectors[:, 0]
-        excess[:, 0] = beyond(root * (1.0 - UP), self.most[0]) + beyond(root * UP, self.turns)
-        return excess
-
-    def _jacobian(self, state: State, joint: int, first: Indices) -> Floats:
-        """Return the Jacobian of a joint's velocities from some frames to the next [R, 2, d, 3]."""
-        axes = (state.own_axes if joint else state.axes)[:, state.freedom.of(joint)[0]]
-        before, after = axes[first], axes[first + 1]
-        if joint == 0:  # other joints' excess lies along their rotation, which the logarithm's Jacobian preserves
-            turn = np.broadcast_to(self.vectors(state)[first, :1] / self.fps, before.shape)
-            before, after = inverse_right_jacobian(turn, before), inverse_right_jacobian(-turn, after)
-        return self.fps * np.stack([-before, after], axis=1)
-
-    def add_rows(self, state: State, normal: Normal, off: Floats, excess: Floats, chosen: Bools) -> None:
-        """Add rows of the chosen velocities [N - 1, J]; see `VectorBound.add_rows`."""
-        for joint in np.flatnonzero(chosen.any(axis=0)).tolist():
-            (first,) = np.nonzero(chosen[:, joint])
-            jacobian, columns = self._jacobian(state, joint, first), state.freedom.of(joint)[1]
-            normal.add_joint(first, columns, jacobian, off[first, joint], self.spread**-2.0)
-
-    def gives(self, state: State) -> Floats:
-        """Return the residual of each frame; see `Term.gives`."""
-        out = np.zeros(len(state.x))
-        out[1:] = np.degrees(rot.norm(self.excess(state, self.vectors(state))).max(axis=1))
-        return out
-
-
-@dataclass
-class Travel(VectorBound):
-    """Bound the speed or the acceleration of the root, except in flight.
-
-    Attributes:
-        order: 1 for its speed, 2 for its acceleration.
-        axes: 1 for each bounded axis, 0 for the others [3].
-        most: the bound, m/s or m/s^2.
-        free: whether a difference is unbounded [N - order].
-        fps: frames a second.
-        spread: standard deviation of the excess.
-    """
-
-    unit: ClassVar[str] = ""
-
-    order: int
-    axes: Floats
-    most: float
-    free: Bools
-    fps: float
-    spread: float
-
-    def vectors(self, state: State) -> Floats:
-        """Return the velocities or accelerations of the root [N - order, 3], m/s or m/s^2."""
-        return self._moved(state.root)
-
-    def change(self, state: State, step: Floats) -> Floats:
-        """Return their first-order change [N - order, 3]; see `VectorBound.change`."""
-        return self._moved(step[:, :3])
-
-    def _moved(self, root: Floats) -> Floats:
-        """Return the velocities or accelerations [N - order, 3] of positions, or their changes, [N, 3]."""
-        return np.asarray(self.fps**self.order * np.diff(root, self.order, axis=0) * self.axes)
-
-    def excess(self, state: State, vectors: Floats) -> Floats:
-        """Return the differences of vectors [N - order, 3] from the nearest allowed; see `VectorBound.excess`."""
-        return beyond(vectors, self.most) * ~self.free[:, None]
-
-    def add_rows(self, state: State, normal: Normal, off: Floats, excess: Floats, chosen: Bools) -> None:
-        """Add rows of the chosen vectors [N - order]; see `VectorBound.add_rows`."""
-        (first,) = np.nonzero(chosen)
-        shares = self.fps**self.order * np.array([[-1.0, 1.0], [1.0, -2.0, 1.0]][self.order - 1])
-        jacobian = np.tile(shares[:, None, None] * np.diag(self.axes), (len(first), 1, 1, 1))
-        normal.add_joint(first, slice(0, 3), jacobian, off[first], self.spread**-2.0)
-
-    def gives(self, state: State) -> Floats:
-        """Return the residual of each frame; see `Term.gives`."""
-        return np.zeros(len(state.x))

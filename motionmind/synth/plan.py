@@ -58,7 +58,7 @@ class _Point(NamedTuple):
     Attributes:
         point: its number.
         targets: target positions [N, 3], metres.
-        spreads: standard deviations of these [N, 3], metres.
+        sds: standard deviations of these [N, 3], metres.
         stands: whether it stands [N].
         moves: target displacements between frames [N - 1, 2], level, metres.
         slips: standard deviations of these [N - 1], metres.
@@ -66,7 +66,7 @@ class _Point(NamedTuple):
 
     point: int
     targets: Floats
-    spreads: Floats
+    sds: Floats
     stands: Bools
     moves: Floats
     slips: Floats
@@ -132,21 +132,21 @@ class Plan:
         """Return the contacts for a root near these positions [N, 3]; without steps, feet are free to slide."""
         parts = [*self._of_feet(root, steps), *self._of_others(root)]
         count = len(root)
-        frames, points, targets, spreads, stands = (
+        frames, points, targets, sds, stands = (
             [none] for none in (*np.zeros((2, 0), dtype=np.int64), *np.zeros((2, 0, 3)), np.zeros(0, dtype=np.bool_))
         )
         for part in parts:  # the given postures, first and last, are exact
-            some = 1 + np.flatnonzero(np.isfinite(part.spreads[1:-1]).any(axis=1))
+            some = 1 + np.flatnonzero(np.isfinite(part.sds[1:-1]).any(axis=1))
             frames.append(some)
             points.append(np.full(len(some), part.point))
             targets.append(part.targets[some])
-            spreads.append(part.spreads[some])
+            sds.append(part.sds[some])
             stands.append(part.stands[some])
         return Contacts(
             np.concatenate(frames),
             np.concatenate(points),
             np.concatenate(targets),
-            np.concatenate(spreads),
+            np.concatenate(sds),
             np.concatenate(stands),
             np.array([part.point for part in parts], dtype=np.int64),
             _stacked([part.moves for part in parts], (count - 1, 0, 2)),
@@ -192,9 +192,9 @@ class Plan:
                 at = shape.places[:, point] + root
                 at[:, 1] = self.stretch.ground.floor + shape.places[:, point, 1] - shape.low_others[:, part]
                 on = rests[:, part] & (shape.places[:, point, 1] < shape.low_others[:, part] + LIMB_TOUCHES_M)
-                spreads = np.where(on[:, None], [SDS.stance_place, SDS.stance, SDS.stance_place], np.inf)
+                sds = np.where(on[:, None], [SDS.stance_place, SDS.stance, SDS.stance_place], np.inf)
                 slips = np.where(on[1:] & on[:-1], SDS.support_speed / self.fps, np.inf)
-                yield _Point(int(point), at, spreads, on, np.diff(at[:, [0, 2]], axis=0), slips)
+                yield _Point(int(point), at, sds, on, np.diff(at[:, [0, 2]], axis=0), slips)
 
     def _off(self, root: Floats) -> Floats:
         """Return the displacement of each foot from the reference [N, feet, 3], metres.

@@ -29,12 +29,13 @@ from motionmind.footing.smoothing import smoothstep
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline
 from motionmind.synth.collision import Collision
-from motionmind.synth.gave import Gave
 from motionmind.synth.kinematics import Freedom, State, body_of
-from motionmind.synth.one_sided import BOUND_TOLERANCE, UP, Balance, Floor, Limits, Speed, Travel
+from motionmind.synth.one_sided import BOUND_TOLERANCE, UP, Balance, Floor, Limits
 from motionmind.synth.plan import Plan, plan_contacts
+from motionmind.synth.residual import Residual
 from motionmind.synth.solve import Problem, solve
-from motionmind.synth.terms import Ballistic, Contacts, Run, Term, Track
+from motionmind.synth.speed_bounds import Speed, Travel
+from motionmind.synth.terms import Ballistic, Contacts, Smoothness, Term, Track
 from motionmind.synth.weights import WEIGHTS, Weights
 
 MOTIONLESS_RAD = 2e-3  # a joint that leaves its first orientation by less does not move
@@ -83,7 +84,7 @@ class Synthesis(NamedTuple):
         freedom: the degrees of freedom of the solve.
         x: their unknowns [N, n].
         falls: degree to which the body would fall without each foot [N, feet], 0 to 1.
-        gave: largest residual of each term.
+        residuals: largest residual of each term.
     """
 
     rotations: Floats
@@ -91,7 +92,7 @@ class Synthesis(NamedTuple):
     freedom: Freedom
     x: Floats
     falls: Floats
-    gave: tuple[Gave, ...]
+    residuals: tuple[Residual, ...]
 
     def at(self, times: Floats, then: Floats) -> Synthesis:
         """Return this movement at `then` [M], to start a solve on a slower clock; `times` [N] are its own, seconds."""
@@ -133,11 +134,11 @@ def synthesise(
     state = scene.problem(slice(0, len(times))).state(x)
     root = size * state.root
     root[0], root[-1] = given.ends
-    gave = tuple(
-        Gave(term, size * most if unit in ("cm", "m/s^2") else most, unit, float(times[frame]))
-        for term, (most, unit, frame) in scene.gave.items()
+    residuals = tuple(
+        Residual(term, size * most if unit in ("cm", "m/s^2") else most, unit, float(times[frame]))
+        for term, (most, unit, frame) in scene.residuals.items()
     )
-    return Synthesis(rot.normalise(state.rotations), root, scene.freedom, x, scene.falls(), gave)
+    return Synthesis(rot.normalise(state.rotations), root, scene.freedom, x, scene.falls(), residuals)
 
 
 class _Scene:
@@ -173,7 +174,7 @@ class _Scene:
         self.fixed[np.ceil(self.stops - 1e-6).astype(int)] = True
         self.fixed[[1, -2]] |= moving
         self.plans: list[Plan] = []
-        self.gave: dict[str, tuple[float, str, int]] = {}
+        self.residuals: dict[str, tuple[float, str, int]] = {}
 
     def problem(self, frames: slice) -> Problem:
         """Return the problem of a slice of the frames."""
@@ -201,10 +202,10 @@ class _Scene:
             # The next window solves the rest again.
             last = count if frames.stop == count else frames.stop - N_OVERLAP_FRAMES
             for term in terms:
-                off, name = term.gives(state)[: last - begin], type(term).__name__
+                off, name = term.residuals(state)[: last - begin], type(term).__name__
                 worst = int(np.argmax(off))
-                if term.unit and off[worst] > self.gave.get(name, (BOUND_TOLERANCE,))[0]:
-                    self.gave[name] = float(off[worst]), term.unit, begin + worst
+                if term.unit and off[worst] > self.residuals.get(name, (BOUND_TOLERANCE,))[0]:
+                    self.residuals[name] = float(off[worst]), term.unit, begin + worst
         return x
 
     def falls(self) -> Floats:
@@ -218,7 +219,7 @@ class _Scene:
     def _planned(self, x: Floats) -> Iterator[Plan]:
         """Plan each stretch between two given postures."""
         state = self.problem(slice(0, len(x))).state(np.zeros_like(x))
-        mass = state.mass - state.root if self.body.weighs else np.zeros_like(state.root)
+        mass = state.mass - state.root if self.body.has_masses else np.zeros_like(state.root)
         ground, rates, last = self.ground, self.given.rates, len(self.stops) - 2
         for number, (begin, end) in enumerate(pairwise(self.stops)):
             part = slice(int(np.ceil(begin - 1e-6)), int(end + 1e-6) + 1)
@@ -246,19 +247,19 @@ class _Scene:
         for plan in self.plans:
             flying[plan.stretch.frames] |= plan.flying
         flying = flying[frames]
-        spreads, runs = _spreads(self.skeleton, self.freedom, bounds.wished, fps, w)
+        sds, runs = _sds(self.skeleton, self.freedom, bounds.wished, fps, w)
         floor = self.ground.floor[frames]
         push = w.push_level, w.push_vertical if "bounce" not in self.without else np.inf
         terms: list[Term] = [
-            Track(np.broadcast_to(spreads, (len(root), len(spreads)))),
-            Run(runs),
+            Track(np.broadcast_to(sds, (len(root), len(sds)))),
+            Smoothness(runs),
             Ballistic(fps, flying[1:-1], self.gravity, push, w.falls),
             self._contacts(frames, root),
             Floor(floor, w.floor),
         ]
         if len(self.freedom.joints):
             terms.append(Limits(self.reference[self.fixed], bounds.loose, w.limits))
-        if self.body.weighs and "balance" not in self.without:
+        if self.body.has_masses and "balance" not in self.without:
             away = np.arange(len(self.reference)) / (0.5 * fps)  # a body given out of balance regains it in 0.5 s
             near = 1.0 - smoothstep(np.stack([away, away[::-1]]))
             balance = self._touches(frames), floor, self.overhang, w.room, near[:, frames], self.gravity, fps, w.balance
@@ -340,13 +341,11 @@ def _freedom(skeleton: Skeleton, fixed: Bools, reference: Floats) -> Freedom:
     return Freedom(np.array(joints, dtype=np.int64), np.concatenate([np.zeros((0, 3)), *axes]))
 
 
-def _spreads(
-    skeleton: Skeleton, freedom: Freedom, wished: Bools, fps: float, weights: Weights
-) -> tuple[Floats, Floats]:
-    """Return standard deviations of the unknowns (`Track`) and of their second differences (`Run`) [n]."""
+def _sds(skeleton: Skeleton, freedom: Freedom, wished: Bools, fps: float, weights: Weights) -> tuple[Floats, Floats]:
+    """Return standard deviations of the unknowns (`Track`) and of their second differences (`Smoothness`) [n]."""
     legs, limbs = _in_legs(skeleton), {joint for limb in limbs_of(skeleton) for joint in limb}
     level, vertical, seconds = weights.root_level, weights.root_height, [weights.root_s] * 3
-    spreads = [level, vertical, level]
+    sds = [level, vertical, level]
     for joint in freedom.joints.tolist():
         if joint in legs:
             own, slow = (weights.hip, weights.knee, weights.foot)[min(legs[joint], 1) + 1], weights.legs_s
@@ -355,9 +354,9 @@ def _spreads(
         else:
             own, slow = weights.pelvis if joint == 0 else weights.trunk, weights.trunk_s
         # Legs may leave the states that a request constrains, so that feet can stand.
-        spreads.append(weights.wished if wished[joint] and joint not in legs else own)
+        sds.append(weights.wished if wished[joint] and joint not in legs else own)
         seconds.append(slow)
-    return np.array(spreads), np.array(spreads) / (np.array(seconds) * fps) ** 2
+    return np.array(sds), np.array(sds) / (np.array(seconds) * fps) ** 2
 
 
 @remembered
@@ -377,7 +376,7 @@ def _in_legs(skeleton: Skeleton) -> dict[int, int]:
 @remembered
 def _reach(skeleton: Skeleton) -> Floats:
     """Return the distance from each joint to the farthest point that it carries, at rest [J], metres."""
-    above = body_of(skeleton).above
+    above = body_of(skeleton).ancestors
     far = np.linalg.norm(skeleton.rest - skeleton.rest[: len(skeleton), None], axis=-1)
     carried = np.concatenate([above, above]).T  # joints, then their tips, as in `rest`
     return np.asarray(np.where(carried, far, 0.0).max(axis=1))

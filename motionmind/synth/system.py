@@ -22,36 +22,36 @@ class Normal:
         blocks: couplings of each frame with itself and the next two [N, n, 3 n].
         gradient: half the gradient of the sum [N, n].
         cost: the sum of squares.
-        weights: couplings of the centre of mass with itself and the next two frames' [3, N, 3, 3], see `expand`.
-        pull: half the gradient with respect to the centre of mass [N, 3].
+        mass_blocks: couplings of the centre of mass with itself and the next two frames' [3, N, 3, 3], see `expand`.
+        mass_gradient: half the gradient with respect to the centre of mass [N, 3].
     """
 
     def __init__(self, frames: int, unknowns: int) -> None:
         self.blocks = np.zeros((frames, unknowns, ROW_SPAN_FRAMES * unknowns))
         self.gradient = np.zeros((frames, unknowns))
         self.cost = 0.0
-        self.weights = np.zeros((ROW_SPAN_FRAMES, frames, 3, 3))
-        self.pull = np.zeros((frames, 3))
+        self.mass_blocks = np.zeros((ROW_SPAN_FRAMES, frames, 3, 3))
+        self.mass_gradient = np.zeros((frames, 3))
 
     def block(self, k: int) -> Floats:
         """Return the couplings of each frame with the one k later [N, n, n], a view to add to."""
         n = self.gradient.shape[1]
         return self.blocks[:, :, k * n : (k + 1) * n]
 
-    def add_mass(self, first: Indices, ways: Floats, residual: Floats, weight: Floats) -> None:
+    def add_mass(self, first: Indices, coefficients: Floats, residual: Floats, weight: Floats) -> None:
         """Add rows in the centre of mass over three successive frames each.
 
         Args:
             first: first frame of each row [R], each at most once.
-            ways: coefficients of the three positions [R, 3 frames, 3].
+            coefficients: of the three positions [R, 3 frames, 3].
             residual: of the rows [R].
             weight: of their squares [R].
         """
-        weighted = ways * weight[:, None, None]
+        weighted = coefficients * weight[:, None, None]
         for a in range(ROW_SPAN_FRAMES):
-            self.pull[first + a] += weighted[:, a] * residual[:, None]
+            self.mass_gradient[first + a] += weighted[:, a] * residual[:, None]
             for b in range(a, ROW_SPAN_FRAMES):
-                self.weights[b - a, first + a] += weighted[:, a, :, None] * ways[:, b, None, :]
+                self.mass_blocks[b - a, first + a] += weighted[:, a, :, None] * coefficients[:, b, None, :]
 
     def add_joint(self, first: Indices, columns: slice, jacobian: Floats, residual: Floats, weight: float) -> None:
         """Add rows in a few unknowns of one frame, or of two successive frames.
@@ -70,13 +70,13 @@ class Normal:
                 self.block(b - a)[first + a, columns, columns] += weighted[:, a] @ np.swapaxes(jacobian[:, b], 1, 2)
 
     def expand(self, jacobian: Floats) -> None:
-        """Turn rows in the centre of mass into rows in the unknowns, by its Jacobian [N, 3, n]."""
-        self.gradient += np.einsum("txi,tx->ti", jacobian, self.pull)
+        """Express the rows in the centre of mass in the unknowns, by its Jacobian [N, 3, n]."""
+        self.gradient += np.einsum("txi,tx->ti", jacobian, self.mass_gradient)
         across = np.ascontiguousarray(np.swapaxes(jacobian, 1, 2))
         for k in range(ROW_SPAN_FRAMES):
             count = len(jacobian) - k
-            self.block(k)[:count] += across[:count] @ (self.weights[k, :count] @ jacobian[k:])
-        self.weights[:], self.pull[:] = 0.0, 0.0
+            self.block(k)[:count] += across[:count] @ (self.mass_blocks[k, :count] @ jacobian[k:])
+        self.mass_blocks[:], self.mass_gradient[:] = 0.0, 0.0
 
     def step(self, damping: float, fixed: Bools) -> Floats:
         """Return the Gauss-Newton step [N, n], zero in the `fixed` frames [N]."""
@@ -95,7 +95,7 @@ class Normal:
 
 @jit
 def _solve(blocks: Floats, right: Floats) -> None:
-    """Solve the system in place of its right side [N, n]; `blocks` [N, n, 3 n] become the Cholesky factor."""
+    """Overwrite the right side [N, n] with the solution, and `blocks` [N, n, 3 n] with their Cholesky factor."""
     count, n = right.shape
     for t in range(count):
         own = blocks[t]
@@ -130,7 +130,7 @@ def _solve(blocks: Floats, right: Floats) -> None:
 def _eliminate(row: Floats, rows: Floats, count: int, column: int, shift: int) -> None:
     """Subtract the first `count` rows, each times its entry in a column, from a row that starts `shift` later.
 
-    Rows are taken four at a time, to read and write the target a quarter as often.
+    Four rows at a time: the target is read and written a quarter as often.
     """
     target = row[column - shift : rows.shape[1] - shift]
     for k in range(0, count - count % 4, 4):

@@ -1,8 +1,8 @@
 """Terms of the solve: each adds its squared residuals, in units of their standard deviations, to one system.
 
 A term states one property of the movement and its weight. `add(state, normal)` adds its rows, linearised at a state;
-`gives(state)` returns its residual frame by frame, in the unit that reports name. Terms that push only beyond a bound
-are in `motionmind.synth.one_sided`.
+`residuals(state)` returns its residual frame by frame, in the unit of reports. Terms that push only beyond a bound are
+in `motionmind.synth.one_sided`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class Term(Protocol):
     """A sum of squares over a movement.
 
     Attributes:
-        unit: unit of `gives`; empty for a term that reports omit.
+        unit: unit of `residuals`; empty for a term that reports omit.
     """
 
     unit: ClassVar[str]
@@ -30,8 +30,8 @@ class Term(Protocol):
     def add(self, state: State, normal: Normal) -> None:
         """Add the rows, linearised at a state, and the cost there."""
 
-    def gives(self, state: State) -> Floats:
-        """Return the residual in each frame [N], in the unit that reports name."""
+    def residuals(self, state: State) -> Floats:
+        """Return the residual in each frame [N], in `unit`."""
 
 
 @dataclass
@@ -39,43 +39,43 @@ class Track:
     """Stay near the reference.
 
     Attributes:
-        spreads: standard deviations of the unknowns in each frame [N, n], metres and radians.
+        sds: standard deviations of the unknowns in each frame [N, n], metres and radians.
     """
 
     unit: ClassVar[str] = "degrees"
 
-    spreads: Floats
+    sds: Floats
 
     def add(self, state: State, normal: Normal) -> None:
         """Add the rows; see `Term.add`."""
-        weight = self.spreads**-2.0
+        weight = self.sds**-2.0
         diagonal = np.arange(state.x.shape[1])
         normal.block(0)[:, diagonal, diagonal] += weight
         normal.gradient += weight * state.x
         normal.cost += float(np.sum(weight * state.x**2))
 
-    def gives(self, state: State) -> Floats:
-        """Return the residual of each frame; see `Term.gives`."""
+    def residuals(self, state: State) -> Floats:
+        """Return the residual of each frame; see `Term.residuals`."""
         return np.asarray(np.degrees(np.abs(state.x[:, 3:]).max(axis=1, initial=0.0)))
 
 
 @dataclass
-class Run:
-    """Depart from the reference slowly, which keeps its accelerations: second differences of the unknowns.
+class Smoothness:
+    """Depart from the reference slowly, to keep its accelerations: second differences of the unknowns.
 
     Unknowns are 0 before the first frame and after the last.
 
     Attributes:
-        spreads: standard deviations of these differences [n], metres and radians per frame squared.
+        sds: standard deviations of these differences [n], metres and radians per frame squared.
     """
 
     unit: ClassVar[str] = ""
 
-    spreads: Floats
+    sds: Floats
 
     def add(self, state: State, normal: Normal) -> None:
         """Add the rows; see `Term.add`."""
-        weight, x = self.spreads**-2.0, state.x
+        weight, x = self.sds**-2.0, state.x
         padded = np.zeros((len(x) + 4, x.shape[1]))
         padded[2:-2] = x
         bends = np.diff(padded, 2, axis=0)
@@ -85,8 +85,8 @@ class Run:
         for k, share in enumerate((6.0, -4.0, 1.0)):
             normal.block(k)[: len(x) - k, diagonal, diagonal] += share * weight
 
-    def gives(self, state: State) -> Floats:
-        """Return the residual of each frame; see `Term.gives`."""
+    def residuals(self, state: State) -> Floats:
+        """Return the residual of each frame; see `Term.residuals`."""
         return np.zeros(len(state.x))
 
 
@@ -122,13 +122,13 @@ class Ballistic:
         weight = np.where(self.falling[:, None], self.falls, (level, vertical, level)) ** -2.0
         shares, axes = self.fps**2 * np.array([1.0, -2.0, 1.0]), np.arange(3)
         for a in range(3):
-            normal.pull[first + a] += shares[a] * weight * residual
+            normal.mass_gradient[first + a] += shares[a] * weight * residual
             for b in range(a, 3):
-                normal.weights[b - a, first[:, None] + a, axes, axes] += shares[a] * shares[b] * weight
+                normal.mass_blocks[b - a, first[:, None] + a, axes, axes] += shares[a] * shares[b] * weight
         normal.cost += float(np.sum(weight * residual**2))
 
-    def gives(self, state: State) -> Floats:
-        """Return the residual of each frame; see `Term.gives`."""
+    def residuals(self, state: State) -> Floats:
+        """Return the residual of each frame; see `Term.residuals`."""
         out = np.zeros(len(state.x))
         out[1:-1] = np.where(self.falling, np.linalg.norm(self._residual(state), axis=1), 0.0)
         return out
@@ -136,17 +136,17 @@ class Ballistic:
 
 @dataclass
 class Contacts:
-    """Bring points to their targets, and let supporting points slide no more than the dancer's.
+    """Bring points to their targets, and let supporting points slide no more than in the corpus.
 
     Attributes:
         frames: frames of the targets [M].
         points: point numbers [M].
         targets: target positions [M, 3], metres.
-        spreads: standard deviations of each coordinate [M, 3], metres; infinite where it is free.
-        stands: whether the point is to stand there [M].
+        sds: standard deviations of each coordinate [M, 3], metres; infinite where it is free.
+        stands: whether the point stands there [M].
         grips: points that may support the body [Q].
         moves: their target displacements from frame to frame [N - 1, Q, 2], level, metres.
-        slips: standard deviations of these [N - 1, Q], metres; infinite for a point that bears nothing.
+        slips: standard deviations of these [N - 1, Q], metres; infinite for a point without grip.
         reach: distance from its target beyond which the pull on a point is constant, metres.
     """
 
@@ -155,7 +155,7 @@ class Contacts:
     frames: Indices
     points: Indices
     targets: Floats
-    spreads: Floats
+    sds: Floats
     stands: Bools
     grips: Indices
     moves: Floats
@@ -165,7 +165,7 @@ class Contacts:
     @cached_property
     def _placed(self) -> tuple[Indices, Indices, Rows]:
         """The target and the axis of each coordinate that is not free [R], and their rows."""
-        target, axis = np.nonzero(np.isfinite(self.spreads))
+        target, axis = np.nonzero(np.isfinite(self.sds))
         return target, axis, rows_at(self.frames[target], np.eye(3)[axis], self.points[target])
 
     @cached_property
@@ -179,8 +179,8 @@ class Contacts:
 
     def add(self, state: State, normal: Normal) -> None:
         """Add the rows; see `Term.add`."""
-        off, weight = state.places[self.frames, self.points] - self.targets, self.spreads**-2.0
-        for axes in ([0, 2], [1]):  # level, and height: the standard deviations of each are alike
+        off, weight = state.places[self.frames, self.points] - self.targets, self.sds**-2.0
+        for axes in ([0, 2], [1]):  # both level coordinates have one standard deviation
             own = off[:, axes] * (weight[:, axes] > 0.0)
             share = 1.0 / np.maximum(1.0, np.linalg.norm(own, axis=1) / self.reach)
             normal.cost += float(np.sum(share * (2.0 - share) * np.sum(weight[:, axes] * own**2, axis=1)))
@@ -204,7 +204,7 @@ class Contacts:
             np.concatenate([begin + part.frames for begin, part in zip(begins, parts, strict=True)]),
             np.concatenate([part.points for part in parts]),
             np.concatenate([part.targets for part in parts]),
-            np.concatenate([part.spreads for part in parts]),
+            np.concatenate([part.sds for part in parts]),
             np.concatenate([part.stands for part in parts]),
             grips,
             moves,
@@ -219,7 +219,7 @@ class Contacts:
             self.frames[here] - frames.start,
             self.points[here],
             self.targets[here],
-            self.spreads[here],
+            self.sds[here],
             self.stands[here],
             self.grips,
             self.moves[between],
@@ -229,9 +229,9 @@ class Contacts:
     def _slid(self, state: State) -> Floats:
         return np.asarray(np.diff(state.places[:, self.grips][..., [0, 2]], axis=0) - self.moves)
 
-    def gives(self, state: State) -> Floats:
-        """Return the residual of each frame; see `Term.gives`."""
+    def residuals(self, state: State) -> Floats:
+        """Return the residual of each frame; see `Term.residuals`."""
         out, off = np.zeros(len(state.x)), state.places[self.frames, self.points] - self.targets
-        firm = self.stands & (self.spreads[:, 1] < 2.0 * self.spreads[:, 1].min(initial=np.inf, where=self.stands))
+        firm = self.stands & (self.sds[:, 1] < 2.0 * self.sds[:, 1].min(initial=np.inf, where=self.stands))
         np.maximum.at(out, self.frames[firm], 100.0 * np.abs(off[firm, 1]))
         return out

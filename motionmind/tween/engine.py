@@ -348,7 +348,7 @@ class Engine(LearnedCorpus):
             sources=shown,
             detail=found,
             left_out=realised.left_out,
-            gave=realised.gave,
+            gave=realised.residuals,
             expansions=certificate.expansions,
             peak_nodes=certificate.peak_nodes,
             costs=costs,

@@ -18,7 +18,7 @@ from motionmind.errors import FormatError
 from motionmind.files import FilePath, read_bytes
 from motionmind.learned.plausibility import Sighting
 from motionmind.search.length import LengthChoice
-from motionmind.synth.gave import Gave
+from motionmind.synth.residual import Residual
 from motionmind.tween.certificate import Bridge, Source, Wait
 from motionmind.tween.pacing import Tempo
 from motionmind.tween.what_if import WhatIf
@@ -123,7 +123,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     sources: list[list[Source | None]]
     detail: list[Source]
     left_out: float
-    gave: list[Gave]
+    gave: list[Residual]
     shown: dict[str, Sighting]
     times: list[float]
     names: list[list[str]]

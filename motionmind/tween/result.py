@@ -17,7 +17,7 @@ from motionmind.search.cfn import Ingredients, cfn
 from motionmind.search.length import LengthChoice
 from motionmind.search.problem import Problem, Via
 from motionmind.search.solve import Status
-from motionmind.synth.gave import Gave
+from motionmind.synth.residual import Residual
 from motionmind.tween.certificate import Bridge, CostBreakdown, Source, Wait, gap_of
 from motionmind.tween.pacing import Tempo, UsualTime
 from motionmind.tween.report import PassedPosture, ReportedCosts, TweenReport, plain
@@ -95,7 +95,7 @@ class Tween:
     sources: tuple[tuple[Source | None, ...], ...]
     detail: tuple[Source, ...]
     left_out: float
-    gave: tuple[Gave, ...]
+    gave: tuple[Residual, ...]
     expansions: int
     peak_nodes: int
     costs: CostBreakdown

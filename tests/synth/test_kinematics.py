@@ -66,7 +66,9 @@ def test_axes_are_how_fast_joints_turn(size: float) -> None:
         step[:, 3 + d] = width
         after, before = moved(state, step), moved(state, -step)
         own = rot.log(rot.inv_mul(before.rotations[:, joint], after.rotations[:, joint])) / (2.0 * width)
-        world = rot.log(rot.mul_inv(after.turned[:, joint], before.turned[:, joint])) / (2.0 * width)
+        world = rot.log(rot.mul_inv(after.global_rotations[:, joint], before.global_rotations[:, joint])) / (
+            2.0 * width
+        )
         np.testing.assert_allclose(state.own_axes[:, d], own, atol=1e-8)
         np.testing.assert_allclose(state.axes[:, d], world, atol=1e-8)
 
@@ -78,7 +80,7 @@ def test_axes_are_the_sum_of_their_series(size: float, rounding: float) -> None:
     """J(v) e = sum_k (-v x)^k e / (k + 1)!; closed forms lose digits near zero."""
     state = random_state(6, size, frames=3)
     for joint in np.unique(state.freedom.joints):
-        own, columns = state.freedom.of(joint)
+        own, columns = state.freedom.slices(joint)
         axes = state.freedom.axes[own]
         turned = np.repeat((state.x[:, columns] @ axes)[:, None], len(axes), axis=1)
         term = wanted = np.broadcast_to(axes, turned.shape)
@@ -92,7 +94,7 @@ def test_a_body_of_unknown_masses_has_them_in_its_root() -> None:
     insect = ant()
     body, freedom = body_of(insect), freedom_of(insect, balls=("body", "left_mid_femur"), hinges=("left_mid_tibia",))
     state = State(body, freedom, random_rotations(insect, 3, 0.5, 0), np.ones((3, 3)), np.full((3, 10), 0.1))
-    assert not body.weighs
+    assert not body.has_masses
     np.testing.assert_allclose(state.mass, state.root, atol=1e-15)
     np.testing.assert_allclose(state.mass_jacobian, np.tile(np.eye(3, 10), (3, 1, 1)), atol=1e-15)
 
@@ -123,8 +125,8 @@ def dense(rows: Rows, state: State) -> np.ndarray:
     """The rows' Jacobian [R, N n], by central differences of what the rows say they are about."""
 
     def about(there: State) -> np.ndarray:
-        places = there.places[rows.first[:, None] + rows.after, rows.points]
-        return np.asarray(np.einsum("rk,rx,rkx->r", rows.shares, rows.ways, places))
+        places = there.places[rows.first[:, None] + rows.offsets, rows.points]
+        return np.asarray(np.einsum("rk,rx,rkx->r", rows.coefficients, rows.directions, places))
 
     return differences(about, state).reshape(state.x.size, -1).T
 

@@ -17,10 +17,11 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
 from motionmind.synth.collision import Collision
 from motionmind.synth.kinematics import Freedom, State, body_of
-from motionmind.synth.one_sided import Balance, Floor, Limits, Speed, Travel
+from motionmind.synth.one_sided import Balance, Floor, Limits
 from motionmind.synth.solve import MAX_ITERATIONS_PER_PLAN, Problem, solve
+from motionmind.synth.speed_bounds import Speed, Travel
 from motionmind.synth.system import Normal
-from motionmind.synth.terms import Ballistic, Contacts, Run, Term, Track
+from motionmind.synth.terms import Ballistic, Contacts, Smoothness, Term, Track
 
 N, J = 11, len(HUMAN)
 POINTS = len(body_of(HUMAN).owners)
@@ -45,14 +46,14 @@ def test_a_body_in_the_air_falls_on_a_parabola() -> None:
     rng = np.random.default_rng(0)
     problem = problem_of(random_rotations(HUMAN, N, 0.3, 0), np.linspace([0.0, 1.0, 0.0], [0.5, 1.2, 0.3], N))
     given = problem.state(rest(problem)).mass[[0, -1]]
-    spreads = rng.uniform(0.5, 1.0, (N, problem.freedom.unknowns))
+    sds = rng.uniform(0.5, 1.0, (N, problem.freedom.unknowns))
     fall = Ballistic(FPS, np.ones(N - 2, np.bool_), GRAVITY, (np.inf, np.inf), 0.01)
-    made = solve(problem, [Track(spreads), fall], rest(problem))
+    made = solve(problem, [Track(sds), fall], rest(problem))
     t = np.arange(N) / FPS
     wanted = given[0] + (t / t[-1])[:, None] * (given[1] - given[0])
     wanted[:, 1] += 0.5 * GRAVITY * t * (t[-1] - t)
     np.testing.assert_allclose(made.mass, wanted, atol=1e-4)
-    np.testing.assert_allclose(fall.gives(made), 0.0, atol=0.02)
+    np.testing.assert_allclose(fall.residuals(made), 0.0, atol=0.02)
 
 
 def test_a_body_on_the_floor_is_accelerated_as_little_as_may_be() -> None:
@@ -84,17 +85,17 @@ def test_an_arm_reaches_where_the_body_must_stay() -> None:
     problem = standing()
     fingers = HUMAN.index("left_fingers")
     contacts = reaching(problem.state(rest(problem)), fingers, [-0.15, 0.2, 0.1])
-    spreads = np.full((N, problem.freedom.unknowns), 1e-4)
+    sds = np.full((N, problem.freedom.unknowns), 1e-4)
     for joint in ("left_shoulder", "left_elbow"):
-        spreads[:, problem.freedom.of(HUMAN.index(joint))[1]] = 10.0
-    made = solve(problem, [Track(spreads), contacts], rest(problem), iterations=30)
+        sds[:, problem.freedom.slices(HUMAN.index(joint))[1]] = 10.0
+    made = solve(problem, [Track(sds), contacts], rest(problem), iterations=30)
     np.testing.assert_allclose(made.places[5, fingers], contacts.targets[0], atol=1e-3)
     assert np.abs(made.root).max() < 1e-3
 
 
 def test_nothing_moves_without_a_reason() -> None:
     problem = standing()
-    terms: list[Term] = [Track(np.ones((N, problem.freedom.unknowns))), Run(np.ones(problem.freedom.unknowns))]
+    terms: list[Term] = [Track(np.ones((N, problem.freedom.unknowns))), Smoothness(np.ones(problem.freedom.unknowns))]
     np.testing.assert_array_equal(solve(problem, terms, rest(problem)).x, 0.0)
 
 
@@ -121,7 +122,7 @@ class Scripted:
         normal.cost += next(self.costs)
         self.seen.append(state.x)
 
-    def gives(self, state: State) -> Floats:
+    def residuals(self, state: State) -> Floats:
         return np.zeros(len(state.x))
 
 
@@ -195,7 +196,7 @@ def test_terms_that_replanning_changes_count_at_once() -> None:
 INF = np.inf
 FREE: dict[str, Callable[[State], Term]] = {
     "track": lambda state: Track(np.full(state.x.shape, INF)),
-    "run": lambda state: Run(np.full(state.x.shape[1], INF)),
+    "run": lambda state: Smoothness(np.full(state.x.shape[1], INF)),
     "ballistic": lambda _: Ballistic(FPS, np.arange(N - 2) % 2 == 0, GRAVITY, (INF, INF), INF),
     "contacts": lambda state: Contacts(
         np.array([3]),
@@ -239,11 +240,11 @@ def test_legs_in_each_other_come_apart() -> None:
     collision = Collision(np.full(len(capsules_of(HUMAN).pairs()), 0.005), 0.0025, 4)
     terms: list[Term] = [
         Track(np.full((N, problem.freedom.unknowns), 0.3)),
-        Run(np.full(problem.freedom.unknowns, 0.05)),
+        Smoothness(np.full(problem.freedom.unknowns, 0.05)),
         collision,
     ]
-    assert collision.gives(problem.state(rest(problem))).max() > 3.0
-    assert collision.gives(solve(problem, terms, rest(problem))).max() < 0.2
+    assert collision.residuals(problem.state(rest(problem))).max() > 3.0
+    assert collision.residuals(solve(problem, terms, rest(problem))).max() < 0.2
 
 
 def between(rotations: Floats, parts: int = 10) -> Floats:
@@ -276,7 +277,7 @@ def test_legs_that_swap_sides_are_pulled_apart(rotations: Floats, frames_show_it
     problem = problem_of(rotations, np.zeros((N, 3)))
     terms: list[Term] = [
         Track(np.full((N, problem.freedom.unknowns), 0.3)),
-        Run(np.full(problem.freedom.unknowns, 0.05)),
+        Smoothness(np.full(problem.freedom.unknowns, 0.05)),
         Collision(np.full(len(capsules_of(HUMAN).pairs()), 0.005), 0.0025, 4),
     ]
     made = solve(problem, terms, rest(problem))
@@ -290,8 +291,8 @@ def test_a_step_stops_at_a_bound_and_not_before_it() -> None:
     floor = Floor(np.full(N, lowest + 0.05), 0.001)
     above = rest(problem)
     above[1:-1, 1] = 0.11
-    spreads = np.full((N, problem.freedom.unknowns), 0.5)
-    made = solve(problem, [Track(spreads), floor], above, iterations=1)
+    sds = np.full((N, problem.freedom.unknowns), 0.5)
+    made = solve(problem, [Track(sds), floor], above, iterations=1)
     assert np.abs(made.places[1:-1, :, 1].min(axis=1) - floor.floor[1:-1]).max() < 0.002
 
 
@@ -304,6 +305,6 @@ def test_what_is_too_fast_slows_down_by_the_time_it_has() -> None:
     problem = problem_of(rotations, np.zeros((N, 3)))
     speed = Speed(np.full(J, 4.0), 4.0, FPS, 0.05)
     made = solve(problem, [Track(np.full((N, problem.freedom.unknowns), 0.5)), speed], rest(problem))
-    assert speed.gives(problem.state(rest(problem))).max() > 500.0
-    assert speed.gives(made).max() < 5.0
+    assert speed.residuals(problem.state(rest(problem))).max() > 500.0
+    assert speed.residuals(made).max() < 5.0
     np.testing.assert_allclose(made.rotations[[0, -1]], rotations[[0, -1]])

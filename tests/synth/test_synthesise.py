@@ -37,7 +37,7 @@ T = TypeVar("T")
 
 def most_of(made: Synthesis, term: str) -> float:
     """The largest residual of a term; 0 if it has none."""
-    return max((gave.most for gave in made.gave if gave.term == term), default=0.0)
+    return max((one.most for one in made.residuals if one.term == term), default=0.0)
 
 
 class Toy(NamedTuple):
@@ -150,7 +150,7 @@ def test_the_same_movement_is_made_again_to_the_last_bit(name: str) -> None:
     one, other = TOYS[name]().made(), TOYS[name]().made()
     for array in ("rotations", "root", "x", "falls"):
         assert getattr(one, array).tobytes() == getattr(other, array).tobytes()
-    assert one.gave == other.gave
+    assert one.residuals == other.residuals
 
 
 @pytest.mark.parametrize("name", ["post", "snake", "crouches", "walks"])
@@ -389,10 +389,10 @@ def test_limits_are_widened_to_postures_that_are_passed() -> None:
 
 def test_each_term_gives_its_largest_residual_at_a_time_of_the_movement() -> None:
     toy = TOYS["walks"]()
-    gave = toy.made().gave
-    assert gave
-    assert len({one.term for one in gave}) == len(gave)
-    for one in gave:
+    residuals = toy.made().residuals
+    assert residuals
+    assert len({one.term for one in residuals}) == len(residuals)
+    for one in residuals:
         assert one.most > 0.0
         assert one.unit
         assert np.any(one.at == toy.times)

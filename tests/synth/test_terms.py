@@ -17,9 +17,10 @@ from motionmind.geometry import rotations as rot
 from motionmind.synth import collision as module
 from motionmind.synth.collision import Collision
 from motionmind.synth.kinematics import Freedom, State, body_of
-from motionmind.synth.one_sided import Balance, Floor, Limits, OneSided, Speed, Travel
+from motionmind.synth.one_sided import Balance, Floor, Limits, OneSided
+from motionmind.synth.speed_bounds import Speed, Travel
 from motionmind.synth.system import Normal
-from motionmind.synth.terms import Ballistic, Contacts, Run, Term, Track
+from motionmind.synth.terms import Ballistic, Contacts, Smoothness, Term, Track
 
 N, J = 6, len(HUMAN)
 LEVEL = np.array([1.0, 0.0, 1.0])
@@ -46,15 +47,15 @@ def at_rest(rotations: Floats, freedom: Freedom | None = None) -> State:
     )
 
 
-def contacts(state: State, off: float, spreads: Floats, **changes: Any) -> Contacts:
+def contacts(state: State, off: float, sds: Floats, **changes: Any) -> Contacts:
     """Points that are to be about so far from where they are, and to move at random."""
-    frames = np.repeat(np.arange(N), len(spreads) // N)
+    frames = np.repeat(np.arange(N), len(sds) // N)
     points = np.arange(len(frames)) * 7 % POINTS
     targets = state.places[frames, points] + off * np.random.default_rng(1).normal(size=(len(frames), 3))
     slips = np.where(np.arange(3 * N - 3).reshape(-1, 3) % 3 == 1, np.inf, 0.1)
     moves = np.random.default_rng(2).normal(size=(N - 1, 3, 2))
     stands = np.arange(len(frames)) % 2 == 0
-    return Contacts(frames, points, targets, spreads, stands, np.array([3, 4, POINTS - 1]), moves, slips, **changes)
+    return Contacts(frames, points, targets, sds, stands, np.array([3, 4, POINTS - 1]), moves, slips, **changes)
 
 
 ALIKE = np.tile(RNG.uniform(0.01, 0.1, (4 * N, 1)), 3)
@@ -64,7 +65,7 @@ FASTEST = np.where(np.arange(J) % 5 == 4, np.inf, 3.0)
 
 SMOOTH: dict[str, Callable[[State], Term]] = {
     "track": lambda _: Track(np.random.default_rng(0).uniform(0.1, 1.0, (N, UNKNOWNS))),
-    "run": lambda _: Run(np.random.default_rng(0).uniform(0.1, 1.0, UNKNOWNS)),
+    "run": lambda _: Smoothness(np.random.default_rng(0).uniform(0.1, 1.0, UNKNOWNS)),
     "ballistic": lambda _: Ballistic(FPS, SOME[1:-1], GRAVITY, (2.0, 3.0), 0.15),
     "ballistic without bounce": lambda _: Ballistic(FPS, SOME[1:-1], GRAVITY, (2.0, np.inf), 0.15),
     "contacts near": lambda state: contacts(state, 0.01, ALIKE * [1.0, 0.1, 1.0]),
@@ -102,7 +103,7 @@ def test_the_gradient_of_balance_is_exact_but_for_how_the_support_moves(seed: in
     term = Balance(touches, floor, 0.01, 0.04, np.zeros((2, N)), GRAVITY, FPS, 0.005)
     trunk = [HUMAN.index(name) for name in ("lumbar", "left_shoulder", "right_shoulder", "left_elbow", "right_elbow")]
     assert_gradient(term, state, 3 + np.flatnonzero(np.isin(state.freedom.joints, trunk)))
-    assert term.gives(state).max() > 1.0
+    assert term.residuals(state).max() > 1.0
 
 
 def test_the_gradient_of_limits_is_exact_for_hinges() -> None:
@@ -114,7 +115,7 @@ def test_the_gradient_of_limits_is_exact_for_hinges() -> None:
     state = at_rest(posture(left_knee=bent[0].tolist()), freedom)
     term = Limits(posture()[:2], np.zeros(J, dtype=np.bool_), 0.03)
     assert_gradient(term, state)
-    assert 10.0 < term.gives(state).max() < np.degrees(0.3)
+    assert 10.0 < term.residuals(state).max() < np.degrees(0.3)
 
 
 @pytest.mark.parametrize("turned", [{"left_hip": [-0.3, 0.2, -1.0]}, {"lumbar": [0.2, 1.2, 0.1]}])
@@ -143,7 +144,7 @@ def test_the_gradient_of_a_collision_is_exact_but_for_tapering_limbs(monkeypatch
     state = at_rest(inward)
     term = collision()
     assert_gradient(term, state)
-    assert term.gives(state).max() > 1.0
+    assert term.residuals(state).max() > 1.0
     assert not np.any(term._planes)
 
 
@@ -185,7 +186,7 @@ def test_legs_that_would_pass_through_each_other_part_to_the_sides_of_their_hips
     state = crossing()
     term = collision()
     normal = linearised(term, state)
-    deep = np.flatnonzero(term.gives(state) > 0.0)
+    deep = np.flatnonzero(term.residuals(state) > 0.0)
     assert len(deep) > 0
     step = normal.step(0.3, ~np.isin(np.arange(N), deep))
     there = at_rest(state.rotations)
@@ -231,7 +232,7 @@ def test_the_cost_of_legs_that_come_near_does_not_jump() -> None:
     linearised(term, state)
     step = np.zeros(state.x.shape)
     for name, sign in (("left_hip", -1.0), ("right_hip", 1.0)):
-        step[1:-1, state.freedom.of(HUMAN.index(name))[1].start + 2] = -0.3 * sign
+        step[1:-1, state.freedom.slices(HUMAN.index(name))[1].start + 2] = -0.3 * sign
     costs = [linearised(term, moved(state, share * step)).cost for share in np.linspace(-1.0, 1.0, 1001)]
     assert np.abs(np.diff(costs)).max() < 0.02 * np.ptp(costs)
 
@@ -277,7 +278,7 @@ def satisfied() -> dict[str, tuple[Term, State]]:
     fell = State(fell.body, fell.freedom, fell.rotations, fell.root, fell.x)
     return {
         "track": (Track(np.ones((N, UNKNOWNS))), state),
-        "run": (Run(np.ones(UNKNOWNS)), state),
+        "run": (Smoothness(np.ones(UNKNOWNS)), state),
         "ballistic, on the floor": (Ballistic(FPS, np.zeros(N - 2, np.bool_), GRAVITY, (2.0, 2.0), 0.1), state),
         "ballistic, in the air": (Ballistic(FPS, np.ones(N - 2, np.bool_), GRAVITY, (2.0, 2.0), 0.1), fell),
         "contacts": (placed, state),
@@ -298,7 +299,7 @@ def satisfied() -> dict[str, tuple[Term, State]]:
 @pytest.mark.parametrize("name", satisfied())
 def test_a_term_that_is_satisfied_gives_nothing_and_pulls_at_nothing(name: str) -> None:
     term, state = satisfied()[name]
-    np.testing.assert_allclose(term.gives(state), 0.0, atol=1e-6)
+    np.testing.assert_allclose(term.residuals(state), 0.0, atol=1e-6)
     normal = linearised(term, state)
     assert normal.cost == pytest.approx(0.0, abs=1e-9)
     np.testing.assert_allclose(normal.gradient, 0.0, atol=1e-6)
@@ -308,14 +309,14 @@ def test_terms_say_by_how_much_they_give() -> None:
     state = at_rest(posture(left_elbow=[0.0, 0.5, 0.0]))
     lowest = state.places[..., 1].min()
     falling = np.array([True, False, False, False])
-    assert Floor(np.full(N, lowest + 0.05), 0.01).gives(state) == pytest.approx(5.0)
+    assert Floor(np.full(N, lowest + 0.05), 0.01).residuals(state) == pytest.approx(5.0)
     np.testing.assert_allclose(
-        Ballistic(FPS, falling, GRAVITY, (2.0, 2.0), 0.1).gives(state), GRAVITY * (np.arange(N) == 1)
+        Ballistic(FPS, falling, GRAVITY, (2.0, 2.0), 0.1).residuals(state), GRAVITY * (np.arange(N) == 1)
     )
     turning = State(state.body, state.freedom, state.rotations, state.root, np.arange(N)[:, None] * np.eye(UNKNOWNS)[5])
-    faster = Speed(np.full(J, 10.0), 10.0, FPS, 0.05).gives(turning)
+    faster = Speed(np.full(J, 10.0), 10.0, FPS, 0.05).residuals(turning)
     np.testing.assert_allclose(faster, np.degrees(FPS - 10.0) * (np.arange(N) > 0), rtol=1e-6)
-    np.testing.assert_allclose(Track(np.ones((N, UNKNOWNS))).gives(turning), np.degrees(np.arange(N)))
+    np.testing.assert_allclose(Track(np.ones((N, UNKNOWNS))).residuals(turning), np.degrees(np.arange(N)))
 
 
 # --- one-sided terms, and contacts of parts ---------------------------------------------------------------------------
@@ -332,7 +333,7 @@ def aside(state: State) -> Floats:
 
 def across(state: State) -> Floats:
     """The left leg swings into the other."""
-    own, columns = state.freedom.of(HUMAN.index("left_hip"))
+    own, columns = state.freedom.slices(HUMAN.index("left_hip"))
     step = np.zeros((N, UNKNOWNS))
     step[:, columns] = state.freedom.axes[own] @ [0.0, 0.0, -0.1]
     return step
@@ -374,7 +375,7 @@ def test_contacts_of_parts_are_those_of_the_whole() -> None:
     state = random_state(1, 0.2, N)
     whole = contacts(state, 0.2, ALIKE)
     joined = Contacts.joined([whole.part(slice(0, 3)), whole.part(slice(3, N))], [0, 3], N)
-    for name in ("frames", "points", "targets", "spreads", "grips"):
+    for name in ("frames", "points", "targets", "sds", "grips"):
         np.testing.assert_array_equal(getattr(joined, name), getattr(whole, name))
     across = np.arange(N - 1) == 2  # neither part knows how the last frame of one goes on to the other's first
     np.testing.assert_array_equal(joined.slips[~across], whole.slips[~across])
@@ -413,11 +414,11 @@ def test_contacts_give_how_far_standing_points_are_off_the_floor() -> None:
     state = at_rest(posture())
     frames, points = np.array([1, 2, 3, 4]), np.full(4, 4)
     targets = state.places[frames, points] + [[0.3, 0.02, 0.0], [0.0, -0.03, 0.0], [0.0, 0.1, 0.0], [0.0, 0.1, 0.0]]
-    spreads = np.full((4, 3), 0.01)
-    spreads[3] = 0.05
+    sds = np.full((4, 3), 0.01)
+    sds[3] = 0.05
     none = np.zeros(0, np.int64), np.zeros((N - 1, 0, 2)), np.zeros((N - 1, 0))
-    term = Contacts(frames, points, targets, spreads, np.array([True, True, False, True]), *none)
-    np.testing.assert_allclose(term.gives(state), [0.0, 2.0, 3.0, 0.0, 0.0, 0.0], atol=1e-9)
+    term = Contacts(frames, points, targets, sds, np.array([True, True, False, True]), *none)
+    np.testing.assert_allclose(term.residuals(state), [0.0, 2.0, 3.0, 0.0, 0.0, 0.0], atol=1e-9)
 
 
 def test_travel_bounds_only_the_axes_that_count() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 
-class Gave(msgspec.Struct, frozen=True):
+class Residual(msgspec.Struct, frozen=True):
     """The largest residual of a term of the solve.
 
     Attributes:
