@@ -78,7 +78,7 @@ class Pass(NamedTuple):
 
 @dataclass(frozen=True)
 class Freedom:
-    """What a body may move: its D = 3 J + 3 unknowns are three angles of each joint, then the root's position.
+    """The unknowns that a body may change: D = 3 J + 3, which are three angles of each joint, then the root's position.
 
     Attributes:
         mobile: whether each unknown may change [D].

@@ -29,7 +29,7 @@ _NAME = re.compile(r"\w+(\.\w+)*")  # of an array: no name in a manifest leads o
 
 
 class ArrayEntry(msgspec.Struct, frozen=True):
-    """What a manifest states of an array: its type as NumPy writes it, its shape, and the SHA-256 of its file."""
+    """The entry of an array in a manifest: its type as NumPy writes it, its shape, and the SHA-256 of its file."""
 
     type: Annotated[str, msgspec.Meta(pattern="^[<|][fiub][1248]$")]
     shape: tuple[Annotated[int, msgspec.Meta(ge=0)], ...]

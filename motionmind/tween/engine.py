@@ -22,7 +22,7 @@ from motionmind.learned import graphs, summary
 from motionmind.learned.model import LearnedCorpus
 from motionmind.realise.realise import Realised, realise
 from motionmind.realise.wishes import Style, Wishes
-from motionmind.search.apart import TooAlikeError, difference, solve_apart
+from motionmind.search.diverse import TooSimilarError, difference, solve_diverse
 from motionmind.search.problem import places
 from motionmind.search.sample import sample_path
 from motionmind.search.solve import Certificate, Watch, solve

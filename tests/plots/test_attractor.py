@@ -335,7 +335,7 @@ def test_what_cannot_be_drawn_is_refused_in_a_line(run: Run) -> None:
         ("gone.json", "a.png", "there is no such file"),
         ("notes.json", "a.png", "notes.json"),
         ("changed.json", "a.png", "give another order here"),
-        ("flat.json", "a.png", "not 2 numbers and 10 points"),
+        ("flat.json", "a.png", "not 2 numbers and 10"),
         ("still.json", "a.png", "not 3 numbers and -1 points"),
         ("strange.json", "a.png", "no flow 'strange'"),
     ):
