@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from motionmind.tween.what_if import WhatIf
 
 
-_SAME_PASSAGE_S = 3.0  # seconds from one place of a passage to the next, at most: a score's postures lie so far apart
-_N_WARNINGS_PRINTED = 3  # warnings that are printed without --details
+_SAME_PASSAGE_S = 3.0  # longest step within one passage: postures of a score are up to 3 s apart
+_N_WARNINGS_PRINTED = 3  # without --details
 
 
 class Notes(logging.Handler):
-    """Prints each assumption that was logged, such as a file's unit, for the first file that it is made for."""
+    """Prints each logged assumption, such as the unit of a file, once: for the first file that needs it."""
 
     def __init__(self, level: int) -> None:
         super().__init__(level)
@@ -64,7 +64,7 @@ def count(number: int, noun: str) -> str:
 
 
 class Interruption:
-    """A context in which Ctrl-C, instead of ending the program, lets the search end with what it has found.
+    """A context in which Ctrl-C ends the search, which then returns its best result, instead of the program.
 
     Attributes:
         is_requested: whether Ctrl-C was pressed.
@@ -85,7 +85,7 @@ class Interruption:
             click.echo("\r\x1b[2K", err=True, nl=False)
 
     def watch(self, so_far: Progress) -> bool:
-        """Print the search's progress on a terminal, once a second; return whether the search is to end."""
+        """Print the search's progress on a terminal, once a second; return whether to end the search."""
         if sys.stderr.isatty() and monotonic() > self._printed_at + 1.0:
             self._printed_at = monotonic()
             best = f"best so far {so_far.cost:.3f}" if so_far.cost < math.inf else "no path yet"
@@ -94,7 +94,7 @@ class Interruption:
         return self.is_requested
 
     def on_progress(self, done: int, of: int) -> None:
-        """Print on a terminal that the search after the first `done` of several begins."""
+        """Print on a terminal which of several searches begins; `done` searches have ended."""
         self._stage = f"transition {done + 1} of {of}: "
         if sys.stderr.isatty():
             click.echo(f"\r\x1b[2K{self._stage}", err=True, nl=False)
@@ -104,7 +104,7 @@ class Interruption:
 
 
 def print_tween(result: Tween, files: Sequence[Path], *, with_details: bool = False) -> None:
-    """Print a tween in plain words, and the files written; with details costs, states and distances from the corpus."""
+    """Print the summary of a tween and the files written; with details, costs, states and distances from the corpus."""
     from motionmind.tween.headline import headline
 
     click.echo(headline(result))
@@ -117,18 +117,18 @@ def print_tween(result: Tween, files: Sequence[Path], *, with_details: bool = Fa
 
 
 def _print_beyond(result: Tween, indent: str = "") -> None:
-    """Print each flaw that would make a viewer wince, one per line."""
+    """Print each visible flaw, one per line."""
     from motionmind.tween.headline import beyond
 
     for sentence in beyond(result):
-        click.echo(f"{indent}beware    {sentence}")
+        click.echo(f"{indent}warning   {sentence}")
 
 
 def _print_details(result: Tween) -> None:
     """Print the search's figures: moves, cost, proof, make-up, and distances from the corpus."""
     lines = [*_search_lines(result), *_distance_lines(result)]
     if result.detail:
-        lines.append(("danced", f"like {_passages(result.detail)}"))
+        lines.append(("passages", _passages(result.detail)))
     lines.insert(1, ("pace", _tempo(result)))
     for name, line in lines:
         click.echo(f"{name:10}{line}")
@@ -151,23 +151,22 @@ def _tempo(result: Tween) -> str:
     """Explain the duration of a tween, and its differences from the corpus."""
     from motionmind.tween.pacing import worded
 
-    tempo, said = result.tempo, []
+    tempo = result.tempo
     if tempo.least > tempo.usual:
-        said.append(
-            f"{displayed(tempo.slowest)} needs {tempo.least:.2f} s, so as not to be faster than is fast in the corpus"
-        )
+        parts = [f"{displayed(tempo.slowest)} needs {tempo.least:.2f} s at the corpus's fast speed"]
     else:
-        said.append(f"the corpus takes about {tempo.usual:.2f} s for so far a way")
+        parts = [f"typical duration for this distance: {tempo.usual:.2f} s"]
     if tempo.usual_moves is not None:
+        verbs = ("fits", "does") if tempo.usual_moves == 1 else ("fit", "do")
         moves = count(tempo.usual_moves, "move")
-        said.append(f"the {moves} of usual length that the duration holds would not lead there")
+        parts.append(f"{moves} of typical length {verbs[0]} the duration but {verbs[1]} not reach B")
     if tempo.faster and (result.request.fixes_length or result.request.pace > 1.0):
-        said.append(f"faster than anything in the corpus: {worded(tempo.faster)}")
+        parts.append(f"faster than anything in the corpus: {worded(tempo.faster)}")
     if tempo.detours:
-        said.append("what it does after such an A, and before such a B, fills the time")
+        parts.append("usual movement after postures like A and before postures like B fills the time")
     if tempo.creeps > 0.0:
-        said.append(f"slower than all but its slowest seconds in {tempo.creeps:.0%} of the time")
-    return "; ".join(said)
+        parts.append(f"slower than 99% of the corpus in {tempo.creeps:.0%} of the time")
+    return "; ".join(parts)
 
 
 def format_what_if(one: WhatIf) -> str:
@@ -182,13 +181,13 @@ def format_what_if(one: WhatIf) -> str:
 
 
 def print_written(files: Sequence[Path]) -> None:
-    """Print the names of the files that were written."""
+    """Print the names of the written files."""
     names = ", ".join(displayed_path(file) for file in files)
-    click.echo(f"written   {names or 'nothing: name a file by -o'}")
+    click.echo(f"written   {names or 'nothing (-o FILE writes the result)'}")
 
 
 def _search_lines(result: Tween) -> list[tuple[str, str]]:
-    """Describe a path and its certificate: headings, each with a line."""
+    """Return pairs of a heading and a line that describe a path and its certificate."""
     seconds = float(result.motion.times[-1])
     bridged = [f"{displayed(b.joint)} in move {b.move + 1} ({b.degrees:.0f} degrees)" for b in result.bridges]
     waited = Counter(displayed(wait.joint) for wait in result.waits)
@@ -196,14 +195,14 @@ def _search_lines(result: Tween) -> list[tuple[str, str]]:
         ("moves", f"{result.moves}, in {seconds:.2f} s ({count(len(result.motion), 'frame')})"),
         ("cost", f"{result.cost:.3f} nats"),
         ("proven", f"{result.status}: no path costs less than {result.lower_bound:.3f}, gap {result.gap:.2%}"),
-        ("attested", f"{result.attested:.1%} of the joints' moves were seen in the corpus{_shares(result)}"),
+        ("attested", f"{result.attested:.1%} of the joints' transitions occur in the corpus{_shares(result)}"),
         ("bridged", ", ".join(bridged) or "none"),
         ("waited", ", ".join(f"{joint} {count(times, 'move')}" for joint, times in waited.items()) or "none"),
     ]
 
 
 def _distance_lines(result: Tween) -> list[tuple[str, str]]:
-    """Describe how far from states A, B, the postures passed and the motion are: headings, each with a line."""
+    """Return pairs of a heading and a line with the distances of A, B, vias and the motion from their states."""
     ends = zip("AB", (result.before, result.after), result.snap_degrees, strict=True)
     stops = [(end, "" if seconds is None else "moving, ", row) for end, seconds, row in ends]
     for number, (move, row) in enumerate(zip(result.passed, result.via_degrees, strict=True), start=1):
@@ -221,18 +220,18 @@ def _distance_lines(result: Tween) -> list[tuple[str, str]]:
 
 
 def _shares(result: Tween) -> str:
-    """Format the share of attested moves that each part of a corpus with several parts attests; "" for one part."""
-    seen = [source for row in result.sources for source in row if source is not None]
-    times = Counter(_format_origin(source.corpus, source.mirrored, source.reversed) for source in seen)
+    """Format the share of attested transitions from each origin of a corpus; "" for one origin."""
+    attested = [source for row in result.sources for source in row if source is not None]
+    times = Counter(_format_origin(source.corpus, source.mirrored, source.reversed) for source in attested)
     if len(times) < 2:
         return ""
-    return ": " + ", ".join(f"{name} {number / len(seen):.0%}" for name, number in times.most_common())
+    return ": " + ", ".join(f"{name} {number / len(attested):.0%}" for name, number in times.most_common())
 
 
 def print_alternatives(results: Sequence[Tween], files: Sequence[Path], *, with_details: bool = False) -> None:
-    """Print alternative tweens in plain words, each with the share by which it differs from those above.
+    """Print the summaries of alternative tweens, each with the share by which it differs from the ones above.
 
-    With details a table of their costs follows. What restrictions cost the first follows, where that was asked.
+    The prices of restrictions on the first tween follow, if requested; with details, a table of costs.
     """
     from motionmind.tween.headline import headline
 
@@ -261,7 +260,7 @@ def _format_origin(corpus: str, is_mirrored: bool, is_reversed: bool) -> str:
 
 
 def print_origins(summary: dict[str, Any]) -> None:
-    """Print where a corpus's movement comes from, unless that is only its own recordings as they are."""
+    """Print the origins of a corpus's movement, unless its own unchanged recordings are the only one."""
     rows = [(_format_origin(row["corpus"], row["mirrored"], row["reversed"]), row) for row in summary["origins"]]
     if len(rows) < 2 and not any(name != displayed(summary["name"]) for name, _ in rows):
         return
@@ -275,10 +274,10 @@ def print_origins(summary: dict[str, Any]) -> None:
 
 
 def print_check(check: dict[str, Any], *, with_states: bool = True, with_details: bool = False) -> None:
-    """Print what `Engine.check` found: size, states of each joint, share of pairs joined, faults.
+    """Print the result of `Engine.check`: size, states of each joint, share of joinable pairs, faults.
 
     Args:
-        check: what was found.
+        check: the result.
         with_states: whether to print a line for each joint, with its states, edges and out-degree.
         with_details: whether to print a line for each recording with faults.
     """
@@ -298,16 +297,16 @@ def print_check(check: dict[str, Any], *, with_states: bool = True, with_details
 
 
 def format_repairs(summary: dict[str, Any]) -> str:
-    """Format how many stretches of a corpus's recordings were mended: "12 put back exactly, 30 reconstructed"."""
+    """Format the repairs of a corpus's recordings: "2 clips, 12 stretches put back exactly, 30 reconstructed"."""
     exact = sum(one["exact"] for one in summary["repairs"])
     clips = count(len({one["clip"] for one in summary["repairs"]}), "clip")
     return f"{clips}, {count(exact, 'stretch')} put back exactly, {len(summary['repairs']) - exact} reconstructed"
 
 
 def _print_faults(faults: Sequence[dict[str, Any]], repairs: Sequence[dict[str, Any]], with_details: bool) -> None:
-    """Print how often joints jump in the recordings, and what became of it; with details for each recording.
+    """Print how often joints jump in the corpus's own recordings, and the repairs; with details, for each recording.
 
-    Faults are of the corpus's own recordings; repairs are of mixed corpora, too, and these are left out.
+    `repairs` also has those of mixed corpora, which are ignored.
     """
     if not faults:
         return
@@ -325,7 +324,7 @@ def _print_faults(faults: Sequence[dict[str, Any]], repairs: Sequence[dict[str, 
 
 
 def _format_faults(faults: Sequence[dict[str, Any]], stretches: Sequence[dict[str, Any]]) -> str:
-    """Format flips and stretches that were reconstructed: "3 flips, 2 put back exactly, 9 frames reconstructed"."""
+    """Format flips and reconstructed stretches: "3 flips, 2 put back exactly, 9 frames reconstructed"."""
     ends = Counter(fault["repair"] for fault in faults)
     parts = [count(len(faults), "flip")]
     parts += [f"{ends['put back']} put back exactly"] * (ends["put back"] > 0)
@@ -336,13 +335,13 @@ def _format_faults(faults: Sequence[dict[str, Any]], stretches: Sequence[dict[st
 
 
 class Warned:
-    """Shows our own warnings as notes, and drops others, which are for developers.
+    """Prints our own warnings as notes, and drops other warnings, which are for developers.
 
-    A command with `--details` prints each of them only where that is given; else the first few, and how many more.
+    A command that has `--details` prints the first few and the number of the others, unless `--details` is given.
     """
 
     def __init__(self) -> None:
-        self._shown = self._left = 0
+        self._n_seen = self._n_dropped = 0
 
     def show(
         self,
@@ -353,17 +352,17 @@ class Warned:
         file: TextIO | None = None,
         line: str | None = None,
     ) -> None:
-        """Show a warning: a `warnings.showwarning`."""
+        """Print a warning as a note; signature of `warnings.showwarning`."""
         if not issubclass(category, MotionMindWarning):
             return
         context = click.get_current_context(silent=True)
-        self._shown += 1
-        if context and context.params.get("details") is False and self._shown > _N_WARNINGS_PRINTED:
-            self._left += 1
+        self._n_seen += 1
+        if context and context.params.get("details") is False and self._n_seen > _N_WARNINGS_PRINTED:
+            self._n_dropped += 1
         else:
             note(str(message))
 
     def finish(self) -> None:
-        """Print the number of warnings not shown."""
-        if self._left:
-            note(f"{count(self._left, 'more warning')} like these (--details prints them)")
+        """Print the number of dropped warnings."""
+        if self._n_dropped:
+            note(f"{count(self._n_dropped, 'more warning')} like these (--details prints them)")

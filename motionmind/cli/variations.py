@@ -306,7 +306,7 @@ def print_seams_beyond(variation: Variation, engine: Engine) -> None:
         _, number, sentence = max(sightings, key=lambda sighting: sighting[0])
         others = sorted(other for _, other, _ in sightings if other != number)
         also = f" (seam{'s' * (len(others) > 1)} {enumerated(list(map(str, others)), 8)}, too)" if others else ""
-        click.echo(f"beware    seam {number}: {sentence}{also}")
+        click.echo(f"warning   seam {number}: {sentence}{also}")
 
 
 def names_in(variation: Variation, home: Path | None) -> Sequence[str]:

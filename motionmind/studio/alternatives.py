@@ -21,7 +21,7 @@ from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
 from motionmind.tween.certificate import Source
 from motionmind.tween.engine import Engine
-from motionmind.tween.headline import beyond, feet_staying, seen_in
+from motionmind.tween.headline import attestation, beyond, feet_staying
 from motionmind.tween.result import Tween
 
 MAX_ALTERNATIVES = 4
@@ -182,7 +182,7 @@ def _describe_optimality(tween: Tween) -> str:
 def _describe_usualness(tween: Tween, own: Floats) -> str:
     """Describe how usual the movement is among the corpus's own moves, and whether the corpus shows all of it."""
     moved = (tween.path[1:] != tween.path[:-1]) & (tween.costs.likelihood > 0.0)
-    seen = seen_in(tween).replace("every one", "every move").replace("_", " ")
+    seen = attestation(tween).replace("_", " ")
     if not moved.any():
         return seen
     mean = float(np.log(tween.costs.likelihood[moved]).mean())

@@ -1,4 +1,4 @@
-"""Summarise a tween in a few words: the facts that a choreographer wants first, and the flaws that a viewer sees."""
+"""Summarise a tween in one line, and list its visible flaws."""
 
 from __future__ import annotations
 
@@ -16,41 +16,45 @@ from motionmind.tween.result import Tween
 # By measure: a message with the movement's greatest value, the corpus's limit and the body part; then the digits and
 # kind of number for both values.
 _MEASURE_WORDS = {
-    "balance": ("leans {0} m beyond its support; corpus limit {1} m", 2, "f"),
-    "bounce": ("bounces: vertical acceleration {0} m/s^2; corpus limit {1} m/s^2", 0, "f"),
-    "flight": ("floats: {0} of gravity is missing in the air; corpus limit {1}", 0, "%"),
-    "crossed_limbs": ("limbs penetrate each other by {0} m; corpus limit {1} m", 3, "f"),
-    "sliding": ("feet slide: one moves near the floor in {0} of a second; corpus limit {1}", 0, "%"),
-    "pace": ("{2} moves at {0} times its fastest usual speed; corpus limit {1} times", 1, "f"),
+    "balance": ("leans {0} m beyond its support, at most {1} m in the corpus", 2, "f"),
+    "bounce": ("bounces: the centre of mass accelerates at {0} m/s^2, at most {1} in the corpus", 0, "f"),
+    "flight": ("floats: {0} of gravity is missing in the air, at most {1} in the corpus", 0, "%"),
+    "crossed_limbs": ("limbs intersect by {0} m, at most {1} m in the corpus", 3, "f"),
+    "sliding": ("feet slide: near the floor one moves in {0} of a second, at most {1} in the corpus", 0, "%"),
+    "pace": ("{2} is {0}x as fast as fast movement of the corpus, at most {1}x in the corpus", 1, "f"),
 }
 # Messages for residuals of the solve, and the thresholds of visibility in centimetres and degrees.
 _RESIDUAL_WORDS = {
-    "Contacts": ("a standing part is {0:.0f} cm off its place at {1:.1f} s", 4.0),
-    "Floor": ("a part is {0:.0f} cm below the floor at {1:.1f} s", 2.0),
+    "Contacts": ("a support is {0:.0f} cm off its place at {1:.1f} s", 4.0),
+    "Floor": ("a body part is {0:.0f} cm under the floor at {1:.1f} s", 2.0),
     "Limits": ("a joint is {0:.0f} degrees beyond its limit at {1:.1f} s", 8.0),
 }
 
 
 def headline(tween: Tween) -> str:
-    """Summarise a tween in a line: length, whether the corpus attests its moves, proof, and feet that stay in place.
+    """Summarise a tween in a line: length, proof, attestation, how closely the motion follows the path, and the feet.
 
     >>> from motionmind import Engine
     >>> from motionmind.tween.headline import headline
     >>> engine = Engine.load("ballet")
     >>> motion = engine.corpus.motion(engine.corpus.clips[0])
-    >>> headline(engine.tween(motion.posture(0), motion.posture(3)))
-    '3 moves in 1.5 s, every one seen in ballet; proven the best of its kind; feet stay in place'
+    >>> for sentence in headline(engine.tween(motion.posture(0), motion.posture(3))).split(". "):
+    ...     print(sentence)
+    5 moves, 2.0 s
+    Path optimal; every transition occurs in ballet
+    Motion follows it in 85% of joint-moves; feet stay in place
     """
     if tween.moves == 0:
         return "no move: A and B are the same posture"
-    parts = [f"{_count(tween.moves, 'move')} in {tween.motion.times[-1]:.1f} s, {seen_in(tween)}", _proof(tween)]
-    return "; ".join([*parts, *feet_staying(tween.motion)])
+    path = f"{_count(tween.moves, 'move')}, {tween.motion.times[-1]:.1f} s. {_proof(tween)}; {attestation(tween)}"
+    share = tween.followed[1:-1].mean() if tween.moves > 1 else 1.0  # A and B themselves are exact
+    return "; ".join([f"{path}. Motion follows it in {share:.0%} of joint-moves", *feet_staying(tween.motion)])
 
 
 def beyond(tween: Tween) -> list[str]:
-    """List the visible flaws of a tween, one message each: measures beyond the corpus, residuals, and a far bridge."""
-    said = [shown_beyond(name, one) for name, one in tween.shown.items() if one.is_beyond]
-    said += [
+    """List, one per line, the ways in which a tween exceeds everything in the corpus and makes a viewer wince."""
+    flaws = [shown_beyond(name, one) for name, one in tween.shown.items() if one.is_beyond]
+    flaws += [
         _RESIDUAL_WORDS[one.term][0].format(one.most, one.at)
         for one in tween.gave
         if one.most > _RESIDUAL_WORDS.get(one.term, ("", math.inf))[1]
@@ -58,9 +62,10 @@ def beyond(tween: Tween) -> list[str]:
     if tween.bridges:
         far = max(tween.bridges, key=lambda bridge: bridge.degrees)
         if far.degrees >= 30.0:  # nobody notices a smaller bridge
-            turn = f"{displayed(far.joint)} turns by {far.degrees:.0f} degrees in move {far.move + 1}"
-            said.append(f"{turn}, as in no clip")
-    return said
+            flaws.append(
+                f"{displayed(far.joint)} turns by {far.degrees:.0f} degrees in move {far.move + 1}, as in no clip"
+            )
+    return flaws
 
 
 def shown_beyond(name: str, one: Sighting) -> str:
@@ -78,29 +83,29 @@ def shown_beyond(name: str, one: Sighting) -> str:
     return words.format(value, most, displayed(one.part))
 
 
-def seen_in(tween: Tween) -> str:
-    """Describe whether the corpus attests the moves: "every one seen in ballet"."""
+def attestation(tween: Tween) -> str:
+    """Describe whether the corpus attests the transitions of joints: "every transition occurs in ballet"."""
     sources = (source for row in tween.sources for source in row if source is not None)
     times = Counter(source.corpus for source in sources)
     corpora = enumerated((displayed(name) for name, _ in times.most_common()), 3) or "the corpus"
     if not tween.bridges:
-        return f"{'seen' if tween.moves == 1 else 'every one seen'} in {corpora}"
+        return f"every transition occurs in {corpora}"
     joints = dict.fromkeys(displayed(bridge.joint) for bridge in tween.bridges)
-    return f"seen in {corpora} but for {_count(len(tween.bridges), 'move')} of {enumerated(joints, 3)}"
+    return f"every transition occurs in {corpora} except {len(tween.bridges)} of {enumerated(joints, 3)}"
 
 
 def _proof(tween: Tween) -> str:
     """Describe the proof of the cost."""
-    kind = "with this difference" if tween.differs else "of its kind"
+    rivals = " among paths that differ this much" * bool(tween.differs)
     if tween.status == "sampled":
-        return "drawn at random"
+        return "Path sampled"
     if tween.status == "optimal":
-        return f"proven the best {kind}"
-    ended = "ended early, " * (tween.status == "interrupted")
+        return f"Path optimal{rivals}"
+    ended = " (interrupted)" * (tween.status == "interrupted")
     if tween.lower_bound <= 0.0:
-        return f"{ended}not proven to be near the best"
+        return f"Path without a proven bound{ended}"
     percent = math.ceil(100.0 * (tween.cost / tween.lower_bound - 1.0) - 1e-6)
-    return f"{ended}proven to cost at most {percent}% more than the best {kind}"
+    return f"Path at most {percent}% above the optimum{rivals}{ended}"
 
 
 def feet_staying(motion: Motion) -> list[str]:

@@ -46,7 +46,7 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
     assert ran.err.count("\n") == 2
     report = json.loads(Path("report.json").read_text("utf-8"))
     table = {line.split()[0]: line for line in ran.out.splitlines()}
-    table.pop("beware", None)  # where it goes beyond the corpus
+    table.pop("warning", None)  # where it goes beyond the corpus
     assert list(table) == [
         "7",
         "moves",
@@ -59,7 +59,7 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
         "A",
         "B",
         "motion",
-        "danced",
+        "passages",
         "written",
     ]
     assert f" {report['moves']}, in " in table["moves"]
@@ -74,12 +74,12 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
     assert {"problem", "variables", "functions"} <= set(problem)
 
 
-def test_a_tween_is_told_in_plain_words_and_that_nothing_is_written(run: Run) -> None:
+def test_a_tween_is_summarised_in_a_line_and_a_missing_output_reported(run: Run) -> None:
     ran = run("tween", ARABESQUE, FIFTH, "--corpus", "ballet")
-    told, *rest = ran.out.splitlines()
-    said = "every one seen in ballet; proven the best of its kind; the left foot stays in place"
-    assert re.fullmatch(rf"7 moves in \d\.\d s, {said}", told)
-    assert rest == ["written   nothing: name a file by -o"]
+    summary, *rest = ran.out.splitlines()
+    proof = r"Path optimal; every transition occurs in ballet\. Motion follows it in \d+% of joint-moves"
+    assert re.fullmatch(rf"7 moves, \d\.\d s\. {proof}; the left foot stays in place", summary)
+    assert rest == ["written   nothing (-o FILE writes the result)"]
 
 
 @pytest.mark.parametrize(
@@ -201,14 +201,14 @@ def test_a_tween_says_what_a_viewer_sees_beyond_the_corpus(capsys: pytest.Captur
     motion = engine.corpus.motion(engine.corpus.clips[0])
     tween = engine.tween(motion.posture(0), motion.posture(1))
     print_tween(tween, [])
-    assert not [line for line in capsys.readouterr().out.splitlines() if line.startswith("beware")]
+    assert not [line for line in capsys.readouterr().out.splitlines() if line.startswith("warning")]
     away = np.linspace(0.0, 9.0, len(tween.motion))[:, None] * [1.0, 0.0, 0.0]
     carried = replace(tween, motion=replace(tween.motion, root=tween.motion.root + away))
     print_tween(carried, [])
-    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("beware"))
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("warning"))
     pace = carried.report()["shown"]["pace"]
-    assert line.startswith(f"beware    travel is {pace['value']:.1f} times as fast as")
-    assert line.endswith(f"more than {pace['most']:.1f} times")
+    assert line.startswith(f"warning   travel is {pace['value']:.1f}x as fast as fast movement of the corpus, ")
+    assert line.endswith(f"at most {pace['most']:.1f}x in the corpus")
 
 
 def test_the_report_has_the_keys_that_are_promised(run: Run) -> None:

@@ -1,4 +1,4 @@
-"""A tween in plain words."""
+"""The summary line of a tween, and its visible flaws."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from motionmind.tween.result import Tween
 @pytest.mark.parametrize(
     ("value", "said"),
     [
-        (0.35, "leans 0.35 m beyond its support; corpus limit 0.22 m"),
-        (0.2249, "leans 0.225 m beyond its support; corpus limit 0.216 m"),
-        (0.2162, "leans 0.2162 m beyond its support; corpus limit 0.2160 m"),
-        (0.216 + 1e-9, "leans 0.21600 m beyond its support; corpus limit 0.21600 m"),
+        (0.35, "leans 0.35 m beyond its support, at most 0.22 m in the corpus"),
+        (0.2249, "leans 0.225 m beyond its support, at most 0.216 m in the corpus"),
+        (0.2162, "leans 0.2162 m beyond its support, at most 0.2160 m in the corpus"),
+        (0.216 + 1e-9, "leans 0.21600 m beyond its support, at most 0.21600 m in the corpus"),
     ],
 )
 def test_what_exceeds_the_corpus_by_little_gets_the_digits_that_show_it(value: float, said: str) -> None:
@@ -37,8 +37,8 @@ def tween() -> Tween:
 
 def test_it_says_length_making_proof_and_feet(tween: Tween) -> None:
     assert headline(tween) == (
-        f"{tween.moves} moves in {tween.motion.times[-1]:.1f} s, every one seen in ballet; "
-        "proven the best of its kind; the left foot stays in place"
+        f"{tween.moves} moves, {tween.motion.times[-1]:.1f} s. Path optimal; every transition occurs in ballet. "
+        f"Motion follows it in {tween.followed[1:-1].mean():.0%} of joint-moves; the left foot stays in place"
     )
 
 
@@ -47,25 +47,25 @@ def test_it_says_length_making_proof_and_feet(tween: Tween) -> None:
     [
         (
             {"status": "bounded", "cost": 102.0, "lower_bound": 100.0},
-            "; proven to cost at most 2% more than the best of",
+            ". Path at most 2% above the optimum; ",
         ),
         (
             {"status": "bounded", "cost": 100.001, "lower_bound": 100.0},
-            "; proven to cost at most 1% more than the best",
+            ". Path at most 1% above the optimum; ",
         ),
-        ({"status": "bounded", "lower_bound": 0.0}, "; not proven to be near the best"),
+        ({"status": "bounded", "lower_bound": 0.0}, ". Path without a proven bound; "),
         (
             {"status": "interrupted", "cost": 150.0, "lower_bound": 100.0},
-            "; ended early, proven to cost at most 50% more than the best of its kind",
+            ". Path at most 50% above the optimum (interrupted); ",
         ),
-        ({"status": "sampled"}, "; drawn at random"),
-        ({"differs": (0.3,)}, "; proven the best with this difference"),
-        ({"bridges": (Bridge("neck", 0, 5.0, 5.0),)}, ", seen in ballet but for 1 move of neck; "),
+        ({"status": "sampled"}, ". Path sampled; "),
+        ({"differs": (0.3,)}, ". Path optimal among paths that differ this much; "),
+        ({"bridges": (Bridge("neck", 0, 5.0, 5.0),)}, "; every transition occurs in ballet except 1 of neck. "),
         (
             {"bridges": tuple(Bridge(name, 0, 5.0, 5.0) for name in "abcd")},
-            ", seen in ballet but for 4 moves of a, b, c and 1 more; ",
+            "; every transition occurs in ballet except 4 of a, b, c and 1 more. ",
         ),
-        ({"sources": ()}, ", every one seen in the corpus; "),
+        ({"sources": ()}, "; every transition occurs in the corpus. "),
         ({"path": np.zeros((1, 3), np.int32)}, "no move: A and B are the same posture"),
     ],
 )
@@ -95,13 +95,13 @@ def test_a_viewer_winces_at_what_the_corpus_never_shows_and_at_far_bridges(
 ) -> None:
     assert beyond(tween) == []
     for name, sighting, said in (
-        ("balance", Sighting(0.31, 0.1, "m"), "leans 0.31 m beyond its support; corpus limit 0.10 m"),
+        ("balance", Sighting(0.31, 0.1, "m"), "leans 0.31 m beyond its support, at most 0.10 m in the corpus"),
         (
             "sliding",
             Sighting(0.8, 0.4, ""),
-            "feet slide: one moves near the floor in 80% of a second; corpus",
+            "feet slide: near the floor one moves in 80% of a second, at most",
         ),
-        ("pace", Sighting(3.0, 1.5, "", "left_hip"), "left_hip moves at 3.0 times its fastest usual speed"),
+        ("pace", Sighting(3.0, 1.5, "", "left_hip"), "left_hip is 3.0x as fast as fast movement of the corpus"),
     ):
         (sentence,) = beyond(shown(tween, name, sighting))
         assert sentence.startswith(said)

@@ -307,8 +307,8 @@ def test_the_report_and_the_summary_say_why_it_takes_so_long(run: Run) -> None:
     ran = run("tween", A, B, "--corpus", "ballet", "--duration", 0.3, "--report", "r.json", "--details")
     assert "note: faster than anything in the corpus" in ran.err
     line = next(line for line in ran.out.splitlines() if line.startswith("pace "))
-    assert re.search(r"the corpus takes about 2\.\d+ s", line)
-    assert "the 1 move of usual length that the duration holds would not lead there" in line
+    assert re.search(r"typical duration for this distance: 2\.\d+ s", line)
+    assert "1 move of typical length fits the duration but does not reach B" in line
     tempo = read_report("r.json").tempo
     assert tempo is not None
     assert tempo.usual_moves == 1
