@@ -1,4 +1,4 @@
-"""Composes scores into movement: angles become rotations, feet meet the floor, and the body moves over them."""
+"""Compose scores into movement: convert angles to rotations, place feet on the floor, and move the body over them."""
 
 from __future__ import annotations
 
@@ -23,9 +23,8 @@ from motionmind.notation.score import Clip, Score, Setting
 from motionmind.notation.stance import Feet, place_legs
 from motionmind.notation.work import Work
 
-LIMIT_TOLERANCE = 0.5  # degrees past a limit that rounding explains
-FLOOR_TOLERANCE = 0.01  # metres under the floor that nobody sees
-REACH_TOLERANCE = 0.001  # metres by which a leg may miss the floor, or the weight its place
+LIMIT_TOLERANCE_DEG = 0.5  # rounding
+REACH_TOLERANCE_M = 0.001  # by which a leg may miss the floor, or the weight its place
 
 
 def compose(path: FilePath, clip: str | None = None) -> Motion:
@@ -39,7 +38,7 @@ def compose(path: FilePath, clip: str | None = None) -> Motion:
         The motion, in metres and seconds, on the score's body.
 
     Raises:
-        FormatError: the score is invalid, has no such clip, or demands what the body cannot do; names file, line and
+        FormatError: the score is invalid, has no such clip, or exceeds what the body can do; names file, line and
             word.
 
     >>> from pathlib import Path
@@ -67,21 +66,21 @@ def compose(path: FilePath, clip: str | None = None) -> Motion:
             f"holds {len(names) or 'no'} clips" + f"; choose one: {enumerated(names, 60)}" * bool(names), path=path
         )
     if clip is not None and clip not in names:
-        hint = did_you_mean(clip, names) or f"; there are {enumerated(names, 60)}"
+        hint = did_you_mean(clip, names) or f"; clips are {enumerated(names, 60)}"
         raise FormatError(f"no clip {quoted(clip)}{hint}", path=path)
     return motions(score, [found for found in score.clips if clip is None or found.name == clip])[0]
 
 
 def motions(score: Score, clips: Sequence[Clip] | None = None) -> list[Motion]:
-    """Compose a score's clips into movement, all of them or those given; FormatError as `compose`."""
+    """Compose some clips of a score into movement, all by default; FormatError as `compose`."""
     return [motion for _, motion in played(score, clips)]
 
 
 def played(score: Score, clips: Sequence[Clip] | None = None) -> list[tuple[list[Row], Motion]]:
-    """Play a score's clips, all of them or those given.
+    """Play some clips of a score, all by default.
 
     Returns:
-        For each clip its rows, which hold the names of all that it does, and its motion, in metres and seconds.
+        For each clip, its rows, with the names of its positions, and its motion, in metres and seconds.
 
     Raises:
         FormatError: as `compose`.
@@ -104,10 +103,10 @@ def played(score: Score, clips: Sequence[Clip] | None = None) -> list[tuple[list
 
 
 def posture(score: Score, name: str) -> Posture:
-    """Compose a posture that a score names, or one that it includes.
+    """Compose a named posture of a score or of its includes.
 
     Raises:
-        FormatError: there is none, or the body cannot take it.
+        FormatError: there is no such posture, or the body cannot take it.
     """
     if name not in score.postures:
         hint = did_you_mean(name, score.postures) or f"; there are {enumerated(score.postures, 60) or 'none'}"
@@ -118,13 +117,13 @@ def posture(score: Score, name: str) -> Posture:
 
 @dataclass(frozen=True)
 class _Placed:
-    """D distinct postures placed on the floor, each in the frame that it faces in, and which of them are taken.
+    """D distinct postures placed on the floor, each in the frame of its facing, and the posture of each row.
 
     Attributes:
-        taken: the posture of each row, among the D [T].
+        taken: index of each row's posture among the D [T].
         rotations: local [D, J, 4].
         root: [D, 3], metres.
-        weight: the share that each foot bears [D, F].
+        weight: share of the weight on each foot [D, F].
         rests: whether a foot is on the floor [D, F].
         balls, tips: places of the feet [D, F, 3], metres.
         back: unit vectors from the ball of a foot towards its heel [D, F, 3].
@@ -142,17 +141,17 @@ class _Placed:
     pivot: Floats
 
     def part(self, start: int, stop: int) -> _Placed:
-        """Return what the rows from `start` up to `stop` take."""
+        """Return the postures of the rows from `start` up to `stop`."""
         return replace(self, taken=self.taken[start:stop])
 
 
 def _place_distinct(body: Anatomy, rows: list[Row]) -> _Placed:
-    """Place the postures that rows describe as `_place_postures` does, each of them once."""
+    """Place the distinct postures of rows with `_place_postures`."""
     numbers: dict[object, int] = {}
     distinct: list[Row] = []
     taken = np.empty(len(rows), dtype=np.int64)
     for t, row in enumerate(rows):
-        # Settings are parsed and mirrored once each, so most that are equal are the same object.
+        # Settings are parsed and mirrored once each, so most equal ones are the same object.
         key = *map(id, row.limbs), row.up
         taken[t] = number = numbers.setdefault(key, len(distinct))
         if number == len(distinct):
@@ -161,7 +160,7 @@ def _place_distinct(body: Anatomy, rows: list[Row]) -> _Placed:
 
 
 def _place_postures(body: Anatomy, rows: list[Row]) -> _Placed:
-    """Place the postures that rows describe on the floor, or at their height above it; check what a body can do."""
+    """Place the postures of rows on the floor, or at their height above it; check the body's limits."""
     settings = _settings(body, rows)
     degrees = _degrees(body, settings, len(rows))
     rotations = body.rotations(degrees)
@@ -179,7 +178,7 @@ def _place_postures(body: Anatomy, rows: list[Row]) -> _Placed:
         stance = place_legs(body, body.leg, rotations, feet)
         rotations, root, stands = stance.rotations, stance.root, feet.stands[:, 0] | feet.stands[:, 1]
         _check_reach(rows, feet, stance.shortfall)
-        for t in np.flatnonzero(stance.imbalance > REACH_TOLERANCE)[:1]:
+        for t in np.flatnonzero(stance.imbalance > REACH_TOLERANCE_M)[:1]:
             raise rows[t].where.error("the weight cannot be brought over the feet")
         solved = body.degrees(rotations)
         for side in (0, 1):  # legs on the floor: the solved angles replace those written
@@ -205,7 +204,7 @@ def _place_postures(body: Anatomy, rows: list[Row]) -> _Placed:
 
 
 def _settings(body: Anatomy, rows: list[Row]) -> dict[tuple[str, str], list[Setting]]:
-    """Collect each limb's settings in all rows, by layer and side; a trunk's side is ""."""
+    """Collect each limb's settings in all rows, by layer and side; the side of a trunk is ""."""
     out = {}
     for index, (layer, joints) in enumerate(body.layers.items()):
         for number, side in enumerate(SIDES if body.paired(joints[0]) else ("",)):
@@ -226,7 +225,7 @@ def _degrees(body: Anatomy, settings: dict[tuple[str, str], list[Setting]], coun
 
 
 def _feet(body: Anatomy, settings: dict[tuple[str, str], list[Setting]], count: int) -> Feet:
-    """Convert what the rows say of legs on the floor to metres and radians."""
+    """Convert the rows' settings of legs on the floor to metres and radians."""
     assert body.leg is not None  # checked by the caller
     layer = next(layer for layer, joints in body.layers.items() if body.leg.hip in joints)
     legs = [settings[layer, side] for side in SIDES]
@@ -269,16 +268,16 @@ def _planted_limbs(body: Anatomy, settings: dict[tuple[str, str], list[Setting]]
 
 
 def _lift(body: Anatomy, rows: list[Row], rotations: Floats, root: Floats, stands: Bools) -> Floats:
-    """Return by how much to lift each posture [T], metres, to bring its lowest point to the floor or its row's height.
+    """Return the lift of each posture [T], metres, that brings its lowest point to the floor or its row's height.
 
-    If a leg stands the height is right already, and nothing may be under the floor.
+    A standing leg already fixes the height; then nothing may be under the floor.
     """
     lowest, joints = lowest_point(body, rotations, root)
     for t in np.flatnonzero(stands):
         row = rows[t]
         if row.up is not None:
             raise row.where.error(f"up {row.up:g}, but a leg stands; give the legs a position in the air")
-        if lowest[t] < -FLOOR_TOLERANCE:
+        if lowest[t] < -0.01:  # metres; less is invisible
             joint = body.skeleton.names[joints[t]].replace("_", " ")
             raise row.where.error(f"the {joint} would be {-100.0 * lowest[t]:.0f} cm under the floor")
     up = np.array([(row.up or 0.0) / 100.0 for row in rows])
@@ -286,17 +285,17 @@ def _lift(body: Anatomy, rows: list[Row], rotations: Floats, root: Floats, stand
 
 
 def _check_reach(rows: list[Row], feet: Feet, shortfall: Floats) -> None:
-    """Raise FormatError if a leg cannot reach its place, or nothing bears the weight."""
+    """Raise FormatError if a leg cannot reach its place, or no foot bears weight."""
     for t in np.flatnonzero(feet.touches.any(axis=1) & ~feet.stands.any(axis=1))[:1]:
         raise rows[t].where.error("a leg touches the floor, but none stands on it")
     weightless = feet.stands.any(axis=1) & ~(feet.stands & (feet.weight > 0.0)).any(axis=1)
     for t in np.flatnonzero(weightless)[:1]:
         raise rows[t].where.error("no foot bears weight")
-    for t, side in np.argwhere(shortfall > REACH_TOLERANCE):
+    for t, side in np.argwhere(shortfall > REACH_TOLERANCE_M):
         far = f"{100.0 * shortfall[t, side]:.0f} cm"
         if feet.touches[t, side]:
-            raise rows[t].where.error(f"the {SIDES[side]} foot should touch the floor, and stays {far} above it")
-        raise rows[t].where.error(f"the {SIDES[side]} foot is {far} further from the hip than the leg is long")
+            raise rows[t].where.error(f"the {SIDES[side]} foot cannot touch the floor: it stays {far} above it")
+        raise rows[t].where.error(f"the {SIDES[side]} foot is {far} beyond the reach of the leg")
 
 
 def _check_limits(body: Anatomy, rows: list[Row], degrees: dict[str, Floats]) -> None:
@@ -304,13 +303,13 @@ def _check_limits(body: Anatomy, rows: list[Row], degrees: dict[str, Floats]) ->
     for name in body.skeleton.names:
         _, joint = body.anatomy(name)
         swing = np.delete(degrees[name], "xyz".index(joint.long), axis=1)
-        for t in np.flatnonzero(np.linalg.norm(swing, axis=1) > 180.0 + LIMIT_TOLERANCE)[:1]:
+        for t in np.flatnonzero(np.linalg.norm(swing, axis=1) > 180.0 + LIMIT_TOLERANCE_DEG)[:1]:
             called = " and ".join(word for word, angle in joint.angles.items() if "xyz"[angle.axis] != joint.long)
             raise rows[t].where.error(f"{name.replace('_', ' ')}: {called} together are more than half a turn")
         for word, angle in joint.angles.items():
             values = angle.sign * degrees[name][:, angle.axis]
             low, high = angle.range
-            for t in np.flatnonzero((values < low - LIMIT_TOLERANCE) | (values > high + LIMIT_TOLERANCE))[:1]:
+            for t in np.flatnonzero((values < low - LIMIT_TOLERANCE_DEG) | (values > high + LIMIT_TOLERANCE_DEG))[:1]:
                 over = values[t] > high
                 called = word if over or not angle.opposite else angle.opposite
                 value, limit = (values[t], high) if over else (values[t], low)
@@ -338,21 +337,21 @@ def _join_moves(body: Anatomy, name: str, rows: list[Row], placed: _Placed) -> M
 
 
 def _rounded(rotations: Floats) -> Floats:
-    """Return rotations [..., 4] as they are told in a score's motion."""
+    """Round rotations [..., 4] for the motion of a score."""
     return np.asarray(np.round(rot.canonical(rotations), 8) + 0.0)
 
 
 def _steps(rows: list[Row], placed: _Placed, turn: Floats, centre: Floats) -> Floats:
-    """Return how far the body travels from each row to the next [T - 1, 3], metres.
+    """Return the displacement of the body from each row to the next [T - 1, 3], metres.
 
-    Feet that bear weight before and after stay where they are, in the mean where they disagree; where none does, feet
-    that rest on the floor stay, and where none rests the centre of mass goes as far as the row says.
+    Feet that bear weight before and after stay in place; if they disagree, their mean does. Without such feet, feet
+    that rest on the floor stay. Without these, the centre of mass moves by the row's `go`.
 
     Args:
         rows: the rows.
         placed: their postures.
-        turn: where each faces [T, 4].
-        centre: their centres of mass [T, 3], turned, metres.
+        turn: facing of each row [T, 4].
+        centre: centres of mass [T, 3], turned, metres.
     """
     taken = placed.taken
     weight, rests = placed.weight[taken], placed.rests[taken]

@@ -1,4 +1,4 @@
-"""Reads lines that are postures: how the body gets there, then a cell for each layer."""
+"""Read the lines of postures: the move, then a cell for each layer."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ class Row(NamedTuple):
     """One posture and the move that leads to it.
 
     Attributes:
-        where: the line that describes it.
+        where: the line of the posture.
         limbs: by layer, the settings of the left and the right limb; for a trunk, the same twice.
         words: by layer, their names.
-        face: where the body faces, degrees to the left of the audience.
-        up: height of its lowest point in the air, centimetres; None on the floor.
-        seconds: duration of the move; None for a beginning.
-        go: distance that the weight travels in the move to the body's left and ahead, centimetres, if no foot stays on
-            the floor.
-        faced: whether it, or a line of its phrase before it, says where the body faces; else that follows from where
-            it faced before the phrase.
+        face: facing, degrees to the left of the audience.
+        up: height of the lowest point in the air, centimetres; None on the floor.
+        seconds: duration of the move; None for a start posture.
+        go: displacement of the weight in the move to the body's left and ahead, centimetres, if no foot stays on the
+            floor.
+        faced: whether this line, or an earlier one of its phrase, sets an absolute facing; else the facing is relative
+            to the one before the phrase.
     """
 
     where: Where
@@ -45,20 +45,20 @@ class Row(NamedTuple):
     faced: bool = False
 
     def same_posture(self, other: Row) -> bool:
-        """Return whether the postures are the same, whatever moves lead to them."""
+        """Return whether the postures are the same, regardless of the moves that lead to them."""
         return self.limbs == other.limbs and (self.face - other.face) % 360.0 == 0.0 and self.up == other.up
 
 
 @dataclass
 class _Cell:
-    """The first cell of a line: how the body gets to its posture.
+    """The first cell of a line: the move to its posture.
 
     Attributes:
-        face: where the body faces then, degrees to the left of the audience, or of where it faced before.
-        faced: whether it is of the audience.
-        counts: None for a beginning.
+        face: facing after the move, degrees to the left of the audience, or of the facing before.
+        faced: whether `face` is relative to the audience.
+        counts: duration; None for a start posture.
         up: height in the air, centimetres; None on the floor.
-        go: how far it goes to its left and ahead, centimetres.
+        go: displacement to the left and ahead, centimetres.
     """
 
     face: float = 0.0
@@ -68,7 +68,7 @@ class _Cell:
     go: tuple[float, float] = (0.0, 0.0)
 
 
-# A line that is a posture: its first cell, and of each other that is not empty the layer, the settings and their names.
+# A parsed posture: the first cell, and for each other non-empty cell the layer, the settings and their names.
 _Posture = tuple[_Cell, list[tuple[int, tuple[Setting, Setting], tuple[str, str]]]]
 
 
@@ -79,16 +79,16 @@ def is_hold(text: str) -> bool:
 
 
 def posture_row(posture: Phrase) -> Row:
-    """Return the row of a single posture, whose line lacks the first cell; FormatError if it makes no sense."""
+    """Return the row of a single posture, whose line lacks the first cell; FormatError if it is invalid."""
     (line,) = posture.lines
     return read_row(posture.score, replace(line, text=f"start | {line.text}"), None, 1.0, Work())
 
 
 def read_row(score: Score, line: Line, before: Row | None, beat: float, work: Work) -> Row:
-    """Return the row that a line describes after the row `before`; a count lasts `beat` seconds.
+    """Return the row of a line after the row `before`; a count lasts `beat` seconds.
 
     Raises:
-        FormatError: the line makes no sense; names file and line.
+        FormatError: the line is invalid; names file and line.
     """
     first, cells = work.once((score, line.text), lambda: _parse_posture(score, line, work))
     limbs = list(before.limbs) if before else [_NO_SETTINGS] * len(score.body.layers)
@@ -108,7 +108,7 @@ def read_row(score: Score, line: Line, before: Row | None, beat: float, work: Wo
 
 
 def _parse_posture(score: Score, line: Line, work: Work) -> _Posture:
-    """Parse a line that is a posture."""
+    """Parse the line of a posture."""
     first, *cells = (cell.strip() for cell in line.text.split("|"))
     names = list(score.body.layers)
     if len(cells) > len(names):
@@ -124,7 +124,7 @@ def _parse_posture(score: Score, line: Line, work: Work) -> _Posture:
 
 
 def _parse_cell(score: Score, layer: str, cell: str, where: Where) -> tuple[tuple[Setting, Setting], tuple[str, str]]:
-    """Return the settings that a layer's cell stands for, and their names."""
+    """Return the settings of a layer's cell, and their names."""
     return score.cell(layer, cell, where), score.cell_words(layer, cell)
 
 
@@ -141,7 +141,7 @@ def _first_cell(score: Score, text: str, where: Where) -> _Cell:
     while words:
         word = words.popleft()
         if word not in readers:
-            raise where.error(f"{quoted(word)} is no way to move; there are a number of counts, up, face, turn, go")
+            raise where.error(f"{quoted(word)} does not describe a move; give a number of counts, up, face, turn or go")
         readers[word](score, cell, words, where)
     return cell
 
@@ -168,17 +168,17 @@ def _read_face(score: Score, cell: _Cell, words: deque[str], where: Where) -> No
 def _read_turn(_: Score, cell: _Cell, words: deque[str], where: Where) -> None:
     """Read the words after `turn`."""
     if len(words) < 2 or words[1] not in SIDES:
-        raise where.error("turn DEGREES left, or right")
+        raise where.error("give turn DEGREES left, or right")
     degrees = number(words.popleft(), "turn", where)
     if not 0.0 <= degrees < 180.0:
-        raise where.error(f"turn {degrees:g}: a move turns less than half round; write more of them")
+        raise where.error(f"turn {degrees:g}: a move turns by less than 180 degrees; use several moves")
     cell.face += -degrees if words.popleft() == "right" else degrees
 
 
 def _read_go(_: Score, cell: _Cell, words: deque[str], where: Where) -> None:
     """Read the words after `go`."""
     if not words or words[0] not in _DIRECTIONS:
-        raise where.error("go ahead, back, left or right, and how many centimetres")
+        raise where.error("give go, a direction (ahead, back, left, right) and centimetres")
     while words and words[0] in _DIRECTIONS:
         direction = words.popleft()
         far = number(_next(words), f"go {direction}", where)
@@ -193,5 +193,5 @@ def _counts(word: str, where: Where) -> float:
     except (ValueError, ZeroDivisionError, OverflowError):
         counts = 0.0
     if not 0.01 <= counts <= 1000.0:
-        raise where.error(f"{quoted(word)} is no number of counts")
+        raise where.error(f"{quoted(word)} is not a number of counts from 0.01 to 1000")
     return counts

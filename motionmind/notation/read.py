@@ -1,4 +1,4 @@
-"""Reads scores: from a file's lines to positions and phrases; docs/notation.md explains the notation."""
+"""Read scores: parse lines into positions and phrases; docs/notation.md explains the notation."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ from motionmind.notation.score import (
 )
 from motionmind.notation.sources import place_of
 
-MAX_INCLUDES = 100  # scores that one is made of
-MAX_OPEN = 20  # words that a phrase leaves open
+MAX_INCLUDES = 100  # scores included by one
+MAX_OPEN_WORDS = 20  # of a phrase
 
 NAME = re.compile(r"[^\W_][\w-]*")
 
-# Words of a standing leg, with the least and greatest number that may follow; `lean` has a direction before its number.
+# Words of a standing leg, with the range of the number after them; `lean` has a direction before its number.
 STANDING = {
     "out": (-200.0, 200.0),
     "ahead": (-200.0, 200.0),
@@ -59,7 +59,7 @@ def read_score(path: FilePath) -> Score:
     """Read a score, with the scores that it includes.
 
     Raises:
-        FormatError: something in it is not understood; names file, line and word.
+        FormatError: the score is invalid; names file, line and word.
 
     >>> from pathlib import Path
     >>> text = '''title  Two bends of the knees
@@ -82,10 +82,10 @@ def read_score(path: FilePath) -> Score:
 
 
 def read_scores(paths: Iterable[Path]) -> tuple[list[Score], list[Path]]:
-    """Read several scores, and each that they include once; return them, and all files that they are made of.
+    """Read several scores, and each of their includes once; return the scores, and all files read.
 
     Raises:
-        FormatError: something in one of them is not understood; names file, line and word.
+        FormatError: a score is invalid; names file, line and word.
     """
     known: dict[Path, Score] = {}
     scores = [_read(path, (), known, len(known) + MAX_INCLUDES) for path in paths]
@@ -94,8 +94,14 @@ def read_scores(paths: Iterable[Path]) -> tuple[list[Score], list[Path]]:
 
 
 def _read(path: Path, above: tuple[Path, ...], known: dict[Path, Score], most: int) -> Score:
-    """Read a score that those `above` include; each file once, for those that are `known` by their resolved paths, of
-    which there may be so many at `most`."""
+    """Read a score, and each file once.
+
+    Args:
+        path: the score.
+        above: the scores that include it, outermost first.
+        known: the scores read so far, by resolved path; extended in place.
+        most: the maximum number of `known`.
+    """
     lines = [Line(Where(str(path), number), text) for number, text in enumerate(read_lines(path), start=1)]
     blocks = list(_blocks(lines))
     heads = [head for head, _ in blocks if _word(head) == "include"]
@@ -118,15 +124,15 @@ def _word(head: Line) -> str:
 def _read_include(
     path: Path, head: Line, above: tuple[Path, ...], known: dict[Path, Score], most: int
 ) -> tuple[Where, str, Score]:
-    """Read the score of an `include` heading; return its line, the name that it gets, and the score."""
+    """Read the score of an `include` heading; return its line, its new name, and the score."""
     file, _, name = (part.strip() for part in head.text.removeprefix("include").partition(" as "))
     try:
         included = place_of(path, file)
         if not included.is_file():
             raise head.where.error(f"there is no file {included}")
-        # Errors quote what they do not understand: no lines of what is no score, though a link to it has such a name.
+        # Errors quote invalid lines, so files other than scores stay unread, even behind a link named like a score.
         if {included.suffix.lower(), included.resolve().suffix.lower()} != {".score"}:
-            raise head.where.error(f"{file} is no score; the name of one ends in .score")
+            raise head.where.error(f"{file} is not a score, whose name ends in .score")
         if included.resolve() in above:
             raise head.where.error(f"{file} includes itself")
         place = included.resolve()
@@ -162,12 +168,12 @@ def _blocks(lines: list[Line]) -> Iterator[tuple[Line, list[Line]]]:
 
 
 def _join(parts: list[Line]) -> Line:
-    """Join lines that go on in the next."""
+    """Join a line with its continuations."""
     return parts[0] if len(parts) == 1 else Line(parts[0].where, " ".join(part.text for part in parts))
 
 
 def _find_body(path: Path, heads: list[Line], included: list[Score]) -> Anatomy:
-    """Return the body that a score names, a bundled one or a file beside the score; else that of its first include."""
+    """Return the body named by a score, bundled or in a file beside it; else the body of its first include."""
     for head in heads:
         rest = head.text.removeprefix("body").strip()
         if _word(head) == "body":
@@ -194,10 +200,10 @@ def _read_block(score: Score, head: Line, inner: list[Line]) -> None:
         layers = tuple(score.body.layers)
         known = HEADINGS + layers
         raise where.error(
-            f"{quoted(word)} is no heading{did_you_mean(word, known) or f'; there are {enumerated(known, 20)}'}"
+            f"{quoted(word)} is not a heading{did_you_mean(word, known) or f'; headings are {enumerated(known, 20)}'}"
         )
     if inner and word not in ("phrase", "clip"):
-        raise inner[0].where.error(f"indented, but there is nothing to say below {word}")
+        raise inner[0].where.error(f"indented, but {word} has no lines below it")
     if word == "title":
         score.title = rest
     elif word == "tempo":
@@ -222,15 +228,15 @@ def _add_phrase(score: Score, word: str, rest: str, inner: list[Line], where: Wh
     if bracket and (word == "clip" or not arguments.endswith(")")):
         raise where.error(f"{quoted(rest, 80)}: write phrase NAME, or phrase NAME (WORD, WORD)")
     words = tuple(part.strip() for part in arguments.removesuffix(")").split(",")) if bracket else ()
-    if len(words) > MAX_OPEN:
-        raise where.error(f"{len(words)} open words; a phrase has {MAX_OPEN} at most")
+    if len(words) > MAX_OPEN_WORDS:
+        raise where.error(f"{len(words)} open words; a phrase has at most {MAX_OPEN_WORDS}")
     for i, open_word in enumerate(words):
         _check_name(open_word, words[:i], where)
     name = name.strip()
     known = score.phrases.get(name)
     _check_name(name, (name,) if known and known.score is score else (), where)
     if name in ("start", "tempo") or name[0].isdigit():
-        raise where.error(f"{quoted(name)} cannot be a phrase's name: a line that begins so is something else")
+        raise where.error(f"{quoted(name)} cannot be a phrase's name: such lines have another meaning")
     if not inner:
         raise where.error(f"{word} {name} has no lines")
     make = Clip if word == "clip" else Phrase
@@ -238,7 +244,7 @@ def _add_phrase(score: Score, word: str, rest: str, inner: list[Line], where: Wh
 
 
 def _include(score: Score, where: Where, name: str, other: Score) -> None:
-    """Add another score's vocabulary and phrases, or all of it under a name."""
+    """Add another score's vocabulary and phrases, or the whole score under a name."""
     if other.body.path != score.body.path:
         raise where.error(f"{other.path} is for {other.body.skeleton.name}, this score for {score.body.skeleton.name}")
     if name:
@@ -257,9 +263,9 @@ def _check_name(name: str, taken: Container[str], where: Where) -> str:
     if not NAME.fullmatch(name):
         raise where.error(f"{quoted(name)} cannot be a name: use letters, digits and hyphens")
     if name in (*SIDES, "neutral"):
-        raise where.error(f"{quoted(name)} cannot be a name: it means something already")
+        raise where.error(f"{quoted(name)} cannot be a name: it is reserved")
     if name in taken:
-        raise where.error(f"{quoted(name)} is there already")
+        raise where.error(f"{quoted(name)} is already defined")
     return name
 
 
@@ -267,7 +273,7 @@ def _add_entry(score: Score, layer: str, line: Line) -> None:
     """Add a line of a vocabulary, or a facing, to the score."""
     name, equals, text = (part.strip() for part in line.text.partition("="))
     if not equals:
-        raise line.where.error(f"{quoted(line.text, 80)}: write NAME = what it is")
+        raise line.where.error(f"{quoted(line.text, 80)}: write NAME = DEFINITION")
     if layer == "facings":
         if not NUMBER.fullmatch(text):
             raise line.where.error(f"{quoted(text)}: a facing is degrees to the left of the audience")
@@ -281,10 +287,10 @@ def _add_entry(score: Score, layer: str, line: Line) -> None:
 
 
 def _parse_position(score: Score, layer: str, text: str, where: Where) -> Position:
-    """Parse a position's definition: one part, or those of the leading limb and of the other around a slash."""
+    """Parse a position's definition: one part, or LEADING / OTHER limb."""
     parts = text.split("/")
     if len(parts) > 1 and not score.paired(layer):
-        raise where.error(f"{quoted(text)}: a / is for two limbs, and the {layer} is none")
+        raise where.error(f"{quoted(text)}: a / separates two limbs, but the {layer} is one part")
     if len(parts) > 2:
         raise where.error(f"{quoted(text)}: one / too many")
     positions = [_parse_terms(score, layer, part, where) for part in parts]
@@ -292,7 +298,7 @@ def _parse_position(score: Score, layer: str, text: str, where: Where) -> Positi
         return positions[0]
     for part, position in zip(parts, positions, strict=True):
         if position.lead != position.other:
-            raise where.error(f"{quoted(part.strip())} is for both sides; beside a / goes what one limb does")
+            raise where.error(f"{quoted(part.strip())} is for both sides; each side of / is one limb")
     return Position(positions[0].lead, positions[1].lead, True)
 
 
@@ -302,7 +308,7 @@ def _parse_terms(score: Score, layer: str, text: str, where: Where) -> Position:
     for term in text.split(","):
         words = term.split()
         if not words:
-            raise where.error(f"{quoted(text.strip())}: nothing between commas" if text.strip() else "nothing is said")
+            raise where.error(f"{quoted(text.strip())}: nothing between commas" if text.strip() else "empty definition")
         setting = _parse_setting(score, layer, words, where)
         if setting is not None:
             sided = bool(setting.get("lean left")) if score.paired(layer) else setting != mirrored(setting)
@@ -324,7 +330,7 @@ def _parse_setting(score: Score, layer: str, words: list[str], where: Where) -> 
         if first != "touch":
             return {first: 1.0} | _parse_standing(words[1:], where)
         if len(words) != 3 or words[1] != "towards":
-            raise where.error("touch towards DEGREES: 0 to the front, 90 to the side, 180 to the back")
+            raise where.error("write touch towards DEGREES: 0 to the front, 90 to the side, 180 to the back")
         return {"touch": 1.0, "towards": number(words[2], "touch towards", where)}
     if stands and (first == "lean" or (first in STANDING and numbered)):
         return _parse_standing(words, where)
@@ -339,7 +345,7 @@ def _parse_angles(score: Score, layer: str, words: list[str], where: Where) -> S
     if not set(parts) <= set(joints):
         if NUMBER.fullmatch(words[-1]):
             known = [*joints, *score.body.groups, *SUPPORTS, *STANDING]
-            raise where.error(f"{quoted(first)} is no joint of the {layer}{did_you_mean(first, known)}")
+            raise where.error(f"{quoted(first)} is not a joint of the {layer}{did_you_mean(first, known)}")
         return None
     setting: dict[object, float] = {}
     for name, value in _pairs(words[1:], where):
@@ -349,11 +355,11 @@ def _parse_angles(score: Score, layer: str, words: list[str], where: Where) -> S
             names |= {angle.opposite: (key, -1.0) for key, angle in angles.items() if angle.opposite}
             if name not in names:
                 hint = did_you_mean(name, names) or f"; it has {', '.join(names)}"
-                raise where.error(f"{quoted(name)} is no angle of the {first}{hint}")
+                raise where.error(f"{quoted(name)} is not an angle of the {first}{hint}")
             key, sign = names[name]
             setting[joint, angles[key].axis] = sign * angles[key].sign * shares.get(key, 1.0) * value
     if not setting:
-        raise where.error(f"{first}: say which angle, and how many degrees")
+        raise where.error(f"{first}: write an angle and degrees")
     return setting
 
 
@@ -364,15 +370,15 @@ def _parse_standing(words: list[str], where: Where) -> dict[object, float]:
     for word in rest:
         direction = next(rest, "") if word == "lean" else ""
         if word == "lean" and direction not in LEAN:
-            raise where.error(f"lean {direction}: lean ahead, back, left or right, and how many centimetres")
+            raise where.error(f"lean {direction}: write lean, a direction (ahead, back, left, right) and centimetres")
         known = (*STANDING, "lean")
         if word not in known:
-            hint = did_you_mean(word, known) or f"; there are {', '.join(known)}"
-            raise where.error(f"{quoted(word)} means nothing of a leg that stands{hint}")
+            hint = did_you_mean(word, known) or f"; words are {', '.join(known)}"
+            raise where.error(f"{quoted(word)} does not describe a standing leg{hint}")
         value = number(next(rest, ""), f"{word} {direction}".strip(), where)
         least, most = STANDING.get(word, (-200.0, 200.0))
         if not least <= value <= most:
-            raise where.error(f"{word} {value:g}: from {least:g} to {most:g}")
+            raise where.error(f"{word} {value:g}: must be from {least:g} to {most:g}")
         key, sign = LEAN[direction] if direction else (word, 1.0)
         setting[key] = sign * value
     return setting

@@ -1,4 +1,4 @@
-"""Plays phrases out into rows: each posture in full, and the move that leads to it."""
+"""Play phrases into rows: each posture in full, and the move that leads to it."""
 
 from __future__ import annotations
 
@@ -12,35 +12,35 @@ from motionmind.display import displayed
 from motionmind.errors import quoted
 from motionmind.notation.posture_line import Row, is_hold, read_row
 from motionmind.notation.score import Clip, Line, Phrase, Score, Where, tempo
-from motionmind.notation.work import BEGINNING, LONG, Work
+from motionmind.notation.work import N_CHARS_PER_WORK, N_WORK_PER_CALL, Work
 
-MAX_DEPTH = 100  # of phrases, and ways of doing them, within one another; deeper ones call themselves
-MAX_POSTURES = 100_000  # of a clip
+MAX_DEPTH = 100  # nested phrases and modifiers; deeper ones call themselves
+MAX_CLIP_POSTURES = 100_000
 
-# Plays a phrase out after the row before it, if any; the rows include the phrase's own beginning if it has one.
+# Plays a phrase after the row before it, if any; the rows include the phrase's own start posture if it has one.
 _Player = Callable[[Row | None], list[Row]]
 
 
 def play_phrase(phrase: Phrase, work: Work | None = None) -> list[Row]:
-    """Play a phrase or clip out from its beginning.
+    """Play a phrase or clip from its beginning.
 
     Args:
         phrase: the phrase.
-        work: the work so far, if several are played within one limit.
+        work: the work so far, if several phrases share one limit.
 
     Returns:
         Its postures, at least one.
 
     Raises:
-        FormatError: a line makes no sense, or there are too many postures, or too much work; names file and line.
+        FormatError: a line is invalid, or there are too many postures, or too much work; names file and line.
     """
     return _player(phrase, {}, phrase.score.tempo, 0, work or Work())(None)
 
 
 def check_words(phrase: Phrase, work: Work) -> None:
-    """Look up every word of a phrase, whether or not anything calls it; lines with open words are skipped.
+    """Look up every word of a phrase, even if nothing calls it; skip lines with open words.
 
-    What is looked up is remembered in `work`, and does not count as work.
+    The results are cached in `work`, and do not count as work.
 
     Raises:
         FormatError: a word is unknown; names file and line.
@@ -57,16 +57,16 @@ def check_words(phrase: Phrase, work: Work) -> None:
 
 
 def _player(phrase: Phrase, words: dict[str, str], counts: float, depth: int, work: Work) -> _Player:
-    """Return the player of a phrase with its open words filled by `words`, at `counts` a minute."""
+    """Return the player of a phrase with its open words filled from `words`, at `counts` per minute."""
 
     def run(before: Row | None) -> list[Row]:
         if depth > MAX_DEPTH:
             raise phrase.where.error(f"{phrase.name} calls itself")
-        work.add(BEGINNING, phrase.where)
+        work.add(N_WORK_PER_CALL, phrase.where)
         pace, rows = counts, list[Row]()
         for written in phrase.lines:
             line = _fill(written, words, work)
-            work.add(1 + len(line.text) // LONG, line.where)
+            work.add(1 + len(line.text) // N_CHARS_PER_WORK, line.where)
             standing = rows[-1] if rows else before
             if _is_tempo(line.text):
                 pace = tempo(line.text.partition(" ")[2].strip(), line.where)
@@ -84,8 +84,8 @@ def _player(phrase: Phrase, words: dict[str, str], counts: float, depth: int, wo
 
 def _check_count(rows: list[Row], where: Where) -> list[Row]:
     """Return the rows; FormatError if there are too many."""
-    if len(rows) > MAX_POSTURES:
-        raise where.error(f"more than {MAX_POSTURES} postures")
+    if len(rows) > MAX_CLIP_POSTURES:
+        raise where.error(f"more than {MAX_CLIP_POSTURES} postures")
     return rows
 
 
@@ -94,7 +94,7 @@ def _fill(line: Line, words: dict[str, str], work: Work) -> Line:
     if not words:
         return line
     pattern = _whole_words(words)
-    work.add(sum(len(words[found]) for found in re.findall(pattern, line.text)) // LONG, line.where)
+    work.add(sum(len(words[found]) for found in re.findall(pattern, line.text)) // N_CHARS_PER_WORK, line.where)
     text = re.sub(pattern, lambda found: words[found[0]], line.text)
     if not text.strip():
         raise line.where.error("nothing is left of this line")
@@ -102,30 +102,30 @@ def _fill(line: Line, words: dict[str, str], work: Work) -> Line:
 
 
 def _whole_words(words: Iterable[str]) -> str:
-    """Return a pattern that finds any of these words as a whole."""
+    """Return a pattern that matches any of these words as a whole."""
     return rf"(?<![\w-])(?:{'|'.join(map(re.escape, words))})(?![\w-])"
 
 
 def _continue(rows: list[Row], before: list[Row], where: Where) -> list[Row]:
-    """Return the rows that continue those before; a beginning must be the posture reached, and is dropped."""
+    """Return the rows that continue the rows before; a start posture must equal the last one, and is dropped."""
     if not before or rows[0].seconds is not None:
         return rows
     if not rows[0].same_posture(before[-1]):
-        raise where.error(f"begins otherwise than what comes before it ends: {_difference(before[-1], rows[0])}")
+        raise where.error(f"starts in another posture than the line before it ends: {_difference(before[-1], rows[0])}")
     return rows[1:]
 
 
 def _difference(before: Row, after: Row) -> str:
     """Describe how two postures differ."""
     parts = [
-        f"{displayed(' / '.join(dict.fromkeys(was)))}, then {displayed(' / '.join(dict.fromkeys(is_)))}"
-        for a, b, was, is_ in zip(before.limbs, after.limbs, before.words, after.words, strict=True)
+        f"{displayed(' / '.join(dict.fromkeys(old)))}, then {displayed(' / '.join(dict.fromkeys(new)))}"
+        for a, b, old, new in zip(before.limbs, after.limbs, before.words, after.words, strict=True)
         if a != b
     ]
     if (before.face - after.face) % 360.0:
         parts.append(f"facing {before.face:g}, then {after.face:g}")
     if before.up != after.up:
-        parts.append("higher up, or lower")
+        parts.append("at another height")
     return f"{'; '.join(parts)} (line {before.where.line} and line {after.where.line})"
 
 
@@ -138,24 +138,24 @@ def _is_tempo(text: str) -> bool:
 
 def _call(phrase: Phrase, line: Line, counts: float, depth: int, work: Work) -> _Player:
     """Return the player of a line `NAME (WORDS), HOW, HOW`."""
-    call, *ways = _split_outside_brackets(line.text)
+    call, *modifiers = _split_outside_brackets(line.text)
     match = re.fullmatch(r"([\w.-]++)\s*+(\(([^)]*+)\))?", call)
     if not match:
         raise line.where.error(
-            f"{quoted(line.text, 80)}: a posture has cells with | between, a phrase is called by its name"
+            f"{quoted(line.text, 80)}: neither a posture, whose cells are separated by |, nor the name of a phrase"
         )
-    if depth + len(ways) > MAX_DEPTH:
-        raise line.where.error(f"{len(ways)} ways to do a phrase are too many")
+    if depth + len(modifiers) > MAX_DEPTH:
+        raise line.where.error(f"{len(modifiers)} modifiers are too many")
     called = phrase.score.phrase(match[1], line.where)
     given = [part.strip() for part in match[3].split(",")] if match[2] else []
     if not all(given):
-        raise line.where.error(f"{quoted(line.text, 80)}: an open word is filled with nothing")
+        raise line.where.error(f"{quoted(line.text, 80)}: an open word is empty")
     if len(given) != len(called.open):
-        raise line.where.error(f"{called.name} leaves {len(called.open)} words open, and {len(given)} are given")
+        raise line.where.error(f"{called.name} has {len(called.open)} open words, but {len(given)} are given")
     own = called.score is not phrase.score
     pace = called.score.tempo if own and isinstance(called, Clip) else counts
-    run = _player(called, dict(zip(called.open, given, strict=True)), pace, depth + 1 + len(ways), work)
-    for how in ways:
+    run = _player(called, dict(zip(called.open, given, strict=True)), pace, depth + 1 + len(modifiers), work)
+    for how in modifiers:
         run = _modify(_counted(run, line.where, work), how, phrase, line, counts, depth, work)
     return run
 
@@ -175,7 +175,7 @@ def _split_outside_brackets(text: str) -> tuple[str, ...]:
 
 
 def _counted(run: _Player, where: Where, work: Work) -> _Player:
-    """Return a player whose rows count as work again, for something is done to each of them."""
+    """Return a player whose rows count as work again, since a modifier changes each of them."""
 
     def counted(before: Row | None) -> list[Row]:
         rows = run(before)
@@ -186,7 +186,7 @@ def _counted(run: _Player, where: Where, work: Work) -> _Player:
 
 
 def _modify(run: _Player, how: str, phrase: Phrase, line: Line, counts: float, depth: int, work: Work) -> _Player:
-    """Return a player that plays a phrase out the way `how` says."""
+    """Return a player that applies the modifier `how` to a phrase."""
     words = how.split()
     layers = list(phrase.score.body.layers)
     if how == "other side":
@@ -204,12 +204,12 @@ def _modify(run: _Player, how: str, phrase: Phrase, line: Line, counts: float, d
         taken = words[1 : words.index("of")]
         for layer in taken:
             if layer not in layers:
-                raise line.where.error(f"{quoted(layer)} is no layer; there are {', '.join(layers)}")
+                raise line.where.error(f"{quoted(layer)} is not a layer; layers are {', '.join(layers)}")
         other = _call(phrase, replace(line, text=" ".join(words[words.index("of") + 1 :])), counts, depth, work)
         chosen = [layers.index(layer) for layer in taken]
         return lambda before: _with_layers(run(before), other(before), chosen)
     raise line.where.error(
-        f"{quoted(how)} is no way to do a phrase; there are other side, backwards, there and back, 3 times, "
+        f"{quoted(how)} is not a modifier; modifiers are other side, backwards, there and back, 3 times, "
         "with LAYERS of PHRASE"
     )
 
@@ -228,14 +228,14 @@ def _mirror(row: Row, score: Score, work: Work) -> Row:
 
 
 def _play_to_face(run: _Player, before: Row | None) -> list[Row]:
-    """Play a phrase out to end facing where `before` faces: it begins turned back by the turn that it makes.
+    """Play a phrase so that it ends in the facing of `before`: turn its beginning back by the turn that it makes.
 
-    A phrase that says where it faces cannot be turned.
+    A phrase with an absolute facing cannot be turned.
     """
     if before is None:
         return run(None)
     rows = run(before._replace(faced=False))
-    turned = 0.0 if rows[-1].faced else rows[-1].face - before.face  # once said, it holds to the end
+    turned = 0.0 if rows[-1].faced else rows[-1].face - before.face  # an absolute facing holds to the end
     return [row._replace(face=row.face - turned, faced=row.faced or before.faced) for row in rows]
 
 
@@ -262,7 +262,7 @@ def _there_and_back(rows: list[Row], before: Row | None) -> list[Row]:
 
 
 def _repeat(run: _Player, times: int, before: Row | None, where: Where) -> list[Row]:
-    """Play a phrase out several times in a row."""
+    """Play a phrase several times in a row."""
     rows: list[Row] = []
     for _ in range(times):
         rows += _continue(run(rows[-1] if rows else before), rows, where)
@@ -271,7 +271,7 @@ def _repeat(run: _Player, times: int, before: Row | None, where: Where) -> list[
 
 
 def _with_layers(rows: list[Row], others: list[Row], layers: Sequence[int]) -> list[Row]:
-    """Take `layers` of the rows from others, move by move; if others are fewer, their last is held."""
+    """Replace `layers` of the rows with those of others, move by move; hold the last of fewer others."""
     start = [row for row in others if row.seconds is None][:1]
     moves = [row for row in others if row.seconds is not None]
     out, move = [], 0

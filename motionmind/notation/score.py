@@ -1,8 +1,8 @@
-"""A score's contents: positions, phrases and postures, and the lookup of their words.
+"""The contents of a score: positions, phrases and postures, and the lookup of their words.
 
-Everything is written for the left side. A *setting* describes one limb, or the trunk: its keys are angles,
-`(joint, axis)` in degrees about that axis, or words of a standing leg such as `"bend"`. A *position* is an entry of the
-vocabulary: the settings of the leading limb and of the other.
+All definitions are for the left side. A *setting* describes one limb, or the trunk: its keys are angles, `(joint,
+axis)` in degrees about that axis, or words of a standing leg such as `"bend"`. A *position* is an entry of the
+vocabulary: the settings of the leading and the other limb.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Where:
 
 @dataclass(frozen=True)
 class Position:
-    """An entry of a vocabulary: the settings of the leading limb and of the other; a trunk has one setting, twice.
+    """An entry of a vocabulary: the settings of the leading and the other limb; a trunk repeats its setting.
 
     Attributes:
         lead, other: their settings.
@@ -49,7 +49,7 @@ class Position:
     path: str = ""
 
     def over(self, below: Position) -> Position:
-        """Overlay this position on another, which supplies all that this one leaves unset."""
+        """Overlay this position on another, which supplies the unset values."""
         lead, other = _overlay(self.lead, below.lead), _overlay(self.other, below.other)
         return Position(lead, other, self.sided or below.sided)
 
@@ -70,8 +70,8 @@ class Phrase:
     """Named lines of a score.
 
     Attributes:
-        name: what calls it.
-        score: where its words are looked up.
+        name: its name.
+        score: the score that defines its words.
         lines: the lines below its heading.
         where: its heading.
         open: words that a call fills in.
@@ -133,7 +133,7 @@ class Score:
         return self.body.paired(self.body.layers[layer][0])
 
     def cell(self, layer: str, text: str, where: Where) -> tuple[Setting, Setting]:
-        """Return the settings of the left and the right limb in a cell; for a trunk, the same setting twice.
+        """Return the settings of the left and the right limb in a cell; a trunk repeats its setting.
 
         Raises:
             FormatError: a word is unknown, or a side is missing or too many.
@@ -143,7 +143,7 @@ class Score:
             return self._led_by_side(layer, text, where)
         if len(parts) > 2 or not self.paired(layer):
             raise where.error(
-                f"{quoted(text)}: left / right is for two limbs"
+                f"{quoted(text)}: left / right needs two limbs"
                 if len(parts) == 2
                 else f"{quoted(text)}: one / too many"
             )
@@ -151,7 +151,7 @@ class Score:
         for part in parts:
             position = self._combine(layer, part, where)
             if position.lead != position.other:
-                raise where.error(f"{quoted(part.strip())} is for both sides; beside a / goes what one limb does")
+                raise where.error(f"{quoted(part.strip())} is for both sides; each side of / is one limb")
             settings.append(position.lead)
         return settings[0], settings[1]
 
@@ -164,12 +164,12 @@ class Score:
         position = self._combine(layer, " ".join(word for word in words if word not in SIDES), where)
         if position.sided and not sides:
             short = displayed(text, 40)
-            raise where.error(f"{short!r}: say which side: {short} left or {short} right")
+            raise where.error(f"{short!r}: add a side: {short} left or {short} right")
         settings = position.lead, position.other
         return self.mirrored(layer, settings) if sides == ["right"] else settings
 
     def cell_words(self, layer: str, text: str) -> tuple[str, str]:
-        """Return a cell's names for what the left and the right limb do; for a trunk, with its side, twice."""
+        """Return the names of the left and the right limb's position in a cell; a trunk repeats its name and side."""
         if "/" in text:
             left, right = (" ".join(part.split()) for part in text.split("/"))
             return left, right
@@ -182,7 +182,7 @@ class Score:
         return names if side == "left" else names[::-1]
 
     def mirrored_words(self, layer: str, words: tuple[str, str]) -> tuple[str, str]:
-        """Return the names of what the left and the right limb do in the mirror image."""
+        """Return the names of the left and the right limb's position in the mirror image."""
         if self.paired(layer):
             return words[::-1]
         opposite = {"left": "right", "right": "left"}
@@ -190,14 +190,14 @@ class Score:
         return name, name
 
     def mirrored(self, layer: str, limbs: tuple[Setting, Setting]) -> tuple[Setting, Setting]:
-        """Return the settings of the left and the right limb in the mirror image; for a trunk, its setting twice."""
+        """Return the settings of the left and the right limb in the mirror image; a trunk repeats its setting."""
         left, right = limbs
         if not self.paired(layer):
             return mirrored(left), mirrored(right)
         return _swap_lean(right), _swap_lean(left)
 
     def _combine(self, layer: str, text: str, where: Where) -> Position:
-        """Overlay the positions that a cell names, the last on top."""
+        """Overlay the positions in a cell, the last on top."""
         position, words = NOTHING, text.split()
         if not words:
             raise where.error(f"no position of the {layer}")
@@ -215,7 +215,7 @@ class Score:
         if name not in known:
             elsewhere = [other for other, names in home.positions.items() if name in names]
             hint = did_you_mean(name, known) or (f"; it is a position of the {elsewhere[0]}" if elsewhere else "")
-            raise where.error(f"{quoted(word)} is no position of the {layer}{hint}")
+            raise where.error(f"{quoted(word)} is not a position of the {layer}{hint}")
         return known[name]
 
     def phrase(self, word: str, where: Where) -> Phrase:
@@ -223,12 +223,12 @@ class Score:
         prefix, dot, name = word.rpartition(".")
         home = self._included(prefix, where) if dot else self
         if name not in home.phrases:
-            raise where.error(f"{quoted(word)} is no phrase{did_you_mean(name, home.phrases)}")
+            raise where.error(f"{quoted(word)} is not a phrase{did_you_mean(name, home.phrases)}")
         return home.phrases[name]
 
     def _included(self, prefix: str, where: Where) -> Score:
         if prefix not in self.included:
-            raise where.error(f"{quoted(prefix)} is no score that is included{did_you_mean(prefix, self.included)}")
+            raise where.error(f"{quoted(prefix)} is not an included score{did_you_mean(prefix, self.included)}")
         return self.included[prefix]
 
     def facing(self, word: str, where: Where) -> float:
@@ -237,7 +237,7 @@ class Score:
             return number(word, "face", where)
         if word not in self.facings:
             raise where.error(
-                f"{quoted(word)} is no facing{did_you_mean(word, self.facings)}; give one of the facings, or degrees"
+                f"{quoted(word)} is not a facing{did_you_mean(word, self.facings)}; give a facing or degrees"
             )
         return self.facings[word]
 
@@ -248,7 +248,7 @@ def mirrored(setting: Setting) -> Setting:
 
 
 def _swap_lean(setting: Setting) -> Setting:
-    """Return the setting that a limb takes from the other in the mirror image: only a lean to the left is negated."""
+    """Return a limb's setting for the other limb in the mirror image: negate only a lean to the left."""
     return {key: -value if key == "lean left" else value for key, value in setting.items()}
 
 
@@ -261,12 +261,12 @@ def _overlay(upper: Setting, lower: Setting) -> Setting:
 def tempo(text: str, where: Where) -> float:
     """Parse counts per minute, from 1 to 6000; FormatError for anything else."""
     if not NUMBER.fullmatch(text) or not 1.0 <= float(text) <= 6000.0:
-        raise where.error(f"tempo {displayed(text, 40)}: give counts a minute, from 1 to 6000")
+        raise where.error(f"tempo {displayed(text, 40)}: give counts per minute, from 1 to 6000")
     return float(text)
 
 
 def number(text: str, what: str, where: Where) -> float:
     """Parse the number written after `what`, at most 1e4 in size; FormatError for anything else."""
     if not NUMBER.fullmatch(text) or abs(float(text)) > 1e4:
-        raise where.error(f"{what} {text}".rstrip() + ": a number was expected")
+        raise where.error(f"{what} {text}".rstrip() + ": expected a number")
     return float(text)

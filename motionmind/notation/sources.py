@@ -1,4 +1,4 @@
-"""Finds the files that a score is made of, without parsing their content."""
+"""Find the files that a score includes, without parsing their content."""
 
 from __future__ import annotations
 
@@ -32,9 +32,6 @@ def sources(path: Path) -> list[Path]:
 
 
 def place_of(score: Path, file: str) -> Path:
-    """Return the path of a file that a score includes.
-
-    It is beside the score or, where there is none, a score of a corpus that comes with MotionMind, CORPUS/NAME.score.
-    """
+    """Return the path of an included file: beside the score, else the bundled CORPUS/NAME.score."""
     beside, bundle = score.parent / file, bundled("corpora") / file
     return bundle if not beside.is_file() and bundle.is_file() else beside

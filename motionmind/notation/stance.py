@@ -1,4 +1,4 @@
-"""Places legs on the floor: finds the pelvis and the angles of legs that stand or touch, with the weight over the feet.
+"""Place legs on the floor: find the pelvis and the angles of standing and touching legs, with the weight over the feet.
 
 All postures are computed at once, in the frame that the body faces in: x to its left, z ahead, the floor at y = 0. The
 right leg is computed as its mirror image.
@@ -14,7 +14,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.anatomy import SIDES, Anatomy, Leg
 from motionmind.geometry import rotations as rot
 
-ON_BALL_DEG = 24.0  # lift of a heel from which the ball alone bears the weight
+ON_BALL_DEG = 24.0  # from this lift of the heel on, the ball alone bears the weight
 MAX_RAISE_RAD = np.radians(120.0)  # of a touching leg
 
 

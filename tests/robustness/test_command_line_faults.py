@@ -275,7 +275,7 @@ def test_an_include_of_a_link_to_what_is_no_score_shows_nothing_of_it(tmp_path: 
     (tmp_path / "a.score").write_text("title A\nbody human23\ninclude link.score\n")
     ran = run("compose", "a.score", "-o", "out.json")
     assert ran.code == 2
-    assert ran.err == "error: a.score:3: link.score is no score; the name of one ends in .score\n"
+    assert ran.err == "error: a.score:3: link.score is not a score, whose name ends in .score\n"
 
 
 # --- numbers ----------------------------------------------------------------------------------------------------------
