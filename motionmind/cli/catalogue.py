@@ -1,4 +1,4 @@
-"""The command that lists the postures that have names."""
+"""The postures command: list the named postures and the clips of a corpus."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ from motionmind.names.spelling import parse_source
 if TYPE_CHECKING:
     from motionmind.names.finding import Collection
 
-_DESCRIPTION_CHARS = 300  # characters: a sentence rather than a name
+_MAX_CHARS = 300  # a sentence rather than a name
 
 
 @command("motionmind postures ballet -o postures.png")
 @click.argument("source", shell_complete=completion.corpora)
-@output("Draw the named postures: .png.", required=False)
+@output("Picture of the named postures (.png).", required=False)
 @JSON
 @HOME
 def postures(source: str, output: Path | None, as_json: bool, home: Path | None) -> None:
-    """List the postures of a corpus or a score by the names that other commands take.
+    """List the postures and clips of a corpus or a score, by the names that other commands take.
 
-    SOURCE is a corpus, by its name or folder, or a score. After its named postures come its clips, each with the number
-    of its postures, of which ballet/adagio@23 is one.
+    SOURCE is a corpus, by name or folder, or a score. Clips are listed with their number of postures; ballet/adagio@23
+    is posture 23 of a clip.
     """
     from motionmind.names.finding import check_exists, open_collection
 
     named = parse_source(source, home)
     check_exists(named, home)
     if named.kind == "file":
-        raise MotionMindError(f"{source}: give a corpus or a score; sheet draws the frames of a file")
+        raise MotionMindError(f"{source}: not a corpus or a score; `motionmind sheet` draws the frames of a file")
     if named.name:
-        raise MotionMindError(f"{source}: give {named.place} alone; sheet draws the postures of a clip")
+        raise MotionMindError(f"{source}: give {named.place} alone; `motionmind sheet` draws the postures of a clip")
     if output:
         check_outputs([(output, (".png",))], named.paths)
     found = open_collection(named, home)
@@ -56,7 +56,7 @@ def postures(source: str, output: Path | None, as_json: bool, home: Path | None)
 
 
 def _list(found: Collection) -> dict[str, list[Any]]:
-    """List what a collection holds, as plain values for JSON."""
+    """List the contents of a collection as plain values for JSON."""
     motions = found.choose() if found.clips else []
     return {
         "postures": [f"{found.word}/{name}" for name in found.postures],
@@ -76,20 +76,20 @@ def _print(word: str, postures: list[str], clips: list[dict[str, Any]]) -> None:
     """Print the named postures of a collection, then its clips."""
     click.echo(f"{word}: {count(len(postures), 'named posture')}, {count(len(clips), 'clip')}")
     for name in postures:
-        click.echo(f"  {_shown(name)}")
+        click.echo(f"  {_display_name(name)}")
     if clips:
-        last = f"{_shown(clips[0]['name'])}@{clips[0]['postures'] - 1}"
-        click.echo(f"clips, whose postures are counted from 0 (the last of the first is {last})")
-    width = max((len(_shown(clip["name"])) for clip in clips), default=0)
+        last = f"{_display_name(clips[0]['name'])}@{clips[0]['postures'] - 1}"
+        click.echo(f"clips (postures count from 0, so the first clip ends with {last})")
+    width = max((len(_display_name(clip["name"])) for clip in clips), default=0)
     for clip in clips:
         length = f"{clip['postures']:5} postures  {clip['seconds']:6.1f} s"
         click.echo(
-            f"  {_shown(clip['name']):{width}}  {length}  {displayed(clip['about'], _DESCRIPTION_CHARS)}".rstrip()
+            f"  {_display_name(clip['name']):{width}}  {length}  {displayed(clip['about'], _MAX_CHARS)}".rstrip()
         )
 
 
-def _shown(name: str) -> str:
-    return displayed(name, _DESCRIPTION_CHARS)
+def _display_name(name: str) -> str:
+    return displayed(name, _MAX_CHARS)
 
 
 def _draw(found: Collection, output: Path) -> None:
@@ -101,7 +101,7 @@ def _draw(found: Collection, output: Path) -> None:
     from motionmind.render.sheet import draw_sheet, png
 
     if not found.postures:
-        raise MotionMindError(f"{found.word}: names no postures; motionmind sheet draws those of its clips")
+        raise MotionMindError(f"{found.word}: has no named postures; `motionmind sheet` draws its clips")
     drawn = [found.posture(name) for name in found.postures]
     motion = Motion(
         drawn[0].skeleton,

@@ -1,4 +1,4 @@
-"""The commands that change what a corpus is learned from, and the reading of files for them."""
+"""The commands that add recordings to a corpus or remove them, and the reading of files."""
 
 from __future__ import annotations
 
@@ -27,24 +27,25 @@ if TYPE_CHECKING:
     from motionmind.learned.learning import Learned
 
 DETAILS = option(
-    "--details", section=Section.OUTPUT, is_flag=True, help="Print each joint's states, and each recording with faults."
+    "--details",
+    section=Section.OUTPUT,
+    is_flag=True,
+    help="Print the states of joints, and the recordings with faults.",
 )
 FLIPS = option(
     "--flips",
     section=Section.LEARN,
     type=click.Choice(["repair", "keep", "drop"]),
     default="repair",
-    help="Repair a clip where a joint jumps, keep it as it is, or drop it.",
+    help="Treatment of clips in which a joint jumps: repair, keep or drop.",
 )
 PERFORMER = option(
     "--performer",
     section=Section.ABOUT,
     default="",
     show_default=False,
-    help="Name who performs the movement, if not the author: credits name them.",
+    help="Performer of the movement, if not the author; named in credits.",
 )
-_ANNOUNCED_BYTES = 1e8  # bytes on disk that are said beforehand
-_NEGLIGIBLE_SHARE = 0.001  # share of orientations outside of all states of which nothing is said
 
 
 @command("motionmind corpus add mine new/*.bvh")
@@ -69,8 +70,8 @@ def add(
 ) -> None:
     """Add recordings to a corpus that you built.
 
-    They are taken as the corpus's own were: at its rate, mirrored if these are. Its states stay, and no earlier file is
-    read again; how far the new movement is outside of these states is said.
+    They are read like the corpus's own recordings: at its rate, and mirrored if it is. The states stay, and earlier
+    files are not read again. A note says how far the new movement is outside the states.
     """
     from motionmind.corpus.changing import add_recordings
     from motionmind.corpus.recordings import Taking
@@ -91,7 +92,7 @@ def add(
         more = add_recordings(learned.corpus, taken, workshop=workshop, **options)
         changed = _learn_again(learned, more, workshop)
         persistence.save(changed, place)
-    _tell(changed, f"added {count(len(files), 'file')} to {displayed_path(place)}", details=details)
+    _print_change(changed, f"added {count(len(files), 'file')} to {displayed_path(place)}", details=details)
 
 
 @command("motionmind corpus remove mine clip")
@@ -100,9 +101,9 @@ def add(
 @DETAILS
 @HOME
 def remove(name: str, clips: tuple[str, ...], details: bool, home: Path | None) -> None:
-    """Remove clips from a corpus that you built, and their mirror images.
+    """Remove clips and their mirror images from a corpus that you built.
 
-    The name of a recording removes all of its parts. The states of what is left stay.
+    The name of a recording removes all of its parts. The states stay.
     """
     from motionmind.corpus.changing import remove_clips
     from motionmind.corpus.shards import shards_of
@@ -115,32 +116,31 @@ def remove(name: str, clips: tuple[str, ...], details: bool, home: Path | None) 
         changed = _learn_again(learned, remove_clips(learned.corpus, clips, workshop), workshop)
         persistence.save(changed, place)
     gone = len(learned.corpus.clips) - len(changed.corpus.clips)
-    _tell(changed, f"removed {count(gone, 'clip')} from {displayed_path(place)}", details=details)
+    _print_change(changed, f"removed {count(gone, 'clip')} from {displayed_path(place)}", details=details)
 
 
 def take_files(
     names: Mapping[Path, str], reading: Reading, folder: Path, team: Team, *, strict: bool
 ) -> Iterator[Recording]:
-    """Take files by workers, with a progress bar on a terminal; report those that are left out, or end with one.
+    """Read files with workers, with a progress bar on a terminal; skip and report unusable files.
 
-    These are files that cannot be read, and files on another skeleton than most.
-
-    After the last of them, what learning needs is compiled: a file that is not there does not wait for that.
+    Unusable files cannot be read, or are on another skeleton than most. Compiling the code that learning needs begins
+    after the last file, so a missing file is reported at once.
 
     Args:
         names: the clip's name for each file; a score names its own.
-        reading: how to read and take them.
-        folder: where shards are kept until the corpus is built.
+        reading: how to read and sample them.
+        folder: the folder of shards until the corpus is built.
         team: the workers.
-        strict: whether a file that would be left out is an error.
+        strict: whether an unusable file is an error.
     """
     from motionmind.corpus import shards
 
     faults: list[str] = []
 
     def on_need(size: float) -> None:
-        if size >= _ANNOUNCED_BYTES:
-            note(f"about {size / 1e9:.1f} GB of disk are needed, more than half of it until the corpus is built")
+        if size >= 1e8:  # bytes
+            note(f"needs about {size / 1e9:.1f} GB on disk, more than half of it only until the corpus is built")
 
     def on_taken(taken: Taken) -> None:
         bar.update(1)
@@ -157,13 +157,13 @@ def take_files(
     for fault in faults:
         note(f"{fault}; left out")
     if faults:
-        note(f"nothing is learned from {count(len(faults), 'file')} of {len(names)}")
+        note(f"left out {count(len(faults), 'file')} of {len(names)}")
     prepare()
     progress("learning")
 
 
 def _own(name: str, home: Path | None) -> tuple[Learned, Path]:
-    """Return what was learned from a user's corpus, and its folder; CorpusError if there is none that was built."""
+    """Load a corpus that the user built; return it and its folder. CorpusError if there is none."""
     from motionmind.corpus.store import own_place
     from motionmind.learned import persistence
 
@@ -172,7 +172,7 @@ def _own(name: str, home: Path | None) -> tuple[Learned, Path]:
 
 
 def _learn_again(learned: Learned, corpus: Corpus, workshop: Workshop) -> Learned:
-    """Learn from changed movement in the same states, and note how much of what is new is outside of them."""
+    """Learn from changed movement in the same states; note the share of new orientations outside all states."""
     from motionmind.corpus.kept import Kept
     from motionmind.learned.learning import learn_changed, outside
 
@@ -180,16 +180,16 @@ def _learn_again(learned: Learned, corpus: Corpus, workshop: Workshop) -> Learne
     kept = Kept.find(corpus, learned.corpus, workshop)
     if kept.new:
         share, joint, degrees = outside(kept.new, learned.space)
-        if share > _NEGLIGIBLE_SHARE:
+        if share > 0.001:  # less is negligible
             note(
-                f"{100.0 * share:.1f}% of all joints' orientations in what is new are in no state ({joint} by "
-                f"{degrees:.0f} degrees): to learn states anew, build the corpus from all files"
+                f"{100.0 * share:.1f}% of the new joint orientations are in no state ({joint} by {degrees:.0f} "
+                "degrees); to learn new states, build the corpus from all files"
             )
     return learn_changed(learned, kept, workshop)
 
 
-def _tell(learned: Learned, done: str, *, details: bool) -> None:
-    """Print how well a changed corpus hangs together, and what was done."""
+def _print_change(learned: Learned, done: str, *, details: bool) -> None:
+    """Print the check of a changed corpus, and the change."""
     from motionmind.learned.summary import check_corpus, to_plain
 
     found = to_plain(check_corpus(learned.corpus, learned.grammar, learned.states))

@@ -1,7 +1,7 @@
 """Values that shells complete: corpora, postures, clips, joints and flows.
 
-A shell starts the program for each tab, so nothing here imports numpy or parses a score: names are read from manifests
-and from the lines of scores that begin with them. What cannot be read completes to nothing.
+A shell starts the program for each tab, so nothing here imports numpy or parses a score: names come from manifests and
+from lines of scores that define them. Unreadable files complete to nothing.
 """
 
 from __future__ import annotations
@@ -20,11 +20,10 @@ from motionmind.errors import MotionMindError
 
 FLOWS = ("chua", "duffing", "halvorsen", "lorenz", "rossler", "thomas")  # as `motionmind.chaos.flows.FLOWS`
 _NAMING_LINE = re.compile(r"(posture|clip|include)[ \t]+([^\s:=]+)")
-_MAX_SCORES = 100
 
 
 class _Names(NamedTuple):
-    """The names of a corpus: of its postures, of its clips, of its joints."""
+    """The names of a corpus's postures, clips and joints."""
 
     postures: list[str]
     clips: list[str]
@@ -58,7 +57,7 @@ def published(context: click.Context, _: click.Parameter, incomplete: str) -> li
 
 
 def postures(context: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Complete a posture of a corpus, or a file; of a clip the first posture is given."""
+    """Complete a posture of a corpus, or a file; a clip completes to its first posture."""
     return _complete_named(context, incomplete, "@0")
 
 
@@ -68,9 +67,9 @@ def movement(context: click.Context, _: click.Parameter, incomplete: str) -> lis
 
 
 def joints(context: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Complete a joint of the command's corpus, the last of several that commas separate."""
+    """Complete a joint of the command's corpus, the last in a comma-separated list."""
     before, comma, last = incomplete.rpartition(",")
-    # Arguments before an option that still lacks its value are in `args`, and in no parameter.
+    # Arguments before an option without a value yet are in `args`, not in a parameter.
     words = (context.params.get(name) for name in ("corpus", "a", "b"))
     places = [str(word).partition("/")[0] for word in (*words, *context.args) if word]
     corpus = next((place for place in places if place in _folders(context)), "")
@@ -86,7 +85,7 @@ def flows(_: click.Context, __: click.Parameter, incomplete: str) -> list[Comple
 
 
 def _complete_named(context: click.Context, incomplete: str, suffix: str) -> list[CompletionItem]:
-    """Complete what corpora name, and files; `suffix` goes after the name of a clip."""
+    """Complete names in corpora, and files; append `suffix` to the name of a clip."""
     word, slash, _ = incomplete.partition("/")
     known = [name for name in _folders(context) if (name == word if slash else name.startswith(word))]
     found = [f"{name}/" for name in known]
@@ -102,7 +101,7 @@ def _complete_named(context: click.Context, incomplete: str, suffix: str) -> lis
 
 
 def _files(incomplete: str) -> list[str]:
-    """Return the files of the current folder whose names begin so."""
+    """Return the files of the current folder that begin with `incomplete`."""
     return sorted(path.name for path in Path().iterdir() if path.is_file() and path.name.startswith(incomplete))
 
 
@@ -164,7 +163,7 @@ def _manifest(folder: Path) -> dict[str, Any]:
 
 
 def _scanned(folder: Path, scores: list[str]) -> Iterator[tuple[str, str]]:
-    """Yield ("posture", name) and ("clip", name) for the lines of scores, and of those that they include."""
+    """Yield ("posture", name) and ("clip", name) for definitions in scores and their includes."""
     waiting = [folder / str(score) for score in scores]
     for path in waiting:  # the list grows during the loop
         lines: list[str] = []
@@ -174,6 +173,6 @@ def _scanned(folder: Path, scores: list[str]) -> Iterator[tuple[str, str]]:
             found = _NAMING_LINE.match(line)
             if found and found[1] != "include":
                 yield found[1], found[2]
-            elif found and " as " not in line and len(waiting) < _MAX_SCORES:
+            elif found and " as " not in line and len(waiting) < 100:
                 included = path.parent / found[2]
                 waiting += [] if included in waiting else [included]

@@ -1,4 +1,4 @@
-"""The commands that take postures out of clips and convert movement between formats."""
+"""The commands that extract postures from clips and convert movement between formats."""
 
 from __future__ import annotations
 
@@ -33,30 +33,29 @@ if TYPE_CHECKING:
 
 @command("motionmind posture ballet/adagio --frame 23 -o A.json")
 @click.argument("source", shell_complete=completion.movement)
-@outputs(f"Write {OUTPUT_KINDS}; or .txt.")
+@outputs(f"File to write: {OUTPUT_KINDS}; or .txt.")
 @option(
     "--clip",
     "name",
     section=Section.PART,
     metavar="NAME",
-    help="Take this clip of a score or a corpus  [default: its only one]",
+    help="Clip of a score or a corpus  [default: its only one]",
 )
 @option(
     "--frame",
     section=Section.PART,
     type=FRAME,
     metavar="N",
-    help="Take frame N, counted from 0, or from the end if negative  [default: the only one, or that of SOURCE@N]",
+    help="Frame, counted from 0, or from the end if negative  [default: the only one, or N of SOURCE@N]",
 )
 @reading
 @HOME
 def posture(
     source: str, frame: int | None, name: str | None, outputs: tuple[Path, ...], home: Path | None, **options: Any
 ) -> None:
-    """Take one posture out of a clip.
+    """Extract one posture from a clip.
 
-    SOURCE is what sheet draws: a file of movement, a score, a corpus, CORPUS/CLIP, or a posture such as
-    ballet/arabesque and clip.bvh@240.
+    SOURCE is a motion file, a score, a corpus, CORPUS/CLIP, or a posture such as ballet/arabesque or clip.bvh@240.
 
     The posture is on human23 if the clip's joints map to it, by known names or by --joints; otherwise on the clip's own
     skeleton, such as human44.
@@ -67,7 +66,7 @@ def posture(
     named = parse_movement(source, home)
     check_outputs([(path, (*MOTION_SUFFIXES, ".txt", *PICTURES)) for path in outputs], named.source.paths)
     if frame is not None and named.moment is not None:
-        raise MotionMindError(f"{source}: names a frame, and so does --frame; give one of them")
+        raise MotionMindError(f"{source}: already names a frame; leave out --frame")
     motion = read_movement(named.source, name, home, **options)
     at = frame_of(named, motion) if frame is None else select_frame(named.source.word, motion, Moment(frame))
     write_all(outputs, motion.posture(at))
@@ -85,28 +84,28 @@ def posture(
     section=Section.OUTPUT,
     type=click.Choice(["own", "human23"]),
     default="own",
-    help="Keep IN's own joints, or retarget to human23.",
+    help="Skeleton of OUT: IN's own, or human23.",
 )
-@option("--fps", section=Section.OUTPUT, type=RATE, help="Resample to N frames per second  [default: keep IN's]")
+@option("--fps", section=Section.OUTPUT, type=RATE, help="Frames per second of OUT  [default: IN's]")
 @option(
     "--out-unit",
     section=Section.OUTPUT,
     metavar="UNIT",
-    help="Set the unit of length of a .bvh OUT, as --unit does for IN  [default: cm]",
+    help="Unit of length of a .bvh OUT, as in --unit  [default: cm]",
 )
 @option(
     "--for",
     "program",
     section=Section.OUTPUT,
     type=click.Choice(["blender", "unreal", "maya"]),
-    help="Write OUT as a program takes it without settings: unit, frames per second, root.",
+    help="Program that OUT suits without settings: unit, frames per second, root.",
 )
 @option(
     "--form",
     section=Section.OUTPUT,
     type=click.Choice(["braces", "lines"]),
     default="braces",
-    help="Choose between the two notations of the papers for .txt.",
+    help="Notation of the papers for .txt.",
 )
 @reading
 @HOME
@@ -124,11 +123,11 @@ def convert(
 ) -> None:
     """Convert movement from one format to another.
 
-    IN may be .bvh, .amc with its .asf, .glb or .gltf, .vrm or .vrma, .json, .npz as in AMASS, .pkl as in AIST++, .npy
-    as in FineDance, .txt in the notation of the papers, or a clip or posture of a score or a corpus, as ballet/adagio.
-    OUT may be .bvh, .json, .glb (a skinned body, for Blender and the like), .vrma (a VRM animation), .npz (on SMPL's
-    joints), or .txt, which is on human23 (or human44, if IN is) and holds orientations only. A note lists whatever OUT
-    has no place for.
+    IN is a clip or posture of a score or a corpus, such as ballet/adagio, or a file: .bvh, .amc with its .asf, .glb,
+    .gltf, .vrm, .vrma, .json, .npz (AMASS), .pkl (AIST++), .npy (FineDance) or .txt (the papers' notation).
+
+    OUT is .bvh, .json, .glb (a skinned body, for Blender and others), .vrma (a VRM animation), .npz (SMPL's joints) or
+    .txt, which holds orientations only, on human23 (human44 if IN is). A note lists the data that OUT cannot hold.
     """
     from motionmind.formats import lossy_fields, write_motion
     from motionmind.formats.papers import write_papers
@@ -140,10 +139,10 @@ def convert(
     check_outputs([(output, (".bvh", ".json", ".txt", ".glb", ".npz", ".vrma"))], named.source.paths)
     suffix = output.suffix.lower()
     if out_unit and suffix != ".bvh":
-        raise MotionMindError(f"--out-unit {out_unit}: only BVH has no unit of its own, and {output} is not BVH")
+        raise MotionMindError(f"--out-unit {out_unit}: only BVH needs a unit, and {output} is not BVH")
     taker = program_for(program, output) if program else None
     motion = read_part(named, None, home, raw=True, **options)
-    upright = "y" if options["up"] else None  # reading has turned it
+    upright = "y" if options["up"] else None  # the reader has turned it
     if named.source.kind == "file":
         question_recording(named.source.paths[0], motion, upright)
     if skeleton == "human23" or joints or (suffix == ".txt" and not is_human44(motion.skeleton)):
@@ -167,7 +166,7 @@ def convert(
 
 
 def _written_body(suffix: str, motion: Motion) -> tuple[int, str]:
-    """Return the number of joints, and the name, of the body that a file of a motion holds."""
+    """Return the number of joints and the name of the body in a written file."""
     if suffix == ".npz":
         from motionmind.formats._smpl import smpl_body_for
 

@@ -1,4 +1,4 @@
-"""The command that says whose movement a movement is made of."""
+"""The credits command: list the sources of a movement."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from motionmind.cli.options import HOME, JSON, command
 from motionmind.cli.printing import note
 from motionmind.cli.sources import parse_movement, read_movement
 
-_FORMATS_WITH_CREDITS = (".json", ".glb")  # formats in which movement keeps its credits
-
 if TYPE_CHECKING:
     from motionmind.credits.ledger import Ledger
 
@@ -24,11 +22,10 @@ if TYPE_CHECKING:
 @JSON
 @HOME
 def credits(source: str, as_json: bool, home: Path | None) -> None:  # noqa: A001 (the command's name)
-    """Say whose movement a movement is made of: shares by performer, licence, corpus and clip.
+    """List the shares of performers, licences, corpora and clips in a movement.
 
-    SOURCE is a tween, a variation or any other movement that the engine had a part in, or that was taken from a corpus,
-    as .json or .glb, or the report of one; or a clip of a corpus. Shares are of time, over all joints. What no clip
-    attests is the engine's.
+    SOURCE is movement from the engine or from a corpus, as .json or .glb, such as a tween or a variation; its report;
+    or a clip of a corpus. Shares are of time, over all joints. Unattested movement is credited to the engine.
     """
     import msgspec
 
@@ -43,7 +40,7 @@ def credits(source: str, as_json: bool, home: Path | None) -> None:  # noqa: A00
 
 
 def _ledger(source: str, home: Path | None) -> Ledger:
-    """Return the ledger of a report, or of a movement."""
+    """Return the ledger of a report or a movement."""
     from motionmind.credits.ledger import ledger_of, read_ledger
 
     named = parse_movement(source, home)
@@ -52,6 +49,6 @@ def _ledger(source: str, home: Path | None) -> Ledger:
     reading = {"unit": None, "asf": None, "source_fps": None, "up": None}
     credited = read_movement(named.source, None, home, raw=True, **reading).credits
     suffix = Path(named.source.place).suffix.lower()
-    if suffix not in _FORMATS_WITH_CREDITS and all(credit.is_given for credit in credited):
-        note(f"{source}: {suffix} holds no credits; if the engine made it, name its .json, its .glb or its report")
+    if suffix not in (".json", ".glb") and all(credit.is_given for credit in credited):
+        note(f"{source}: {suffix} files hold no credits; for movement from the engine, give its .json, .glb or report")
     return ledger_of(credited)

@@ -18,23 +18,23 @@ if TYPE_CHECKING:
     from motionmind.body.motion import Motion, Posture
 
 MOTION_SUFFIXES = (".json", ".bvh", ".glb", ".npz", ".vrma")
-EVEN_SUFFIXES = (".bvh", ".npz")  # formats whose frames are even in time
-_EVEN_FPS = 30.0  # frames a second of movement that has to be made even
+EVEN_SUFFIXES = (".bvh", ".npz")  # formats with evenly spaced frames
+_DEFAULT_FPS = 30.0  # rate of motions resampled for these formats
 
 
 def read(path: Path, unit: str | None, asf: Path | None, source_fps: float | None, up: str | None) -> Motion:
-    """Read movement from a file, given the values of the options that `options.reading` adds."""
+    """Read a motion file, given the values of the options that `options.reading` adds."""
     from motionmind.formats import read_motion
 
     return read_motion(path, unit=unit, asf=asf, fps=source_fps, up=up)
 
 
 def question_recording(path: Path, motion: Motion, up: str | None = None) -> None:
-    """Warn if a person in a file contradicts the file's clock, drops frames, or stands off the floor, y = 0.
+    """Warn if the movement in a file contradicts its frame rate, drops frames, or stands off the floor, y = 0.
 
     Args:
         path: the file.
-        motion: its movement, on any joints; only on those that map to human23 it is questioned.
+        motion: its movement; joints that do not map to human23 are not checked.
         up: the axis that is up in the movement; None finds it.
     """
     from motionmind.body.human import SHORTEST, TALLEST
@@ -49,7 +49,7 @@ def question_recording(path: Path, motion: Motion, up: str | None = None) -> Non
         return
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", MotionMindWarning)  # whoever takes it onto human23 is warned then
+            warnings.simplefilter("ignore", MotionMindWarning)  # retargeting to human23 warns later
             person = own_skeleton(motion, up=up)
     except SkeletonError:  # its zero pose does not show how it stands
         return
@@ -68,7 +68,7 @@ def question_recording(path: Path, motion: Motion, up: str | None = None) -> Non
 
 
 def write(path: Path, movement: Motion | Posture) -> None:
-    """Write a motion or a posture as movement or as a picture, by the suffix of `path`, and note what it leaves out."""
+    """Write a motion or a posture as movement or as a picture, by the suffix of `path`; note the data left out."""
     from motionmind.body.motion import Posture
     from motionmind.formats import lossy_fields, write_motion, write_posture
     from motionmind.render.pictures import draw_picture
@@ -86,7 +86,7 @@ def write(path: Path, movement: Motion | Posture) -> None:
 
 
 def note_licences(path: Path, motion: Motion) -> None:
-    """Note the licences of a written motion's sources that restrict passing it on."""
+    """Note the licences of a motion's sources that restrict its distribution."""
     from motionmind.credits.ledger import objections
 
     for objection in objections(motion.credits):
@@ -94,13 +94,13 @@ def note_licences(path: Path, motion: Motion) -> None:
 
 
 def evened(path: Path, motion: Motion) -> Motion:
-    """Return a motion as its file can hold it: resampled, which a note says, if the frames have to be even in time."""
+    """Return a motion as its file can hold it: resampled, with a note, if the format needs evenly spaced frames."""
     if path.suffix.lower() not in EVEN_SUFFIXES or motion.is_even:
         return motion
-    even = motion.resample(_EVEN_FPS)
+    even = motion.resample(_DEFAULT_FPS)
     note(
         f"{path}: this format needs evenly spaced frames: resampled {len(motion)} frames to {len(even)}, "
-        f"{_EVEN_FPS:g} per second (--fps sets another rate)"
+        f"{_DEFAULT_FPS:g} per second (--fps sets another rate)"
     )
     return even
 
@@ -119,7 +119,7 @@ def note_lossy_fields(path: Path, fields: Sequence[str]) -> None:
 
 
 def read_mapping(path: Path | None) -> dict[str, str] | None:
-    """Read the human23 joint that each joint maps to; return None without a file."""
+    """Read a mapping of joints to human23; None without a file."""
     from motionmind.retarget.retarget import read_joint_mapping
 
     return read_joint_mapping(path) if path else None
@@ -146,18 +146,17 @@ def numbered(path: Path, number: int, count: int | None) -> Path:
 
 
 def check_outputs(outputs: Sequence[tuple[Path, tuple[str, ...]]], sources: Sequence[Path]) -> list[Path]:
-    """Check, before any work is done, that files can be written.
+    """Check that files can be written, before any work.
 
     Args:
-        outputs: files to write, each with the suffixes that it may have; none for any.
-        sources: files that are read.
+        outputs: files to write, each with its allowed suffixes; empty for any.
+        sources: files to read.
 
     Returns:
         The paths of `outputs`.
 
     Raises:
-        MotionMindError: a file has another suffix, stands twice among the outputs or among the sources too, or lies
-            where nothing may be written.
+        MotionMindError: a file has another suffix, is given twice or is also read, or its folder is not writable.
     """
     paths = [path for path, _ in outputs]
     places, read_places = [_resolve(path) for path in paths], [_resolve(path) for path in sources]
@@ -180,7 +179,7 @@ def check_outputs(outputs: Sequence[tuple[Path, tuple[str, ...]]], sources: Sequ
 
 
 def _is_one_of(path: Path, suffixes: tuple[str, ...]) -> bool:
-    """Return whether a file has one of some suffixes, or, where movement is written, one of an added format."""
+    """Return whether a file has one of some suffixes; for movement, also one of a plug-in format."""
     suffix = path.suffix.lower()
     if suffix in suffixes or ".bvh" not in suffixes:
         return suffix in suffixes
@@ -190,7 +189,7 @@ def _is_one_of(path: Path, suffixes: tuple[str, ...]) -> bool:
 
 
 def _resolve(path: Path) -> Path:
-    """Resolve a path; MotionMindError if it leads nowhere, as links in a circle do."""
+    """Resolve a path; MotionMindError if it is invalid, such as a cycle of links."""
     try:
         found = path.resolve()
         found.exists()

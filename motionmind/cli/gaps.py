@@ -1,4 +1,4 @@
-"""The command that says what to record next."""
+"""The corpus gaps command: recommend transitions to record."""
 
 from __future__ import annotations
 
@@ -20,13 +20,10 @@ from motionmind.display import displayed
 if TYPE_CHECKING:
     from motionmind.gaps.gaps import Gaps, Place
 
-_N_GRAPHS_PRINTED = 5  # joint graphs that are printed
-_SAME_POSTURE_DEG = 1.0  # degrees a joint: nearer, and a posture has a name
-
 
 @command("motionmind corpus gaps ballet --pairs 20 --count 1")
 @click.argument("name", shell_complete=completion.corpora)
-@output("Draw the transitions: a sheet of pictures (.png).", required=False)
+@output("Sheet of pictures of the transitions (.png).", required=False)
 @JSON
 @option(
     "--pairs",
@@ -34,17 +31,24 @@ _SAME_POSTURE_DEG = 1.0  # degrees a joint: nearer, and a posture has a name
     type=COUNT,
     metavar="N",
     default=100,
-    help="Join N random pairs of postures, to see what helps.",
+    help="Number of random pairs of postures to join.",
 )
-@option("--count", section=Section.CHECK, type=Whole(1, 100), metavar="N", default=3, help="Recommend N transitions.")
-@option("--seed", section=Section.CHECK, type=NATURAL, metavar="N", default=0, help="Seed the random choice.")
+@option(
+    "--count",
+    section=Section.CHECK,
+    type=Whole(1, 100),
+    metavar="N",
+    default=3,
+    help="Transitions to recommend.",
+)
+@option("--seed", section=Section.CHECK, type=NATURAL, metavar="N", default=0, help="Seed of the random pairs.")
 @HOME
 def gaps(name: str, output: Path | None, as_json: bool, pairs: int, count: int, seed: int, home: Path | None) -> None:
-    """Say what to record next: the transitions that would make tweens cheaper, or spare them bridges.
+    """Recommend transitions to record, which would make tweens cheaper or avoid bridges.
 
-    Random pairs of postures are joined by the cheapest path of any number of moves. Each transition is one move from a
-    posture of the corpus to another, in which no joint turns farther than in a move of the corpus. Those that promise
-    most are added to the corpus in turn and all pairs joined again, which gives the figures.
+    The command joins random pairs of postures by the cheapest path of any number of moves. A transition is one move
+    between two postures of the corpus, in which no joint turns farther than in a move of the corpus. To measure the
+    gain, the command adds the most promising transitions one by one and joins all pairs again.
     """
     import msgspec
 
@@ -78,17 +82,17 @@ def gaps(name: str, output: Path | None, as_json: bool, pairs: int, count: int, 
 
 
 def _lines(found: Gaps) -> Iterator[str]:
-    """Write the gaps of a corpus as a choreographer reads them."""
+    """Format the gaps of a corpus for a choreographer."""
     energy = found.energy
     yield (
         f"{displayed(found.corpus)}: {counted(found.pairs, 'random tween')} cost {energy.cost:.2f} nats on average, at "
         f"least {energy.lower_bound:.2f}, with {energy.bridges:.2f} bridges"
     )
     yield "worst joint graphs  states  pairs apart  bridges a tween"
-    for joint in found.joints[:_N_GRAPHS_PRINTED]:
+    for joint in found.joints[:5]:
         yield f"  {displayed(joint.joint):16}  {joint.states:6}  {joint.apart:11.0%}  {joint.bridges:15.2f}"
     if not found.transitions:
-        yield "no single move from posture to posture would lower that"
+        yield "no single move between two postures would lower the cost"
         return
     yield "record next"
     for number, one in enumerate(found.transitions, start=1):
@@ -105,10 +109,10 @@ def _lines(found: Gaps) -> Iterator[str]:
 
 
 def _place(place: Place) -> str:
-    """Say where a posture is: "fifth (barre: plies at 3.2 s)"."""
+    """Describe the place of a posture: "fifth (barre: plies at 3.2 s)"."""
     mirrored = ", mirrored" * place.mirrored
     where = f"{displayed(place.corpus)}: {displayed(place.clip)} at {place.seconds:.2f} s, posture {place.posture}"
     if not place.near:
         return f"{where}{mirrored}"
-    off = "" if place.degrees < _SAME_POSTURE_DEG else f", {place.degrees:.0f} degrees a joint off"
+    off = "" if place.degrees < 1.0 else f", {place.degrees:.0f} degrees a joint off"
     return f"{'about ' * bool(off)}{displayed(place.near)}{off} ({where}{mirrored})"

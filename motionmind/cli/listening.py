@@ -1,4 +1,4 @@
-"""Sockets at which commands listen, and their addresses."""
+"""Listening sockets and their addresses."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from motionmind.errors import MotionMindError
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """Open a socket that listens; MotionMindError if that is not possible, as where the port is taken."""
+    """Open a listening socket; MotionMindError if it fails, for example because the port is in use."""
     try:
         return socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
     except OSError as error:
@@ -16,7 +16,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def address_of(listening: socket.socket) -> tuple[str, bool]:
-    """Return the URL of a socket that listens, and whether others than this computer reach it."""
+    """Return the URL of a listening socket, and whether other computers can reach it."""
     address, port = listening.getsockname()[:2]
-    shown = f"[{address}]" if ":" in address else address
-    return f"http://{shown}:{port}", not address.startswith("127.") and address != "::1"
+    host = f"[{address}]" if ":" in address else address
+    return f"http://{host}:{port}", not address.startswith("127.") and address != "::1"

@@ -1,4 +1,4 @@
-"""The commands that explain a tween and draw what was learned."""
+"""The commands that explain a tween and draw the graph of a joint."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from motionmind.display import displayed, displayed_path, printable
 def explain(report: Path, as_json: bool) -> None:
     """Explain a tween, move by move.
 
-    For each move: which joints move, how likely that is, and where it was seen. REPORT is a file that tween --report
-    wrote; of one that found nothing, the reason is printed.
+    For each move: the joints that move, the probability, and the source in the corpus. REPORT is a file from tween
+    --report; if the tween found no path, the command prints the reason.
     """
     import msgspec
 
@@ -45,16 +45,15 @@ def explain(report: Path, as_json: bool) -> None:
     required=True,
     metavar="NAME",
     shell_complete=completion.joints,
-    help="Draw the graph of this joint, or of facing, if that is a chain of its own.",
+    help="Joint whose graph to draw, or facing, if it has states of its own.",
 )
-@output("Write the graph: a picture (.svg, .png), or data (.graphml, .gexf).")
+@output("Picture (.svg, .png) or data (.graphml, .gexf) of the graph.")
 @HOME
 def graph(corpus: str, joint: str, output: Path, home: Path | None) -> None:
-    """Draw a joint's states and the transitions between them.
+    """Draw a joint's states in a corpus and the transitions between them.
 
-    States and transitions are those of a corpus. The larger a circle, the more often its state is visited; the darker
-    an arrow, the likelier the transition. In .svg, point at a state to see more, such as the states of the joint's
-    parent that go with it. Pictures leave out states that no move leads to or from.
+    A larger circle marks a more frequent state, a darker arrow a likelier transition. In .svg, point at a state for
+    more, such as the states of the joint's parent that occur with it. Pictures leave out isolated states.
     """
     from motionmind.plots.joint_graph import GRAPHS, draw_joint_graph
     from motionmind.tween.engine import Engine
@@ -64,5 +63,5 @@ def graph(corpus: str, joint: str, output: Path, home: Path | None) -> None:
     alone = sum(not any(other != state for other in (*drawn.succ[state], *drawn.pred[state])) for state in drawn)
     click.echo(
         f"{displayed_path(output)}: {displayed(joint)}, {count(len(drawn), 'state')}, "
-        f"{count(drawn.number_of_edges(), 'transition')}; {count(alone, 'state')} that none joins to another"
+        f"{count(drawn.number_of_edges(), 'transition')}; {count(alone, 'isolated state')}"
     )

@@ -1,4 +1,4 @@
-"""The command that measures movement against a corpus."""
+"""The measure command: compare movement with a corpus."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     "--report",
     section=Section.INPUT,
     type=FILE,
-    help="Take SOURCE's path of states from the report that tween --report wrote with it.",
+    help="Report of SOURCE from tween --report, for its path of states.",
 )
 @JSON
 @reading
@@ -43,9 +43,9 @@ def measure(
 ) -> None:
     """Measure movement, and compare it with a corpus.
 
-    SOURCE is any movement: a tween, a recording, CORPUS/CLIP or SCORE/CLIP. Its dynamics are measured at 30 frames per
-    second, its vocabulary in the corpus's states. The range runs from the 5th to the 95th percentile of the corpus's
-    clips, cut to pieces as long as SOURCE, or to a tenth of the corpus; figures beyond it are marked < or >.
+    SOURCE is any movement: a tween, a recording, CORPUS/CLIP or SCORE/CLIP. Dynamics are measured at 30 frames per
+    second, vocabulary in the corpus's states. The range runs from the 5th to the 95th percentile of the corpus's clips,
+    cut to the length of SOURCE, or to a tenth of the corpus; < or > marks values outside it.
     """
     import msgspec
     import numpy as np
@@ -60,10 +60,10 @@ def measure(
     if report is not None:
         tween = read_report(report)
         if tuple(tween.joints) != engine.corpus.chains:
-            raise MotionMindError(f"{report}: its tween is not of {corpus}, whose joints differ")
+            raise MotionMindError(f"{report}: not a tween of {corpus}, which has other joints")
         path = np.array(tween.path, dtype=np.int32)
         if np.any(path < 0) or np.any(path >= engine.space.sizes):
-            raise MotionMindError(f"{report}: its tween is not of {corpus}, which has no such states")
+            raise MotionMindError(f"{report}: not a tween of {corpus}, which lacks its states")
     found = measure(motion, engine, path)
     if as_json:
         click.echo(json.dumps(msgspec.to_builtins(MeasureReport.of(engine.corpus.name, len(motion), found))))
@@ -71,7 +71,7 @@ def measure(
     seconds = motion.times[-1] - motion.times[0]
     click.echo(
         f"{displayed_path(source)}: {count(len(motion), 'frame')} in {seconds:.2f} s, "
-        f"beside {displayed(engine.corpus.name)}"
+        f"compared with {displayed(engine.corpus.name)}"
     )
     width = max(map(len, found))
     click.echo(f"{'':{width}}     value    corpus 5 to 95 %")

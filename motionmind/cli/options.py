@@ -22,33 +22,33 @@ _SHOW_ALL_KEY = "motionmind.cli.options.show_all"  # key of a context's `meta`
 
 
 class Section(StrEnum):
-    """Headings of options on a page of help, in their order there."""
+    """Headings of options in --help, in their order."""
 
     OUTPUT = "Output"
     CORPORA = "Corpora"
     INPUT = "Input files"
-    PART = "Which part to take"
-    EDITS = "How to edit"
-    TRAJECTORY = "Which trajectory to follow"
-    THROUGH = "What to pass through"
-    SEARCH = "How to search"
-    WEIGH = "How to weigh"
-    MOTION = "How to move"
-    LEARN = "What to learn"
-    STATES = "What counts as one state"
-    WORKERS = "Who does the work"
-    CHECK = "How to check"
-    DRAW = "How to draw"
-    ABOUT = "About the corpus"
-    ADVANCED = "Rarely needed"
+    PART = "Selection"
+    EDITS = "Edits"
+    TRAJECTORY = "Trajectory"
+    THROUGH = "Constraints"
+    SEARCH = "Search"
+    WEIGH = "Costs"
+    MOTION = "Motion"
+    LEARN = "Learning"
+    STATES = "States"
+    WORKERS = "Workers"
+    CHECK = "Checks"
+    DRAW = "Drawing"
+    ABOUT = "Metadata"
+    ADVANCED = "Advanced"
     HELP = "Help"
 
 
 class Option(click.Option):
-    """An option that stands in one section of its command's help.
+    """An option listed under a heading of its command's help.
 
     Attributes:
-        section: the heading that it is listed under.
+        section: the heading.
     """
 
     def __init__(self, *args: Any, section: Section, advanced: bool = False, **attributes: Any) -> None:
@@ -61,10 +61,12 @@ def option(
 ) -> Callable[[_Function], _Function]:
     """Add an option to a command.
 
+    The help of an option with a value is a noun phrase for the value; the help of a flag is an imperative.
+
     Args:
-        names: its flags, and the name of its parameter where the flags do not give it.
+        names: its flags, and the name of its parameter if it differs.
         section: the heading to list it under.
-        advanced: whether it is listed under "Rarely needed" instead, by --help-all alone.
+        advanced: whether to list it under "Advanced" instead, which only --help-all shows.
         attributes: other arguments of `click.Option`.
     """
     return click.option(*names, cls=Option, section=section, advanced=advanced, **attributes)
@@ -78,20 +80,20 @@ def _show_all(context: click.Context, _: click.Parameter, is_given: bool) -> Non
 
 
 class Command(click.Command):
-    """A command whose help lists its options by section, and rare ones for --help-all alone."""
+    """A command whose help lists its options by section; only --help-all lists the advanced ones."""
 
     def __init__(self, *args: Any, **attributes: Any) -> None:
         super().__init__(*args, **attributes)
         flag: dict[str, Any] = {"is_flag": True, "is_eager": True, "expose_value": False, "callback": _show_all}
-        text, is_useless = "Show all options and exit.", not self._has_advanced()
-        self.params.append(Option(["--help-all"], section=Section.HELP, help=text, hidden=is_useless, **flag))
+        text, is_hidden = "Show all options and exit.", not self._has_advanced()
+        self.params.append(Option(["--help-all"], section=Section.HELP, help=text, hidden=is_hidden, **flag))
 
     def get_short_help_str(self, limit: int = 45) -> str:
-        """Return the first sentence of the help, whole, whatever the limit: a list of commands breaks its lines."""
+        """Return the whole first sentence of the help, ignoring the limit: a list of commands breaks its lines."""
         return super().get_short_help_str(max(limit, 1000))
 
     def sections(self, context: click.Context) -> dict[Section, list[click.Option]]:
-        """Return the options that are not hidden under each heading, advanced ones too, in the order of the page."""
+        """Return the visible options under each heading, advanced ones too, in the order of --help."""
         found: dict[Section, list[click.Option]] = {section: [] for section in Section}
         for parameter in self.get_params(context):
             if isinstance(parameter, click.Option) and not parameter.hidden:
@@ -99,25 +101,25 @@ class Command(click.Command):
         return {section: options for section, options in found.items() if options}
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the sections, without the rare options unless --help-all asks for them."""
+        """Write the sections; the advanced one for --help-all only."""
         for section, options in self.sections(ctx).items():
             if section != Section.ADVANCED or ctx.meta.get(_SHOW_ALL_KEY):
                 with formatter.section(section):
                     formatter.write_dl([record for one in options if (record := one.get_help_record(ctx))])
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the example, and where to find the rare options if they are left out."""
+        """Write the example, and mention --help-all if it lists more options."""
         super().format_epilog(ctx, formatter)
         if self._has_advanced() and not ctx.meta.get(_SHOW_ALL_KEY):
             formatter.write_paragraph()
-            formatter.write_text(f"{ctx.command_path} --help-all lists the rarely needed options, too.")
+            formatter.write_text(f"{ctx.command_path} --help-all lists the advanced options, too.")
 
     def _has_advanced(self) -> bool:
         return any(isinstance(one, Option) and one.section == Section.ADVANCED for one in self.params)
 
 
 class Group(Command, click.Group):
-    """Commands in the order in which a user comes to need them."""
+    """Commands listed in the order in which they are added, instead of alphabetically."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return their names."""
@@ -130,20 +132,20 @@ class Group(Command, click.Group):
 
 
 def command(example: str, name: str | None = None) -> Callable[[Callable[..., Any]], Command]:
-    """Make a function a command, whose help shows an example.
+    """Make a function a command whose help shows an example.
 
     Args:
-        example: a command line that runs as it stands.
+        example: a command line that runs unchanged.
         name: the command's name; the function's by default.
     """
     return click.command(name, cls=Command, epilog=_epilog(example))
 
 
 def group(example: str, name: str | None = None, **attributes: Any) -> Callable[[Callable[..., Any]], Group]:
-    """Make a function a group of commands that shows its help when called alone.
+    """Make a function a group of commands, which shows its help when called without one.
 
     Args:
-        example: a command line that runs as it stands.
+        example: a command line that runs unchanged.
         name: the group's name; the function's by default.
         attributes: other arguments of `click.Group`.
     """
@@ -151,18 +153,18 @@ def group(example: str, name: str | None = None, **attributes: Any) -> Callable[
 
 
 def show_help_without_command(context: click.Context) -> None:
-    """Print the help of a group that is called without a command."""
+    """Print the help of a group called without a command."""
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
 
 
 def _epilog(example: str) -> str:
-    """Set an example on a line that is not wrapped, so that it can be copied."""
+    """Format an example on one line, which click does not wrap, to be copied."""
     return f"\b\nExample:\n  {example}"
 
 
 def given_option(context: click.Context, names: Collection[str]) -> str | None:
-    """Return the first flag of the first option among `names` that stands on the command line; None if none does."""
+    """Return the first flag of the first option among `names` given on the command line; None if there is none."""
     for parameter in context.command.params:
         source = context.get_parameter_source(parameter.name) if parameter.name in names else None
         if source is ParameterSource.COMMANDLINE:
@@ -171,11 +173,11 @@ def given_option(context: click.Context, names: Collection[str]) -> str | None:
 
 
 def outputs(text: str, *, required: bool = True) -> Callable[[_Function], _Function]:
-    """Add -o, which may be repeated, as `outputs`: a tuple of paths.
+    """Add a repeatable -o as `outputs`: a tuple of paths.
 
     Args:
-        text: its help text, without that it may be repeated.
-        required: whether there must be one.
+        text: its help text, without "Repeatable."
+        required: whether it must be given.
     """
     return option(
         "-o",
@@ -193,9 +195,9 @@ def output(
     text: str,
     *,
     required: bool = True,
-    type: click.ParamType[Any] = FILE,  # noqa: A002 - as `option` calls it
+    type: click.ParamType[Any] = FILE,  # noqa: A002 - click's name
 ) -> Callable[[_Function], _Function]:
-    """Add -o, which may be given once, as `output`: a path, or None.
+    """Add an -o that may be given once as `output`: a path, or None.
 
     Args:
         text: its help text.
@@ -216,7 +218,7 @@ def output(
 
 def _only_one(context: click.Context, _: click.Parameter, paths: tuple[Path, ...]) -> Path | None:
     if len(paths) > 1:
-        raise click.UsageError(f"-o is given {len(paths)} times, and one file is written; give it once", context)
+        raise click.UsageError(f"-o is given {len(paths)} times; this command writes one file", context)
     return paths[0] if paths else None
 
 
@@ -226,7 +228,7 @@ HOME = option(
     type=FOLDER,
     envvar="MOTIONMIND_HOME",
     show_envvar=True,
-    help="Keep the corpora that you build in this folder  [default: the platform's data directory]",
+    help="Folder of the corpora that you build  [default: the platform's data directory]",
 )
 JSON = option("--json", "as_json", section=Section.OUTPUT, is_flag=True, help="Print JSON.")
 CORPUS = option(
@@ -234,47 +236,47 @@ CORPUS = option(
     section=Section.CORPORA,
     required=True,
     metavar="NAME",
-    help="Take this corpus, by name or folder.",
+    help="Corpus to use, by name or folder.",
     shell_complete=completion.corpora,
 )
 
 
 def reading(function: _Function) -> _Function:
-    """Add the options of commands that read movement: `joints`, `unit`, `asf`, `source_fps` and `up`."""
+    """Add the options for reading motion files: `joints`, `unit`, `asf`, `source_fps` and `up`."""
     for decorate in (
         option(
             "--up",
             section=Section.INPUT,
             advanced=True,
             type=click.Choice(["y", "z"]),
-            help="Say which axis is up in the file  [default: the one that people stand along]",
+            help="Axis that is up in the file  [default: the one that people stand along]",
         ),
         option(
             "--source-fps",
             section=Section.INPUT,
             advanced=True,
             type=RATE,
-            help="Set the frames per second of BVH, .amc, .npz, .pkl, .npy and .txt  "
-            "[default: what the file states; .amc 120, .pkl 60, .npy 30, else .txt 1]",
+            help="Frames per second of a BVH, .amc, .npz, .pkl, .npy or .txt file  "
+            "[default: the file's own; .amc 120, .pkl 60, .npy 30, .txt 1]",
         ),
         option(
             "--asf",
             section=Section.INPUT,
             type=EXISTING_FILE,
-            help="Read an AMC file's skeleton from this file  [default: the one beside it]",
+            help="Skeleton file of an AMC file  [default: the .asf beside it]",
         ),
         option(
             "--unit",
             section=Section.INPUT,
             metavar="UNIT",
-            help="Set BVH's unit of length: m, cm, mm, dm, in, ft, cmu, or metres per unit  "
+            help="Unit of length of BVH: m, cm, mm, dm, in, ft, cmu, or metres per unit  "
             "[default: guessed from the body's height; metres for glTF and .npz]",
         ),
         option(
             "--joints",
             section=Section.INPUT,
             type=FILE,
-            help="Map joints by a TOML or JSON file: your joint = human23's.",
+            help="TOML or JSON file that maps joints to human23: your joint = human23's.",
         ),
     ):
         function = decorate(function)

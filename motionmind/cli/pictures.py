@@ -32,7 +32,7 @@ FIRST = option(
     type=FRAME,
     metavar="N",
     default=0,
-    help="Begin at frame N, counted from the end if negative.",
+    help="First frame; negative numbers count from the end.",
 )
 LAST = option(
     "--to",
@@ -41,44 +41,44 @@ LAST = option(
     type=FRAME,
     metavar="N",
     default=-1,
-    help="End at frame N, counted from the end if negative.",
+    help="Last frame; negative numbers count from the end.",
 )
 
 
 @command("motionmind sheet ballet/adagio -o adagio.png")
 @click.argument("source", shell_complete=completion.movement)
-@output("Write the picture: .png; or a picture of each clip into a folder.", type=FILE_OR_FOLDER)
+@output("Picture (.png), or a folder for a picture of each clip.", type=FILE_OR_FOLDER)
 @option(
     "--clip",
     "names",
     section=Section.PART,
     multiple=True,
     metavar="NAME",
-    help="Take this clip of a score or a corpus  [default: all]. Repeatable.",
+    help="Clip of a score or a corpus  [default: all]. Repeatable.",
 )
 @FIRST
 @LAST
-@option("--every", section=Section.PART, type=COUNT, metavar="N", help="Draw every Nth frame  [default: all]")
+@option("--every", section=Section.PART, type=COUNT, metavar="N", help="Interval between drawn frames  [default: 1]")
 @option(
     "--postures",
     section=Section.PART,
     type=COUNT,
     metavar="N",
-    help="Draw N evenly spread frames, the first and the last included.",
+    help="Number of evenly spaced frames to draw, from the first to the last.",
 )
 @option(
     "--columns",
     section=Section.DRAW,
     type=COUNT,
     metavar="N",
-    help="Put N postures in a row  [default: as many as suit the screen]",
+    help="Postures per row  [default: as many as suit the screen]",
 )
 @option(
     "--side",
     section=Section.DRAW,
     type=click.Choice(["right", "left"]),
     default="right",
-    help="Take the side view from this side of the stage, as the performer sees it.",
+    help="Side of the stage, as the performer sees it, for the side view.",
 )
 @reading
 @HOME
@@ -97,8 +97,8 @@ def sheet(
 ) -> None:
     """Draw the postures of clips side by side.
 
-    SOURCE is a file of movement, a score, a corpus by its name or folder, CORPUS/CLIP, or a posture such as
-    ballet/arabesque. Scores and corpora hold several clips; --clip takes some.
+    SOURCE is a motion file, a score, a corpus by name or folder, CORPUS/CLIP, or a posture such as ballet/arabesque.
+    --clip selects clips of a score or a corpus.
 
     The sheet draws each posture from the front and from the side, and its feet from above, with its time and frame
     number: frame 23 is the posture SOURCE@23.
@@ -127,13 +127,13 @@ def sheet(
 
 @command("motionmind render clip.bvh -o clip.html")
 @click.argument("source", shell_complete=completion.movement)
-@outputs("Write a picture (.png), a film (.gif, .mp4, .svg) or a page (.html).")
+@outputs("Picture (.png), film (.gif, .mp4, .svg) or page (.html).")
 @option(
     "--clip",
     "name",
     section=Section.PART,
     metavar="NAME",
-    help="Take this clip of a score or a corpus  [default: its only one]",
+    help="Clip of a score or a corpus  [default: its only one]",
 )
 @FIRST
 @LAST
@@ -141,20 +141,20 @@ def sheet(
     "--fps",
     section=Section.DRAW,
     type=RATE,
-    help="Show N frames per second in a film  [default: the movement's own, at most 25 in .gif; .svg 12]",
+    help="Frames per second of a film  [default: the movement's own, at most 25 in .gif; .svg 12]",
 )
 @option(
     "--view",
     section=Section.DRAW,
     type=click.Choice(["quarter", "front", "side", "left", "top"]),
-    help="View a film or a posture from here  [default: quarter]",
+    help="Camera of a film or a posture  [default: quarter]",
 )
 @option(
     "--size",
     section=Section.DRAW,
     type=Whole(120, 2160),
     metavar="PIXELS",
-    help="Make a film or a posture this high  [default: 480]",
+    help="Height of a film or the picture of a posture  [default: 480]",
 )
 @reading
 @HOME
@@ -163,9 +163,9 @@ def render(
 ) -> None:
     """Draw movement as a picture, a film, or a page that plays it.
 
-    SOURCE is a file of movement, a score, a corpus by its name or folder, CORPUS/CLIP, or a posture such as
-    ballet/arabesque. A .png shows one posture, or a sheet of up to 48 evenly spread ones (the sheet command has more
-    options); an .html page plays the movement in any browser, from disk, offline. Inserted movement is violet; a green
+    SOURCE is a motion file, a score, a corpus by name or folder, CORPUS/CLIP, or a posture such as ballet/arabesque.
+    A .png shows one posture, or a sheet of up to 48 evenly spaced ones (the sheet command has more options); an .html
+    page plays the movement in any browser, from disk, offline. Inserted movement is violet; a green
     ball marks a bridged joint.
     """
     from motionmind.render.pictures import draw_picture
@@ -204,7 +204,7 @@ def _make_files(folder: Path, motions: Sequence[Motion], read_from: Sequence[Pat
 
 
 def _select_drawn(frames: range, every: int | None, postures: int | None) -> Sequence[int]:
-    """Select every `every`th frame, or as many as `postures`, evenly spread from the first to the last."""
+    """Select every `every`th frame, or `postures` evenly spaced ones from the first to the last."""
     if every and postures:
         raise MotionMindError("--every and --postures both choose the frames to draw; give one of them")
     from motionmind.render.sheet import evenly

@@ -1,4 +1,4 @@
-"""The commands that fetch corpora that others publish, and publish one's own."""
+"""The commands that fetch published corpora and publish your own."""
 
 from __future__ import annotations
 
@@ -28,26 +28,22 @@ INDEX = option(
     envvar="MOTIONMIND_INDEX",
     show_envvar=True,
     metavar="PLACE",
-    help="Look in this index first, by file or address  [default: only the one that comes with MotionMind]",
+    help="Index to search first, by file or address  [default: only the one bundled with MotionMind]",
 )
-_LICENCE_CHARS = 300  # characters of a title or a licence
-_LINE_CHARS = 100  # characters to which sentences are wrapped
+_MAX_TEXT_CHARS = 300  # of a title or a licence
 
 
 @command("motionmind corpus fetch hands --index public/index.json --as fingers")
 @click.argument("name", shell_complete=completion.published)
-@option(
-    "--as", "new_name", section=Section.CORPORA, metavar="NAME", help="Give the corpus this name  [default: its own]"
-)
+@option("--as", "new_name", section=Section.CORPORA, metavar="NAME", help="New name of the corpus  [default: its own]")
 @INDEX
 @HOME
 def fetch(name: str, new_name: str | None, index: str | None, home: Path | None) -> None:
-    """Fetch a corpus that others publish.
+    """Fetch a published corpus.
 
-    NAME is a name in the index, or the address of another index, with #NAME after it where that holds several corpora.
-    The archive is verified against the index and kept; where a download ends early, the next one goes on. Of
-    collections that may not be passed on, the recipe is printed: where they are, under which licence, and how to build
-    a corpus of them.
+    NAME is a name in the index, or the address of another index, followed by #NAME if it lists several corpora. The
+    command verifies the archive against the index and keeps it; an interrupted download resumes. For a collection that
+    may not be redistributed, the command prints a recipe: its address, its licence, and how to build a corpus from it.
     """
     from motionmind.registry.fetching import fetch, look_up
     from motionmind.registry.index import Recipe
@@ -55,7 +51,7 @@ def fetch(name: str, new_name: str | None, index: str | None, home: Path | None)
     found, source = look_up(name, index)
     if isinstance(found, Recipe):
         _print_recipe(found)
-        raise CorpusError(f"{found.name} is not passed on; the steps above lead to it")
+        raise CorpusError(f"{found.name} may not be redistributed; the steps above build it")
     _print_terms(found)
     prepare()
     with click.progressbar(
@@ -66,12 +62,12 @@ def fetch(name: str, new_name: str | None, index: str | None, home: Path | None)
 
 
 def _print_terms(entry: Entry) -> None:
-    """Print what a corpus is, and under which terms it may be used."""
+    """Print the metadata of a corpus and its terms of use."""
     from motionmind.credits.licences import find_licence
 
     size = f"{entry.archive.size / 10**6:,.1f} MB"
     click.echo(
-        f"{displayed(entry.title, _LICENCE_CHARS)} "
+        f"{displayed(entry.title, _MAX_TEXT_CHARS)} "
         f"({count(entry.clips, 'clip')}, {count(entry.postures, 'posture')}, {size})"
     )
     rows = [
@@ -83,11 +79,11 @@ def _print_terms(entry: Entry) -> None:
     ]
     for label, text in rows:
         if text:
-            click.echo(f"{label:12} {displayed(text, _LICENCE_CHARS)}")
+            click.echo(f"{label:12} {displayed(text, _MAX_TEXT_CHARS)}")
 
 
 def _print_recipe(recipe: Recipe) -> None:
-    """Print how to come by a collection, whole: each line of it matters."""
+    """Print a recipe in full, since each line matters."""
     rows = [
         ("title", recipe.title),
         ("performed by", recipe.performers),
@@ -101,18 +97,18 @@ def _print_recipe(recipe: Recipe) -> None:
         *(("unverified", text) for text in recipe.unverified),
     ]
     for label, text in rows:
-        is_command = text.startswith("motionmind ")  # to be copied, in one line
-        lines = [text] if is_command else wrap(text, _LINE_CHARS, break_on_hyphens=False, break_long_words=False)
+        is_command = text.startswith("motionmind ")  # one line, to be copied
+        lines = [text] if is_command else wrap(text, 100, break_on_hyphens=False, break_long_words=False)
         for first, line in zip([label, *[""] * len(lines)], lines, strict=False):
             click.echo(f"{first:12} {printable(line)}")
 
 
 def print_index(place: str | None, *, as_json: bool) -> None:
-    """Print what an index holds, and the recipes that come with MotionMind.
+    """Print the corpora and recipes of an index and of the bundled one.
 
     Args:
-        place: the index, as for --index.
-        as_json: whether to print entries and recipes whole, as JSON.
+        place: the index, as for --index; None for the bundled one alone.
+        as_json: whether to print all fields, as JSON.
     """
     import msgspec
 
@@ -130,7 +126,7 @@ def print_index(place: str | None, *, as_json: bool) -> None:
     rows += [(recipe.name, "recipe", f"{recipe.title}; {recipe.licence}") for recipe in recipes]
     width = max((len(displayed(name)) for name, *_ in rows), default=0)
     for name, size, text in rows:
-        click.echo(f"{displayed(name):{width}}  {size:>10}  {displayed(text, _LICENCE_CHARS)}")
+        click.echo(f"{displayed(name):{width}}  {size:>10}  {displayed(text, _MAX_TEXT_CHARS)}")
 
 
 @command(
@@ -138,27 +134,23 @@ def print_index(place: str | None, *, as_json: bool) -> None:
     "--licence-file LICENCE.txt"
 )
 @click.argument("folder", shell_complete=completion.corpora)
-@output("Write into this folder; corpora that its index lists stay.", type=FOLDER)
+@output("Folder to write to; corpora already in its index stay.", type=FOLDER)
 @option(
     "--url",
     section=Section.ABOUT,
     required=True,
     metavar="ADDRESS",
-    help="State the address that the folder will have on the network.",
+    help="Address at which the folder will be served.",
 )
-@option(
-    "--date", section=Section.ABOUT, required=True, metavar="DAY", help="State the day of publication, as 2026-11-23."
-)
+@option("--date", section=Section.ABOUT, required=True, metavar="DAY", help="Day of publication, as 2026-11-23.")
 @option(
     "--licence-file",
     section=Section.ABOUT,
     required=True,
     type=EXISTING_FILE,
-    help="Publish the text of the licence, from this file.",
+    help="File with the text of the licence.",
 )
-@option(
-    "--licence-url", section=Section.ABOUT, metavar="ADDRESS", help="State the address by which the licence is known."
-)
+@option("--licence-url", section=Section.ABOUT, metavar="ADDRESS", help="Address of the licence.")
 @HOME
 def publish(
     folder: str,
@@ -168,9 +160,9 @@ def publish(
 ) -> None:
     """Publish a corpus, by name or folder.
 
-    What is written can be put on any server that serves files: an archive, metadata in the words of Croissant, by which
-    search engines find data sets, and an index for `motionmind corpus fetch`. The same corpus gives the same bytes.
-    Title, author, source and licence are those that the corpus was built with.
+    The output suits any server of static files: an archive, Croissant metadata, by which search engines find data sets,
+    and an index for `motionmind corpus fetch`. The same corpus gives the same bytes. Title, author, source and licence
+    come from corpus build.
     """
     from motionmind.formats.text import decode
     from motionmind.registry.publishing import publish

@@ -15,13 +15,11 @@ if TYPE_CHECKING:
     from motionmind.tween.engine import Engine
     from motionmind.variation.variation import Variation
 
-_MANY_INSERTIONS_SHARE = 0.3  # share of the time beyond which insertions are much
-_STANDS_STILL_SHARE = 0.25  # share of steps that stay, beyond which a variation seems to stand still
-_NAME_CHARS = 24  # characters of a posture's name in a table
+_MANY_INSERTIONS_SHARE = 0.3  # of the time: above it, a note recommends --inserted
 
 
 def print_review(report: dict[str, Any], names: Sequence[str]) -> None:
-    """Print the report of a variation: how it was made, then a line for each stretch of the piece and its seam.
+    """Print the report of a variation: its method, then a line for each stretch of the piece and its seam.
 
     Args:
         report: the report, as plain values.
@@ -30,11 +28,12 @@ def print_review(report: dict[str, Any], names: Sequence[str]) -> None:
     course, counts = report["course"], report["counts"]
     click.echo(
         f"{displayed(report['piece']['name']) or 'piece'}, {count(report['piece']['postures'], 'posture')}, "
-        f"by {_format_making(report['control'], course)}"
+        f"by {_format_method(report['control'], course)}"
     )
     if course:
         click.echo(
-            f"Lyapunov exponent {course['exponent']:.2g}: trajectories part by {course['parting']:.2g} nats a posture"
+            f"Lyapunov exponent {course['exponent']:.2g}: trajectories diverge by {course['parting']:.2g} nats per "
+            "posture"
         )
     seams = f"{count(counts['seams'], 'seam')} ({counts['departed']:.0%} of steps)"
     click.echo(
@@ -49,7 +48,7 @@ def print_review(report: dict[str, Any], names: Sequence[str]) -> None:
     if report["limits"]:
         shortest = min(end - begin + 1 for begin, end in zip(begins, ends, strict=True))
         kept = _format_limits(report["limits"], counts["inserted_share"], shortest)
-        click.echo(f"{kept}without limits it leaves the piece in {course['departed']:.0%} of steps")
+        click.echo(f"{kept}without limits, {course['departed']:.0%} of steps leave the piece")
     if counts["stays"]:
         click.echo(_format_stillness(counts))
     spans = [(report["order"][first], report["order"][last]) for first, last in zip(begins, ends, strict=True)]
@@ -63,36 +62,36 @@ def print_review(report: dict[str, Any], names: Sequence[str]) -> None:
         click.echo(f"{row}  {decision:9}  {_format_transition(seam)}" if seam else row.rstrip())
 
 
-def _format_making(control: dict[str, Any] | None, course: dict[str, Any] | None) -> str:
-    """Format how an order was made: "dabby, along rossler (a 0.2, b 0.2, c 5.7), nudge 0.01, 0, 0, skip 10"."""
-    made = []
+def _format_method(control: dict[str, Any] | None, course: dict[str, Any] | None) -> str:
+    """Format the method of an order: "dabby, along rossler (a 0.2, b 0.2, c 5.7), nudge 0.01, 0, 0, skip 10"."""
+    parts = []
     if control:
-        made.append(control["by"] if control["seed"] is None else f"{control['by']}, seed {control['seed']}")
+        parts.append(control["by"] if control["seed"] is None else f"{control['by']}, seed {control['seed']}")
     if course:
         values = ", ".join(f"{name} {value:g}" for name, value in course["parameters"].items())
         nudge = ", ".join(f"{x:g}" for x in course["nudge"])
-        made.append(f"{course['flow']} ({values}), nudge {nudge}, skip {course['skip']}")
-    return ", along ".join(made)
+        parts.append(f"{course['flow']} ({values}), nudge {nudge}, skip {course['skip']}")
+    return ", along ".join(parts)
 
 
 def _format_limits(limits: dict[str, Any], share: float, shortest: int) -> str:
-    """Format what a variation is kept within: "kept within 30% inserted, in stretches of 4 postures at least; ".
+    """Format the limits that a variation meets: "at most 30% inserted, stretches of at least 4 postures; ".
 
     Args:
-        limits: those that its first order was kept within; edits may have gone beyond them.
-        share: share of the time that is inserted now.
-        shortest: postures of the shortest stretch now.
+        limits: the limits of its first order; edits may exceed them.
+        share: share of inserted time after the edits.
+        shortest: postures of the shortest stretch after the edits.
     """
     kept = []
     if limits["inserted"] is not None and share <= limits["inserted"]:
-        kept.append(f"within {limits['inserted']:.0%} inserted")
+        kept.append(f"at most {limits['inserted']:.0%} inserted")
     if shortest >= limits["stretch"]:
-        kept.append(f"in stretches of {count(limits['stretch'], 'posture')} at least")
-    return f"kept {', '.join(kept)}; " if kept else ""
+        kept.append(f"stretches of at least {count(limits['stretch'], 'posture')}")
+    return f"limits: {', '.join(kept)}; " if kept else ""
 
 
 def _format_stillness(counts: dict[str, Any]) -> str:
-    """Format how many of a variation's steps stay in their posture, and how long: "32 of 79 steps stay, 6.4 s"."""
+    """Format the number and duration of a variation's steps without movement: "32 of 79 steps stay, 6.4 s"."""
     stays, steps = counts["stays"], count(counts["postures"] - 1, "step")
     return f"{stays} of {steps} stay{'s' * (stays == 1)}, {counts['seconds_still']:.1f} s"
 
@@ -103,7 +102,7 @@ def _format_stretch(first: int, last: int) -> str:
 
 def _format_names(first: str, last: str) -> str:
     """Format the names of the first and the last posture of a stretch: "adagio@3..17", "adagio@3 to tendu"."""
-    one, other = (displayed(name, _NAME_CHARS) for name in (first, last))
+    one, other = (displayed(name, 24) for name in (first, last))
     clip, at, frame = other.rpartition("@")
     if first == last:
         return one
@@ -134,33 +133,33 @@ def _format_transition(seam: dict[str, Any]) -> str:
 
 
 def print_advice(variation: Variation, engine: Engine | None, depart: float | None) -> None:
-    """Note what to change if a variation is not what was asked for, or not what one would want.
+    """Note which options to change if a variation misses a request, or hardly varies or moves.
 
     Args:
         variation: the variation.
-        engine: what judged it; None for nothing.
-        depart: the share of steps for which a nudge was sought, if one was.
+        engine: the engine that judged it; None if there is none.
+        depart: the requested share of steps that leave the piece's order; None if not requested.
     """
     from motionmind.variation.departure import DEPARTURE_TOLERANCE, departure
 
     refused = REFUSED[variation.by]
     reached = departure(variation.first_order)
     if depart is not None and abs(reached - depart) > DEPARTURE_TOLERANCE:
-        note(f"no nudge was found by which {depart:.0%} of steps leave the piece's order; the nearest is {reached:.0%}")
+        note(f"no nudge found for --depart {depart:.0%}; the nearest share is {reached:.0%}")
     counts = variation.report()["counts"]
     limits = variation.kept.limits if variation.kept else None
     if not variation.seams and limits:
-        note("within its limits the variation does not leave the piece's order: allow more by --inserted or --stretch")
+        note("within its limits the variation keeps the piece's order: raise --inserted, or lower --stretch")
     elif not variation.seams:
         hints = {"depart": "--depart 0.25", "length": "a larger --length"}
         tries = ", or ".join(hint for name, hint in hints.items() if name not in refused)
-        note("the variation does not leave the piece's order" + f": try {tries}" * bool(tries))
+        note("the variation keeps the piece's order" + f": try {tries}" * bool(tries))
     elif engine is None:
-        note("no corpus says which transitions are abrupt, so none is smoothed: name one by --corpus")
+        note("without --corpus, no transition is judged or smoothed")
     share = counts["inserted_share"]
     if limits is None and share > _MANY_INSERTIONS_SHARE and "inserted" not in refused:
         note(f"insertions take {share:.0%} of the time: --inserted {_MANY_INSERTIONS_SHARE:g} keeps more of the piece")
     if limits and limits.inserted is not None and share > limits.inserted:
-        note(f"no order was found with {limits.inserted:.0%} of the time inserted at most; this one has {share:.0%}")
-    if counts["stays"] > _STANDS_STILL_SHARE * (counts["postures"] - 1):
+        note(f"no order found with at most {limits.inserted:.0%} of the time inserted; this one has {share:.0%}")
+    if counts["stays"] > 0.25 * (counts["postures"] - 1):
         note(f"{_format_stillness(counts)}: try another --start, or a larger --skip or --step")

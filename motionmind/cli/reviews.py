@@ -1,4 +1,4 @@
-"""The command that reviews a variation and edits it."""
+"""The review command: list the seams of a variation, and edit it."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli import completion
+from motionmind.cli.exits import ExitCode
 from motionmind.cli.files import check_outputs
 from motionmind.cli.options import HOME, JSON, Section, command, given_option, option, output
 from motionmind.cli.printing import Interruption, count, note, print_written
 from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searching
-from motionmind.cli.tweens import INTERRUPTED
 from motionmind.cli.types import COUNT, FILE, NATURAL, Numbers, Span
 from motionmind.cli.variations import load_engine, names_in, print_variation
 from motionmind.display import displayed_path
@@ -27,64 +27,68 @@ if TYPE_CHECKING:
 @command("motionmind review variation.json --approve 1,2 --discard 4 --list")
 @click.argument("file", type=FILE)
 @output(
-    "Write the edited variation: .json  [default: FILE itself]; with --play a picture (.png), a film (.gif, .mp4, "
-    ".svg) or a page (.html).",
+    "Edited variation (.json)  [default: FILE itself]; with --play, picture (.png), film (.gif, .mp4, .svg) or page "
+    "(.html).",
     required=False,
 )
-@option("--list", "listing", section=Section.OUTPUT, is_flag=True, help="Print the seams, after the edits.")
+@option("--list", "listing", section=Section.OUTPUT, is_flag=True, help="Print the seams after the edits.")
 @JSON
 @option(
     "--sheet",
     section=Section.OUTPUT,
     type=FILE,
-    help="Draw each seam, after the edits: the posture before it, what is inserted, the posture after it (.png).",
+    help="Picture of each seam after the edits: the posture before, the insertion, the posture after (.png).",
 )
 @option(
     "--play",
     section=Section.OUTPUT,
     type=COUNT,
     metavar="SEAM",
-    help="Draw the movement around this seam into -o, with --alternative K in its place; nothing is edited.",
+    help="Seam whose surrounding movement to draw into -o, with --alternative K if given; edits nothing.",
 )
-@option("--undo", section=Section.EDITS, count=True, help="Take back the last edit; repeat for earlier ones.")
+@option("--undo", section=Section.EDITS, count=True, help="Undo the last edit; repeat for earlier ones.")
 @option(
     "--cut",
     section=Section.EDITS,
     type=Span(),
     metavar="A..B",
-    help="Take out postures A to B, as --list numbers them, to --paste them elsewhere.",
+    help="Range of postures, as numbered by --list, to cut and --paste elsewhere.",
 )
-@option("--paste", section=Section.EDITS, type=NATURAL, metavar="N", help="Put what was cut before posture N.")
+@option(
+    "--paste",
+    section=Section.EDITS,
+    type=NATURAL,
+    metavar="N",
+    help="Posture before which to insert the cut.",
+)
 @option(
     "--smooth",
     section=Section.EDITS,
     metavar="CORPUS",
     shell_complete=completion.corpora,
-    help="Judge and smooth, by this corpus, the seams that are not smoothed yet, or are discarded.",
+    help="Corpus by which to judge and smooth the seams without an insertion, or with a discarded one.",
 )
-@option(
-    "--replace", section=Section.EDITS, type=COUNT, metavar="SEAM", help="Insert --alternative at this seam instead."
-)
+@option("--replace", section=Section.EDITS, type=COUNT, metavar="SEAM", help="Seam at which to insert --alternative.")
 @option(
     "--alternative",
     section=Section.EDITS,
     type=COUNT,
     metavar="K",
-    help="Choose movement K of those found for the seam to --replace or to --play.",
+    help="Number of the movement found for the seam to --replace or to --play.",
 )
 @option(
     "--approve",
     section=Section.EDITS,
     type=Numbers(),
     metavar="SEAMS",
-    help="Approve these seams, such as 1,3; or all.",
+    help="Seams to approve, such as 1,3; or all.",
 )
 @option(
     "--discard",
     section=Section.EDITS,
     type=Numbers(),
     metavar="SEAMS",
-    help="Leave out the insertions at these seams, such as 2; or all.",
+    help="Seams whose insertions to leave out, such as 2; or all.",
 )
 @option(
     "--alternatives",
@@ -92,7 +96,7 @@ if TYPE_CHECKING:
     type=COUNT,
     metavar="K",
     default=3,
-    help="Find K movements for each seam that --smooth smooths.",
+    help="Number of movements to find for each seam that --smooth smooths.",
 )
 @searching
 @HOME
@@ -110,28 +114,27 @@ def review(
     home: Path | None,
     **options: Any,
 ) -> None:
-    """Review a variation that vary wrote, and edit it.
+    """Review and edit a variation that vary wrote.
 
-    Edits are made in the order in which they are listed below. None of them loses anything: FILE keeps the piece, the
-    variation, all that was found and all that was decided, and --undo takes back one edit after the other. Its
-    movement, which render, sheet and convert take, has all insertions but those discarded.
+    Edits apply in the order of the list below. They lose nothing: FILE keeps the piece, the variation, all movements
+    found and all decisions, and --undo reverts one edit at a time. Its movement, which render, sheet and convert read,
+    has all insertions except discarded ones.
 
-    Seams are numbered in the order in which they come, anew after a --cut; postures are numbered from 0, and named as
-    the corpus names them, or by clip and frame. The options on what to pass through, how to search, how to weigh and
-    how to move are for --smooth.
+    Seams are numbered in order, and renumbered after a --cut. Postures are numbered from 0, and named by the corpus, or
+    by clip and frame. The options under Constraints, Search, Costs and Motion apply to --smooth.
     """
     request = {name: options.pop(name) for name in ("alternatives", *(row.field for row in SEARCH_OPTIONS))}
     has_edits = any(options[name] for name in ("undo", "cut", "replace", "approve", "discard")) or bool(smooth)
     _check_pairs(context, options | {"play": play}, smooth, request)
     if play is not None:
         if has_edits or listing or as_json or sheet:
-            raise click.UsageError("--play draws one seam, and does nothing else", context)
+            raise click.UsageError("--play draws one seam; leave out edits, --list, --json and --sheet", context)
         _play(context, file, play, options["alternative"], output)
         return
     from motionmind.variation.variation_json import read_variation, write_variation
 
     if output and not has_edits:
-        raise click.UsageError("-o is for an edited variation, and no edit is given", context)
+        raise click.UsageError("-o is for an edited variation; give an edit", context)
     outputs = [(output, (".json",))] if output else []
     outputs += [(sheet, (".png",))] if sheet else []
     check_outputs(outputs, [])
@@ -157,20 +160,20 @@ def review(
     if files and not as_json:
         print_written(files)
     if interruption.is_requested:
-        context.exit(INTERRUPTED)
+        context.exit(ExitCode.INTERRUPTED)
 
 
 def _check_pairs(
     context: click.Context, edits: Mapping[str, Any], smooth: str | None, request: Mapping[str, Any]
 ) -> None:
-    """Check that options which need another come with it."""
+    """Check that options that need another come with it."""
     if (edits["cut"] is None) != (edits["paste"] is None):
-        raise click.UsageError("--cut and --paste go together: give both", context)
+        raise click.UsageError("--cut and --paste need each other; give both", context)
     if edits["play"] is None and (edits["replace"] is None) != (edits["alternative"] is None):
-        raise click.UsageError("--replace and --alternative go together: give both, or --play", context)
+        raise click.UsageError("--replace and --alternative need each other; give both, or --play", context)
     unused = given_option(context, request.keys())
     if unused and not smooth:
-        raise click.UsageError(f"{unused} is for --smooth, which is not given", context)
+        raise click.UsageError(f"{unused} needs --smooth", context)
 
 
 def _draw_seams(path: Path, variation: Variation, home: Path | None) -> None:
@@ -183,12 +186,12 @@ def _draw_seams(path: Path, variation: Variation, home: Path | None) -> None:
 
 
 def _play(context: click.Context, file: Path, seam: int, alternative: int | None, output: Path | None) -> None:
-    """Draw the movement around a seam of a variation in a file, with another of its insertions if one is given."""
+    """Draw the movement around a seam of a variation in a file, with an alternative insertion if given."""
     from motionmind.render.pictures import draw_picture
     from motionmind.variation.variation_json import read_variation
 
     if output is None:
-        raise click.UsageError(f"--play draws into a file: name one by -o, such as -o seam-{seam}.gif", context)
+        raise click.UsageError(f"--play needs a file, such as -o seam-{seam}.gif", context)
     check_outputs([(output, PICTURES)], [file])
     motion = read_variation(file).around(seam, alternative)
     draw_picture(output, motion)
@@ -197,7 +200,7 @@ def _play(context: click.Context, file: Path, seam: int, alternative: int | None
 
 
 def _undo_and_cut(variation: Variation, edits: Mapping[str, Any]) -> Variation:
-    """Make the edits that come before smoothing."""
+    """Apply the edits that precede smoothing."""
     for _ in range(edits["undo"]):
         variation = variation.undo()
     if edits["cut"] and edits["paste"] is not None:
@@ -209,7 +212,7 @@ def _undo_and_cut(variation: Variation, edits: Mapping[str, Any]) -> Variation:
 def _smooth(
     variation: Variation, corpus: str, home: Path | None, request: Mapping[str, Any], interruption: Interruption
 ) -> Variation:
-    """Judge and smooth the seams by a corpus; note if that changes nothing."""
+    """Judge and smooth the seams by a corpus; add a note if nothing changes."""
     arguments = request_options({key: value for key, value in request.items() if key != "alternatives"}, home)
     engine = load_engine(corpus, home)
     with interruption:
@@ -222,14 +225,14 @@ def _smooth(
         )
     if smoothed is variation and not interruption.is_requested:
         if any(seam.is_abrupt for seam in variation.seams):
-            note("nothing new was found for the seams that are left to smooth")
+            note("no new movement found for the remaining seams")
         else:
-            note("nothing is left to smooth: --discard the seams to smooth again")
+            note("no seam left to smooth; --discard a seam to smooth it again")
     return smoothed
 
 
 def _decide(variation: Variation, edits: Mapping[str, Any]) -> Variation:
-    """Make the edits that come after smoothing."""
+    """Apply the edits that follow smoothing."""
     if edits["replace"] and edits["alternative"]:
         variation = variation.replace(edits["replace"], edits["alternative"])
     if edits["approve"]:

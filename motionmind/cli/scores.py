@@ -1,4 +1,4 @@
-"""The commands that turn scores into movement, and into libraries of joint states."""
+"""The commands that convert scores to movement and to libraries of joint states."""
 
 from __future__ import annotations
 
@@ -14,21 +14,15 @@ from motionmind.cli.words import parse_tolerances
 from motionmind.display import displayed, displayed_path
 from motionmind.render import PICTURES
 
-_DEFAULT_TOLERANCE_DEG = 12.0  # degrees, for joints that --tolerance does not name
-
 
 @command("motionmind compose ballet/barre.score --clip tendus -o tendus.bvh")
 @click.argument("score", type=FILE)
-@outputs(f"Write {OUTPUT_KINDS}.")
-@option(
-    "--fps", section=Section.OUTPUT, type=RATE, help="Resample to N frames per second  [default: a frame a posture]"
-)
-@option("--clip", section=Section.PART, metavar="NAME", help="Take this clip of the score  [default: its only one]")
-@option(
-    "--posture", section=Section.PART, metavar="NAME", help="Take a posture that the score names, instead of a clip."
-)
+@outputs(f"File to write: {OUTPUT_KINDS}.")
+@option("--fps", section=Section.OUTPUT, type=RATE, help="Frames per second  [default: a frame per posture]")
+@option("--clip", section=Section.PART, metavar="NAME", help="Clip of the score  [default: its only one]")
+@option("--posture", section=Section.PART, metavar="NAME", help="Named posture of the score, instead of a clip.")
 def compose(score: Path, outputs: tuple[Path, ...], clip: str | None, posture: str | None, fps: float | None) -> None:
-    """Turn a score, movement written as text, into a motion.
+    """Convert a score, which is movement written as text, to a motion.
 
     docs/notation.md explains the language of scores.
     """
@@ -62,24 +56,24 @@ def compose(score: Path, outputs: tuple[Path, ...], clip: str | None, posture: s
 
 @command("motionmind library karate/kata.score -o mine.toml --tolerance 12 --tolerance hip=8")
 @click.argument("scores", type=FILE, nargs=-1, required=True)
-@output("Write the library: .toml.")
+@output("Library to write (.toml).")
 @option(
     "--tolerance",
     section=Section.STATES,
     multiple=True,
     metavar="DEGREES",
-    help="Let orientations of one state lie this far apart, or JOINT=DEGREES for one joint  [default: 12]. Repeatable.",
+    help="Size of a state in degrees, or JOINT=DEGREES for one joint  [default: 12]. Repeatable.",
 )
 @option(
     "--stage",
     section=Section.STATES,
     is_flag=True,
-    help="Let the pelvis's states tell where the body faces, as on a stage.",
+    help="Distinguish states of the pelvis by where the body faces, as on a stage.",
 )
 def library(scores: tuple[Path, ...], output: Path, tolerance: tuple[str, ...], stage: bool) -> None:
     """Write a library of joint states from scores.
 
-    States are named as the scores name them. Edit the library, and use it with corpus build --discretize.
+    States have their names in the scores. Edit the library, and use it with corpus build --discretize.
     """
     from motionmind.discretize.library import write_library
     from motionmind.discretize.naming import name_states
@@ -88,7 +82,7 @@ def library(scores: tuple[Path, ...], output: Path, tolerance: tuple[str, ...], 
 
     places = [locate_score(str(score)) for score in scores]
     check_outputs([(output, (".toml",))], places)
-    degrees, per_joint = parse_tolerances(tolerance, _DEFAULT_TOLERANCE_DEG)
+    degrees, per_joint = parse_tolerances(tolerance, 12.0)
     found = name_states([read_score(place) for place in places], degrees, per_joint, stage=stage)
     write_library(output, found)
     click.echo(

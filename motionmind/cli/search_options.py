@@ -62,8 +62,8 @@ SEARCH_OPTIONS = (
         "via",
         "--via",
         Section.THROUGH,
-        "Pass through this posture at move N, or at any move; a frame of a clip is CLIP@FRAME@N, or CLIP@FRAME@. "
-        "Repeat for several, in order.",
+        "Posture to pass through at move N, or at any move; a frame of a clip is CLIP@FRAME@N, or CLIP@FRAME@. "
+        "Repeatable, in order.",
         str,
         "POSTURE[@N]",
         multiple=True,
@@ -73,7 +73,7 @@ SEARCH_OPTIONS = (
         "pin",
         "--pin",
         Section.THROUGH,
-        "Keep JOINT in A's state until the last move; =B: in B's state from the first move on. Repeatable.",
+        "Joint to keep in A's state until the last move; with =B, in B's state from the first move on. Repeatable.",
         str,
         "JOINT[=B]",
         multiple=True,
@@ -83,7 +83,7 @@ SEARCH_OPTIONS = (
         "hold",
         "--hold",
         Section.THROUGH,
-        "Keep these joints, separated by commas, in their state throughout; A and B must agree there. Repeatable.",
+        "Joints, separated by commas, to keep in one state, which A and B must share. Repeatable.",
         str,
         "JOINTS",
         multiple=True,
@@ -93,7 +93,7 @@ SEARCH_OPTIONS = (
         "avoid",
         "--avoid",
         Section.THROUGH,
-        "Keep JOINT out of a state, given by number or name, between A and B. Repeatable.",
+        "State, by number or name, that JOINT must avoid between A and B. Repeatable.",
         str,
         "JOINT=STATE",
         multiple=True,
@@ -103,7 +103,7 @@ SEARCH_OPTIONS = (
         "moves",
         "--moves",
         Section.SEARCH,
-        "Make N moves, or as many as a range such as 6..10 allows  [default: the best number]",
+        "Number of moves, or a range such as 6..10  [default: the best number]",
         Moves(),
         "N",
     ),
@@ -111,7 +111,7 @@ SEARCH_OPTIONS = (
         "duration",
         "--duration",
         Section.SEARCH,
-        "Make the motion last this long; the number of moves follows, unless --moves is given.",
+        "Duration of the motion; it determines the number of moves, unless --moves is given.",
         POSITIVE,
         "SECONDS",
     ),
@@ -119,27 +119,27 @@ SEARCH_OPTIONS = (
         "pace",
         "--pace",
         Section.SEARCH,
-        "Move this many times as fast as the corpus would, unless --duration is given.",
+        "Speed relative to the corpus, unless --duration is given.",
         Number(*PACE_RANGE),
         "FACTOR",
     ),
-    SearchOption("strict", "--strict", Section.SEARCH, "Make only moves that the corpus attests: no bridges.", bool),
+    SearchOption("strict", "--strict", Section.SEARCH, "Allow only attested transitions: no bridges.", bool),
     SearchOption(
         "whole_body",
         "--whole-body",
         Section.SEARCH,
-        "Use only whole postures in the order of the corpus, as the search of 1998 did.",
+        "Allow only whole postures in the order of the corpus, like the search of 1998.",
         bool,
     ),
     SearchOption(
         "sample", "--sample", Section.SEARCH, "Sample a path, with probability proportional to exp(-cost).", bool
     ),
-    SearchOption("seed", "--seed", Section.SEARCH, "Seed all random numbers, such as those of --sample.", NATURAL, "N"),
+    SearchOption("seed", "--seed", Section.SEARCH, "Seed of random numbers, such as those of --sample.", NATURAL, "N"),
     SearchOption(
         "max_moves",
         "--max-moves",
         Section.SEARCH,
-        "Try at most N moves, unless --moves is given.",
+        "Maximum number of moves, unless --moves is given.",
         COUNT,
         "N",
         advanced=True,
@@ -148,7 +148,7 @@ SEARCH_OPTIONS = (
         "differ",
         "--differ",
         Section.SEARCH,
-        "Make an alternative differ from each earlier one in this share of its joints' states between A and B.",
+        "Minimum share of joints' states between A and B in which an alternative differs from each earlier one.",
         Number(min=0, max=1),
         "SHARE",
     ),
@@ -156,7 +156,7 @@ SEARCH_OPTIONS = (
         "within",
         "--within",
         Section.SEARCH,
-        "Accept an alternative proven to cost at most this share more than the best; 0.05 is fast.",
+        "Cost of an alternative above the optimum that is accepted, as a share; 0.05 is fast.",
         Number(min=0, max=1),
         "SHARE",
     ),
@@ -164,7 +164,7 @@ SEARCH_OPTIONS = (
         "node_budget",
         "--node-budget",
         Section.SEARCH,
-        "Hold at most N search nodes at once.",
+        "Maximum number of search nodes in memory.",
         COUNT,
         "N",
         advanced=True,
@@ -173,7 +173,7 @@ SEARCH_OPTIONS = (
         "memory",
         "--memory",
         Section.SEARCH,
-        "Hold as many search nodes as fit in SIZE, such as 200MB; replaces --node-budget.",
+        "Memory for search nodes, such as 200MB; replaces --node-budget.",
         Size(),
         "SIZE",
         advanced=True,
@@ -182,36 +182,32 @@ SEARCH_OPTIONS = (
         "novelty",
         "--novelty",
         Section.WEIGH,
-        "Flatten the cost of attested moves: 0 favours frequent ones, 1 treats all alike.",
+        "Flattening of the cost of attested moves: 0 favours frequent ones, 1 treats all alike.",
         Number(min=0, max=1),
     ),
     SearchOption(
         "coordination",
         "--coordination",
         Section.WEIGH,
-        "Coordinate joints by their postures, by their progressions from posture to posture, or not at all.",
+        "Coordination of joints: by posture, by progression from posture to posture, or none.",
         click.Choice(get_args(Scheme)),
     ),
     SearchOption(
         "weights",
         "--weights",
         Section.WEIGH,
-        "Weigh transitions by their conditional probability, or by the formula as printed in the papers.",
+        "Weights of transitions: conditional probability, or the formula as printed in the papers.",
         click.Choice(get_args(Weights)),
         advanced=True,
     ),
-    SearchOption(
-        "lambda_", "--lambda", Section.WEIGH, "Multiply the cost of coordination by this factor.", NATS, advanced=True
-    ),
-    SearchOption(
-        "beta", "--beta", Section.WEIGH, "Charge N nats for each move that a joint waits at its goal.", NATS, "N", True
-    ),
-    SearchOption("tau", "--tau", Section.WEIGH, "Charge N nats for each move.", NATS, "N", advanced=True),
+    SearchOption("lambda_", "--lambda", Section.WEIGH, "Factor of the cost of coordination.", NATS, advanced=True),
+    SearchOption("beta", "--beta", Section.WEIGH, "Nats per move that a joint waits at its goal.", NATS, "N", True),
+    SearchOption("tau", "--tau", Section.WEIGH, "Nats per move.", NATS, "N", advanced=True),
     SearchOption(
         "bridge_price",
         "--bridge-price",
         Section.WEIGH,
-        "Charge N nats for each degree of an unattested move.",
+        "Nats per degree of an unattested move.",
         NATS,
         "N",
         advanced=True,
@@ -220,7 +216,7 @@ SEARCH_OPTIONS = (
         "guide",
         "--guide",
         Section.WEIGH,
-        "Charge N nats for a joint that is one tolerance away from the corpus walks for 0.2 s.",
+        "Nats for a joint that is one tolerance away from the corpus walks for 0.2 s.",
         NATS,
         "N",
         advanced=True,
@@ -229,14 +225,14 @@ SEARCH_OPTIONS = (
         "liveliness",
         "--liveliness",
         Section.MOTION,
-        "Move like the mean of the corpus over this displacement (0), or like one passage of it (1).",
+        "Blend from the corpus's mean movement over this displacement (0) to one of its passages (1).",
         Number(min=0, max=1),
     ),
     SearchOption(
         "passage",
         "--passage",
         Section.MOTION,
-        "Follow the corpus's passage that begins at CLIP@TIME, such as adagio@3.2s, in place of the mean.",
+        "Start of the passage to follow in place of the mean, such as adagio@3.2s.",
         str,
         "CLIP@TIME",
     ),
@@ -244,11 +240,11 @@ SEARCH_OPTIONS = (
         "without",
         "--without",
         Section.MOTION,
-        "Leave out this part of the synthesis. Repeatable.",
+        "Part of the synthesis to leave out. Repeatable.",
         click.Choice(get_args(Correction)),
         multiple=True,
     ),
-    SearchOption("fps", "--fps", Section.MOTION, "Set the motion's frames per second.", RATE, advanced=True),
+    SearchOption("fps", "--fps", Section.MOTION, "Frames per second of the motion.", RATE, advanced=True),
 )
 
 
@@ -275,7 +271,7 @@ def searching(function: _Function) -> _Function:
 def request_options(
     options: Mapping[str, Any], home: Path | None, read: Callable[[Path], Motion] | None = None
 ) -> dict[str, Any]:
-    """Convert the values of the search options to options of `Engine.tween`; read the postures to pass through.
+    """Convert the values of the search options to options of `Engine.tween`; read the vias.
 
     Args:
         options: a value for each field in `SEARCH_OPTIONS`, as the command received them.
@@ -299,7 +295,7 @@ def request_options(
 
 
 def via_sources(options: Mapping[str, Any], home: Path | None) -> list[Source]:
-    """Return the sources of the postures to pass through."""
+    """Return the sources of the vias."""
     return [posture.source for posture, _ in parse_vias(options["via"], home)]
 
 

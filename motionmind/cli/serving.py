@@ -1,4 +1,4 @@
-"""The command that serves movement to other programs."""
+"""The serve command: serve movement to other programs."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from motionmind.cli.warming import prepare
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 
-_MAX_CONNECTIONS = 16  # connections
-_IDLE_S = 5  # seconds that a connection without a request stays open
+_KEEP_ALIVE_S = 5
 
 
 @command("motionmind serve --mmcp --corpus ballet")
@@ -24,7 +23,7 @@ _IDLE_S = 5  # seconds that a connection without a request stays open
     section=Section.OUTPUT,
     is_flag=True,
     required=True,
-    help="Speak MMCP, the protocol of animation programs such as Blender with Proscenium.",
+    help="Use MMCP, the protocol of animation programs such as Blender with Proscenium.",
 )
 @CORPUS
 @option(
@@ -32,15 +31,15 @@ _IDLE_S = 5  # seconds that a connection without a request stays open
     section=Section.OUTPUT,
     default="127.0.0.1",
     metavar="ADDRESS",
-    help="Listen at this address; any other than that of this computer lets others ask.",
+    help="Address to listen on; other computers can connect unless it is this computer's own.",
 )
-@option("--port", section=Section.OUTPUT, type=PORT, metavar="N", default=8000, help="Listen at this port.")
+@option("--port", section=Section.OUTPUT, type=PORT, metavar="N", default=8000, help="Port to listen on.")
 @HOME
 def serve(mmcp: bool, corpus: str, host: str, port: int, home: Path | None) -> None:
     """Serve movement in the style of a corpus to animation programs, until Ctrl-C.
 
-    A program sends a skeleton, poses at frames, waypoints and pins, and gets the movement between them, each stretch
-    with its certificate. It needs the extra: pip install "motionmind[mmcp]".
+    A program sends a skeleton, poses at frames, waypoints and pins, and receives the movement between them, with a
+    certificate for each stretch. Requires an extra: pip install "motionmind[mmcp]".
     """
     if not mmcp:
         raise click.UsageError("Missing option '--mmcp': there is no other protocol.", click.get_current_context())
@@ -58,7 +57,7 @@ def serve(mmcp: bool, corpus: str, host: str, port: int, home: Path | None) -> N
     with listen(host, port) as listening:
         url, is_open = address_of(listening)
         if is_open:
-            note(f"whoever reaches {url.removeprefix('http://')} may ask for movement: there is no password")
+            note(f"no password: anyone who can reach {url.removeprefix('http://')} can request movement")
         click.echo(f"serving {displayed(engine.corpus.name)} at {url} (Ctrl-C ends)")
         config = uvicorn.Config(
             Guard(app(engine), host),
@@ -66,8 +65,8 @@ def serve(mmcp: bool, corpus: str, host: str, port: int, home: Path | None) -> N
             access_log=False,
             ws="none",
             server_header=False,
-            limit_concurrency=_MAX_CONNECTIONS,
-            timeout_keep_alive=_IDLE_S,
-            timeout_graceful_shutdown=_IDLE_S,
+            limit_concurrency=16,
+            timeout_keep_alive=_KEEP_ALIVE_S,
+            timeout_graceful_shutdown=_KEEP_ALIVE_S,
         )
         uvicorn.Server(config).run(sockets=[listening])

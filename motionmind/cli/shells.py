@@ -1,4 +1,4 @@
-"""The command that makes shells complete."""
+"""The completion command: print the completion script of a shell."""
 
 from __future__ import annotations
 
@@ -8,16 +8,12 @@ from click.shell_completion import get_completion_class
 from motionmind.cli.options import command
 from motionmind.errors import MotionMindError
 
-_COMPLETION_VARIABLE = "_MOTIONMIND_COMPLETE"
-# Else bash takes ballet/adagio@23 for three words, and completes the last as another argument.
-_BASH_PREFIX = "COMP_WORDBREAKS=${COMP_WORDBREAKS//@/}\n"
-
 
 @command("motionmind completion bash")
 @click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
 @click.pass_context
 def completion(context: click.Context, shell: str) -> None:
-    """Print what makes a shell complete commands, options, corpora, postures, joints and flows.
+    """Print a script that completes commands, options, corpora, postures, joints and flows in a shell.
 
     Put eval "$(motionmind completion bash)" into ~/.bashrc, the same with zsh into ~/.zshrc, or, for fish, the output
     into ~/.config/fish/completions/motionmind.fish.
@@ -25,5 +21,7 @@ def completion(context: click.Context, shell: str) -> None:
     found = get_completion_class(shell)
     if found is None:
         raise MotionMindError(f"there is no completion for {shell}")
-    source = found(context.find_root().command, {}, "motionmind", _COMPLETION_VARIABLE).source()
-    click.echo((_BASH_PREFIX if shell == "bash" else "") + source)
+    source = found(context.find_root().command, {}, "motionmind", "_MOTIONMIND_COMPLETE").source()
+    if shell == "bash":  # or bash would take ballet/adagio@23 for three words, and complete the last on its own
+        source = "COMP_WORDBREAKS=${COMP_WORDBREAKS//@/}\n" + source
+    click.echo(source)

@@ -1,4 +1,4 @@
-"""Find the movement that commands draw, measure, convert or vary: in files of movement, scores and corpora."""
+"""Find the movement that commands draw, measure, convert or vary: in motion files, scores and corpora."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ def parse_movement(word: str, home: Path | None) -> PostureName:
     """Parse the name of movement, or of one posture of it.
 
     Raises:
-        MotionMindError: the posture is to be moving, or there is no such movement, though its word could be a corpus's.
+        MotionMindError: the name has a ~, or names neither a corpus nor a file.
     """
     from motionmind.names.finding import check_exists
 
     named = parse_posture(word, home)
     check_exists(named.source, home)
     if named.is_moving:
-        raise MotionMindError(f"{word}: ~ is for the ends of tween, which may be moving; leave it out")
+        raise MotionMindError(f"{word}: ~ is only for the ends of a tween; leave it out")
     return named
 
 
@@ -38,9 +38,9 @@ def read_movements(
     Args:
         source: the source.
         names: the clips to read; empty for all.
-        home: the folder of the user's corpora; None for the usual one.
-        raw: whether a file's movement stays on its own joints; else it is brought to human23 where they map to it.
-        options: values of the options that `options.reading` adds; they are for files of movement alone.
+        home: the folder of the user's corpora; None for the default folder.
+        raw: whether a file's movement keeps its own joints; else it is retargeted to human23 if they map to it.
+        options: values of the options that `options.reading` adds; only for motion files.
 
     Raises:
         MotionMindError: the source cannot be read, there is no such clip, or an option is not for this source.
@@ -49,13 +49,13 @@ def read_movements(
 
     has_clips = source.kind != "file"
     if names and not has_clips:
-        raise MotionMindError(f"{source.word}: --clip chooses from a score or a corpus")
+        raise MotionMindError(f"{source.word}: --clip is only for a score or a corpus")
     if names and source.name:
-        raise MotionMindError(f"{source.word}: names a clip, and so does --clip; give one of them")
+        raise MotionMindError(f"{source.word}: already names a clip; leave out --clip")
     for name, value in options.items():
         if has_clips and value is not None:
             option = name.replace("_", "-")
-            raise MotionMindError(f"{source.word}: --{option} is for a file of movement, which this is not")
+            raise MotionMindError(f"{source.word}: --{option} is only for motion files")
     if has_clips and not source.name:
         return open_collection(source, home).choose(names)
     read_file = partial(read if raw else _read_file, **options)
@@ -71,23 +71,23 @@ def read_movement(source: Source, name: str | None, home: Path | None, **options
 
 
 def read_part(named: PostureName, name: str | None, home: Path | None, **options: Any) -> Motion:
-    """Read the movement of a name, or the one frame that it gives, as `read_movement`."""
+    """Read the named movement, or its named frame, like `read_movement`."""
     motion = read_movement(named.source, name, home, **options)
     frames = select_part(named, motion, 0, -1)
     return motion.slice(frames.start, frames.stop)
 
 
 def select_part(named: PostureName, motion: Motion, start: int, end: int) -> range:
-    """Return the frames of a motion from `start` to `end`, or the one that its name gives.
+    """Return the frames of a motion from `start` to `end`, or the frame in its name.
 
     Args:
         named: the name.
         motion: the motion of that name, or one of several.
-        start: the first frame; 0 for all from the first on.
-        end: the last frame, included, and negative if counted from the end; -1 for all to the last.
+        start: the first frame; 0 by default.
+        end: the last frame, included; negative if counted from the end; -1 by default.
 
     Raises:
-        MotionMindError: there is no such frame, `end` lies before `start`, or both the name and they say which frames.
+        MotionMindError: there is no such frame, `end` is before `start`, or the name and they both select frames.
     """
     from motionmind.names.finding import select_frame, select_frames
 
@@ -95,29 +95,29 @@ def select_part(named: PostureName, motion: Motion, start: int, end: int) -> ran
     if named.moment is None:
         return select_frames(word, len(motion), start, end)
     if (start, end) != (0, -1):
-        raise MotionMindError(f"{named.word}: names a frame, and so do --from and --to; give one of them")
+        raise MotionMindError(f"{named.word}: already names a frame; leave out --from and --to")
     frame = select_frame(word, motion, named.moment)
     return range(frame, frame + 1)
 
 
 def ends_reader(sources: Sequence[Source], corpus: str, home: Path | None, **options: Any) -> Callable[[Path], Motion]:
-    """Return a reader of files that postures of a tween are in; each file is read, and questioned, once.
+    """Return a reader of the files with the postures of a tween; it reads and checks each file once.
 
-    Movement comes as a whole to the joints that a corpus of people has: it shows more than a posture does of which axis
-    is up, and of how a rig's joints are turned.
+    It retargets whole motions, not single postures, because a motion shows better which axis is up and how a rig's
+    joints are turned.
 
     Args:
-        sources: where the postures are.
-        corpus: the corpus that moves them.
-        home: the folder of the user's corpora; None for the usual one.
+        sources: the sources of the postures.
+        corpus: the corpus of the tween.
+        home: the folder of the user's corpora; None for the default folder.
         options: values of the options that `options.reading` adds.
 
     Raises:
-        MotionMindError: an option is given, and no source is a file of movement; or the corpus's manifest is damaged.
+        MotionMindError: an option is given, but no source is a motion file; or the corpus's manifest is damaged.
     """
     for name, value in options.items():
         if value is not None and all(source.kind != "file" for source in sources):
-            raise MotionMindError(f"--{name.replace('_', '-')} is for files of movement, and no posture here is in one")
+            raise MotionMindError(f"--{name.replace('_', '-')} is only for motion files, and no posture here is in one")
     stays = _has_own_joints(corpus, home) and not options["joints"]
 
     @cache
@@ -130,7 +130,7 @@ def ends_reader(sources: Sequence[Source], corpus: str, home: Path | None, **opt
 
 
 def _has_own_joints(corpus: str, home: Path | None) -> bool:
-    """Return whether a corpus was built on other joints than human23's."""
+    """Return whether a corpus has joints other than human23's."""
     from motionmind.body.human import human23
     from motionmind.corpus import store
 
@@ -140,7 +140,7 @@ def _has_own_joints(corpus: str, home: Path | None) -> bool:
 
 
 def _read_file(path: Path, joints: Path | None, **source: Any) -> Motion:
-    """Read the movement in a file, on human23 if its joints map to it."""
+    """Read a motion file, on human23 if its joints map to it."""
     from motionmind.retarget.retarget import own_skeleton
 
     motion = own_skeleton(read(path, **source), read_mapping(joints), up=source["up"] and "y")

@@ -1,4 +1,4 @@
-"""Standard output and standard error, wrapped so that neither can stop the work."""
+"""Standard output and standard error, wrapped so that failing writes do not end the program."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from motionmind.display import escaped
 
 
 class _Escaping:
-    """Standard output, on which names from files stand."""
+    """Standard output, with control characters in names from files escaped."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        """Write text with what a terminal would act on as escapes; drop it if its reader has gone away."""
+        """Write text with control characters escaped; drop it after the reader has closed the pipe."""
         try:
             self._stream.write(escaped(text))
         except BrokenPipeError:
@@ -27,7 +27,7 @@ class _Escaping:
         return len(text)
 
     def flush(self) -> None:
-        """Flush, unless the reader has gone away."""
+        """Flush, unless the reader has closed the pipe."""
         try:
             self._stream.flush()
         except BrokenPipeError:
@@ -38,7 +38,7 @@ class _Escaping:
 
 
 class _Forgiving:
-    """A stream that drops what it cannot write: nobody reads a closed terminal, and a full disk ends no search."""
+    """A stream that drops text on failure: a closed terminal or a full disk must not end a search."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -47,7 +47,7 @@ class _Forgiving:
         """Write text, or drop it on failure."""
         try:
             return self._stream.write(text)
-        except (OSError, ValueError):  # ValueError: it was closed
+        except (OSError, ValueError):  # ValueError: the stream is closed
             _silence(self._stream)
             return len(text)
 
@@ -63,20 +63,20 @@ class _Forgiving:
 
 
 def _silence(stream: TextIO) -> None:
-    """Let what is buffered and what is still written go nowhere, or Python would fail with it when it ends."""
+    """Redirect buffered and further text to the null device, or Python would fail at exit."""
     with suppress(OSError, ValueError):
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, stream.fileno())
-        os.close(nowhere)
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, stream.fileno())
+        os.close(null)
 
 
 @contextmanager
 def forgiving() -> Iterator[None]:
-    """Let writing to standard error never fail, and standard output get no character that a terminal acts on.
+    """Make writing to standard error never fail, and escape control characters on standard output.
 
-    Names that are no UTF-8 are printed with their bytes escaped.
+    Bytes of names that are not UTF-8 are escaped, too.
     """
-    if sys.stderr is None:  # closed; a file of ours would take its number, and get what libraries print
+    if sys.stderr is None:  # closed; a file of ours would get its descriptor, and the output of libraries
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123, SIM115 - it stays open
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -89,7 +89,7 @@ def forgiving() -> Iterator[None]:
         yield
     finally:
         for stream in (sys.stdout, sys.stderr):
-            with suppress(OSError):  # a full disk, which Python says again when it ends
+            with suppress(OSError):  # a full disk, which Python reports again at exit
                 if stream is not None:
                     stream.flush()
         sys.stdout, sys.stderr = given

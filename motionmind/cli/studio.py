@@ -1,4 +1,4 @@
-"""The command that opens the studio."""
+"""The studio command: open the page to compose, vary and pose movement."""
 
 from __future__ import annotations
 
@@ -20,11 +20,7 @@ from motionmind.errors import MotionMindError
 if TYPE_CHECKING:
     from motionmind.studio.project import Project
 
-_N_PROJECTS_LISTED = 5  # projects that are named at the start
-_TERMINAL_WINDOW = "terminal"  # the window of edits that the command makes
-_COMPILING_NOTE = (
-    "first run: preparing in the background; searches wait for it, up to a minute (`motionmind warm --stop` ends it)"
-)
+_TERMINAL_WINDOW = "terminal"  # the window of edits by this command
 
 
 @command("motionmind studio dance.motionmind --corpus ballet")
@@ -34,7 +30,7 @@ _COMPILING_NOTE = (
     section=Section.CORPORA,
     default="ballet",
     metavar="NAME",
-    help="Judge and smooth by this corpus.",
+    help="Corpus by which to judge and smooth, by name or folder.",
     shell_complete=completion.corpora,
 )
 @option(
@@ -42,8 +38,8 @@ _COMPILING_NOTE = (
     section=Section.OUTPUT,
     default="127.0.0.1",
     metavar="ADDRESS",
-    help="Listen at this address; any other than that of this computer lets others work on the project, "
-    "if they have the whole URL, and others still read along: it is not encrypted.",
+    help="Address to listen on; unless it is this computer's own, anyone with the whole URL can edit the project, "
+    "and the connection is not encrypted.",
 )
 @option(
     "--port",
@@ -52,21 +48,21 @@ _COMPILING_NOTE = (
     metavar="N",
     default=0,
     show_default="any that is free",
-    help="Listen at this port.",
+    help="Port to listen on.",
 )
-@option("--no-browser", section=Section.OUTPUT, is_flag=True, help="Print the URL and open no browser.")
+@option("--no-browser", section=Section.OUTPUT, is_flag=True, help="Print the URL, without opening a browser.")
 @HOME
 @click.pass_context
 def studio(
     context: click.Context, file: Path | None, corpus: str, host: str, port: int, no_browser: bool, home: Path | None
 ) -> None:
-    """Open the studio: a page in the browser in which to compose, vary and pose movement, until Ctrl-C.
+    """Open the studio, a page in the browser to compose, vary and pose movement, until Ctrl-C.
 
-    FILE is a project (.motionmind), which is made if it is not there, or movement or a variation to begin with, whose
-    project then lies beside it. Without FILE a new project begins in the user's data folder. It needs the extra: pip
+    FILE is a project (.motionmind), created if missing, or movement or a variation to start from, whose project is
+    created beside it. Without FILE, the command creates a project in the user's data folder. Requires an extra: pip
     install "motionmind[studio]".
     """
-    import webbrowser  # here, for other commands open none
+    import webbrowser  # here, since other commands do not need it
 
     try:
         from motionmind.codecache import is_all_compiled
@@ -89,13 +85,16 @@ def studio(
                 note(words)
             if is_open:
                 note(
-                    f"whoever has the URL below and reaches {url.removeprefix('http://')} can work on this project, "
-                    "and whoever is on the way can read along: nothing is encrypted"
+                    f"anyone with the URL below who can reach {url.removeprefix('http://')} can edit this project; "
+                    "the connection is not encrypted"
                 )
             if is_cold := not is_all_compiled():
-                note(_COMPILING_NOTE)
+                note(
+                    "first run: preparing in the background; searches wait for it, up to a minute "
+                    "(`motionmind warm --stop` ends it)"
+                )
             work, keys = Studio(project, home, first=prepare_in_steps() if is_cold else None), Keys()
-            with suppress(MotionMindError):  # which is missing, and said to be
+            with suppress(MotionMindError):  # it is missing, which a note above says
                 work.engine(project.state.corpus)
             entry = f"{url}/#token={keys.token}"
 
@@ -110,7 +109,7 @@ def studio(
 
 
 def _project(file: Path | None, corpus: str, home: Path | None) -> Project:
-    """Open the project of a file, or make it."""
+    """Open the project of a file, or create it."""
     from motionmind.cli.sources import parse_movement, read_movements
     from motionmind.studio.edits import Insert, Several
     from motionmind.studio.journal import SUFFIX
@@ -122,7 +121,7 @@ def _project(file: Path | None, corpus: str, home: Path | None) -> Project:
     place = file if file.suffix == SUFFIX else file.with_suffix(SUFFIX)
     if place.exists():
         if place != file:
-            note(f"going on with {displayed_path(place)}")
+            note(f"opening {displayed_path(place)}")
         return Project.open(place, home)
     if place == file:
         return Project.create(place, corpus, home)
@@ -133,7 +132,7 @@ def _project(file: Path | None, corpus: str, home: Path | None) -> Project:
         variation = read_variation(file)
         if variation.piece.composed:
             raise MotionMindError(
-                f"{displayed_path(file)}: the studio arranges stretches of a piece, and quadrants leave none of it"
+                f"{displayed_path(file)}: the studio arranges whole postures, which --by quadrants does not keep"
             )
         judge = corpus_of(variation)
         project = Project.create(place, judge if judge and _is_here(judge, home) else corpus, home)
@@ -162,7 +161,7 @@ def _is_here(corpus: str, home: Path | None) -> bool:
 
 
 def _new(home: Path | None) -> Path:
-    """Return the file of a new project in the user's data folder; name those that are there."""
+    """Return the file of a new project in the user's data folder; note the latest projects there."""
     from motionmind.corpus import store
     from motionmind.files import make_folder
     from motionmind.studio.journal import SUFFIX
@@ -173,8 +172,8 @@ def _new(home: Path | None) -> Path:
         known = sorted(folder.glob(f"*{SUFFIX}"), key=lambda path: path.stat().st_mtime, reverse=True)
     except OSError as error:
         raise MotionMindError(f"{folder}: cannot be made: {error.strerror or error}") from error
-    for path in known[:_N_PROJECTS_LISTED]:
-        note(f"an earlier project: {displayed_path(path)}")
+    for path in known[:5]:
+        note(f"earlier project: {displayed_path(path)}")
     taken = {path.stem for path in known}
     number = next(number for number in range(1, len(taken) + 2) if f"piece-{number}" not in taken)
     return folder / f"piece-{number}{SUFFIX}"

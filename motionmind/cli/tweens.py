@@ -1,4 +1,4 @@
-"""The command that finds a movement between two postures."""
+"""The tween command: find a movement between two postures."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli import completion
+from motionmind.cli.exits import ExitCode
 from motionmind.cli.files import MOTION_SUFFIXES, check_outputs, numbered, write
 from motionmind.cli.options import HOME, OUTPUT_KINDS, Section, command, option, outputs, reading
 from motionmind.cli.printing import Interruption, note, print_alternatives, print_tween
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
     from motionmind.tween.report import TweenReport
     from motionmind.tween.result import Tween
 
-INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
-
 
 @command("motionmind tween ballet/arabesque ballet/fifth -o tween.bvh")
 @click.argument("a", shell_complete=completion.postures)
@@ -44,40 +43,40 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
     section=Section.CORPORA,
     metavar="NAME",
     shell_complete=completion.corpora,
-    help="Move in this corpus, by name or folder  [default: the corpus of A and B, if they are named postures of one]",
+    help="Corpus to use, by name or folder  [default: the corpus of A and B, if they are its postures]",
 )
-@outputs(f"Write {OUTPUT_KINDS}.", required=False)
-@option("--report", section=Section.OUTPUT, type=FILE, help="Write the report as JSON; - prints it.")
+@outputs(f"File to write: {OUTPUT_KINDS}.", required=False)
+@option("--report", section=Section.OUTPUT, type=FILE, help="File of the report, as JSON; - prints it.")
 @option(
     "--details", section=Section.OUTPUT, is_flag=True, help="Print costs, states and distances from the corpus, too."
 )
-@option("--problem", section=Section.OUTPUT, type=FILE, help="Write the problem that was solved: .cfn, for toulbar2.")
+@option("--problem", section=Section.OUTPUT, type=FILE, help="File of the optimisation problem, for toulbar2 (.cfn).")
 @option(
     "--alternatives",
     section=Section.SEARCH,
     type=Whole(1, 1000),
     metavar="K",
-    help="Find K tweens of as many moves that differ; write out-1.json, out-2.json, ...",
+    help="Number of different tweens to find, with equally many moves; files are out-1.json, out-2.json, ...",
 )
 @option(
     "--what-if",
     section=Section.SEARCH,
     is_flag=True,
-    help="Report the cost of each --pin, --hold, --avoid and --via, and of the length: search again without it.",
+    help="Report the cost of each --pin, --hold, --avoid and --via, and of the length, by searching without it.",
 )
 @option(
     "--before",
     section=Section.MOTION,
     metavar="FRAMES",
     shell_complete=completion.movement,
-    help="Leave A with the velocity of these frames; the last is A: FILE@FIRST..LAST, or all of FILE.",
+    help="Frames that end in A and give its velocity: FILE@FIRST..LAST, or all of FILE.",
 )
 @option(
     "--after",
     section=Section.MOTION,
     metavar="FRAMES",
     shell_complete=completion.movement,
-    help="Arrive at B with the velocity of these frames; the first is B. Same form as --before.",
+    help="Frames that begin with B and give its velocity; same form as --before.",
 )
 @searching
 @reading
@@ -102,19 +101,19 @@ def tween(
     up: str | None,
     **options: Any,
 ) -> None:
-    """Find the best movement from A to B, and prove how good it is.
+    """Find the optimal movement from A to B, with a proven bound.
 
     A and B are postures of corpora, such as ballet/arabesque or ballet/adagio@23 (the postures command lists them),
-    files of one posture, or frames of clips, such as clip.bvh@240, counted from 0, or clip.bvh@2.0s. The velocity there
-    is free, unless --before and --after give it; clip.bvh@240~ has the clip's velocity. The input options apply to
+    files of one posture, or frames of clips. Frames count from 0: clip.bvh@240, or by time clip.bvh@2.0s. Velocities
+    are free, unless --before and --after give them; clip.bvh@240~ has the clip's velocity. The input options apply to
     every motion file on the command line.
 
-    Ctrl-C ends the search: the command writes the best movement found so far, with the proof so far, and exits with
-    code 130. Exit code 3 means that no path joins A and B under these rules; --report then holds the diagnosis.
+    Ctrl-C ends the search: the command writes the best movement found and its bound, and exits with code 130. Exit
+    code 3 means that no path joins A and B under these constraints; --report then holds the diagnosis.
     """
     if problem and options["whole_body"]:
-        raise click.UsageError("--problem writes a search of joints that move on their own; leave out --whole-body")
-    gc.disable()  # start-up makes a million objects and no garbage; collecting takes a tenth of a second
+        raise click.UsageError("--problem and --whole-body exclude each other: the problem has a variable per joint")
+    gc.disable()  # start-up makes a million objects and no garbage: saves 0.1 s
     _load_numba()
     from motionmind.cli.postures import read_end
     from motionmind.corpus.store import locate
@@ -150,11 +149,11 @@ def tween(
     else:
         print_alternatives(results, written, with_details=details)
     if interruption.is_requested:
-        click.get_current_context().exit(INTERRUPTED)
+        click.get_current_context().exit(ExitCode.INTERRUPTED)
 
 
 def _corpus_of(ends: Sequence[PostureName], home: Path | None) -> str:
-    """Return the corpus of A and B; fail if neither is a posture of one, or they are of two."""
+    """Return the corpus of A and B; fail if they have none, or two."""
     from motionmind.names.finding import find_motion
     from motionmind.names.postures import find_posture
 
@@ -163,7 +162,7 @@ def _corpus_of(ends: Sequence[PostureName], home: Path | None) -> str:
         for end in ends:
             find_motion(end.source, home)  # raises if there is no such file
         context = click.get_current_context()
-        raise click.UsageError("Missing option '--corpus': no corpus names A or B.", context)
+        raise click.UsageError("Missing option '--corpus': neither A nor B is a posture of a corpus.", context)
     if len(set(corpora)) > 1:
         for end in ends:
             find_posture(end, home)  # raises if there is no such posture
@@ -175,7 +174,7 @@ def _corpus_of(ends: Sequence[PostureName], home: Path | None) -> str:
 def _find_tweens(
     engine: Engine, ends: tuple[Posture, Posture], request: dict[str, Any], count: int, interruption: Interruption
 ) -> list[Tween]:
-    """Find `count` tweens; fewer after Ctrl-C, or, with a note, if no other path differs enough."""
+    """Find `count` tweens; fewer after Ctrl-C, or with a note if no other path differs enough."""
     found: list[Tween] = []
     try:
         for tween in engine.alternatives(*ends, count, **request, watch=interruption.watch):
@@ -191,7 +190,7 @@ def _find_tweens(
 
 @dataclass(frozen=True)
 class _Files:
-    """The files that the command writes: for each alternative motions, a report and a problem.
+    """The output files: for each alternative, motions, a report and a problem.
 
     Attributes:
         motions: the files of the motion.
@@ -212,11 +211,11 @@ class _Files:
 
     @property
     def is_report_printed(self) -> bool:
-        """Whether the report goes to standard output, with nothing else there."""
+        """Whether the report, and nothing else, goes to standard output."""
         return self.report == Path("-")
 
     def check(self, sources: Sequence[Path]) -> None:
-        """Check that all files can be written, and are not among `sources`."""
+        """Check that all files are writable and not among `sources`."""
         outputs: list[tuple[Path, tuple[str, ...]]] = []
         for number in range(1, self.count + 1):
             motions, report, problem = self._files_of(number)
@@ -279,9 +278,9 @@ def _diagnosing(files: _Files) -> Iterator[None]:
 
 
 def _load_numba() -> None:
-    """Import numba without two optional modules, which take a quarter of a second and are not needed here.
+    """Import numba without SciPy's linear algebra, and without YAML unless a file configures numba: saves 0.25 s.
 
-    They are SciPy's linear algebra, and YAML unless a file configures numba. Later imports find them.
+    Later imports find both.
     """
     hidden = {"scipy.linalg"} | ({"yaml"} if not Path(".numba_config.yaml").exists() else set())
     hidden -= sys.modules.keys()

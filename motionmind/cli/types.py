@@ -1,4 +1,4 @@
-"""Types of the values that options take."""
+"""Types of option values."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Number(click.FloatRange):
     name = "number"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return the number; fail with a usage error if it is none."""
+        """Return the number; fail with a usage error if it is invalid."""
         number = float(super().convert(value, param, ctx))
         if not math.isfinite(number):
             is_named = str(value).strip("+- ").isalpha()  # as "inf"
@@ -28,7 +28,7 @@ class Whole(click.IntRange):
     """A whole number in a range."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """Return the number; fail with a usage error if it is none."""
+        """Return the number; fail with a usage error if it is invalid."""
         if _has_too_many_digits(str(value).strip("+- ")):
             self.fail(f"{value} is too large.", param, ctx)
         return int(super().convert(value, param, ctx))
@@ -40,14 +40,14 @@ class FrameNumber(click.ParamType[int]):
     name = "frame"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """Return the number; fail with a usage error if it is none."""
+        """Return the number; fail with a usage error if it is invalid."""
         if _has_too_many_digits(str(value).strip("+- ")):
             self.fail(f"{value} is too large.", param, ctx)
         return int(click.INT.convert(value, param, ctx))
 
 
 def _has_too_many_digits(word: str) -> bool:
-    """Return whether a word is a number beyond all that are counted; Python itself refuses those of 4301 digits."""
+    """Return whether a word is a number too large for any count; int() raises ValueError from 4301 digits on."""
     return len(word) > 18 and word.isdecimal()
 
 
@@ -57,7 +57,7 @@ class Moves(click.ParamType["int | tuple[int, int]"]):
     name = "moves"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int | tuple[int, int]:
-        """Return the number, or the least and the greatest."""
+        """Return the number, or the minimum and the maximum."""
         words = str(value).split("..")
         if any(map(_has_too_many_digits, words)):
             self.fail(f"{value} is too large.", param, ctx)
@@ -86,7 +86,7 @@ class Point(click.ParamType["tuple[float, ...]"]):
 
 
 class Span(click.ParamType["tuple[int, int]"]):
-    """The number of a posture, "10", or the first and the last of several, "10..14"."""
+    """The number of a posture, "10", or a range of postures, "10..14"."""
 
     name = "span"
 
@@ -118,7 +118,7 @@ class Numbers(click.ParamType["tuple[int, ...] | str"]):
 
 
 class Size(click.ParamType[int]):
-    """Bytes, as 200MB; units are powers of 1000."""
+    """A number of bytes, such as 200MB; units are powers of 1000."""
 
     name = "size"
     units: ClassVar[dict[str, int]] = {"": 1, "KB": 1000, "MB": 1000**2, "GB": 1000**3}

@@ -1,8 +1,8 @@
-"""Compiling the inner loops: ahead of time by a command, or in the background of the first run.
+"""Compile the inner loops: with the warm command, or in the background of the first run.
 
-Separate processes begin with different parts of the program, on real work, so that every loop is compiled for the
-arguments that it gets; each finds on disk what another has compiled by the time it comes there. One process at a time,
-which holds a lock, starts and ends them: the command, or a process that goes on when the first run has ended.
+Several processes run different parts of the program on real data, so that every loop is compiled for the types of its
+arguments. They share compiled code on disk. One process at a time, which holds a lock, starts and ends them: the
+command, or a background process that outlives the first run.
 """
 
 from __future__ import annotations
@@ -37,16 +37,8 @@ FIRST_RUN_NOTE = "first run: preparing in the background, this one may take a mi
 STILL_COMPILING_NOTE = (
     "still preparing in the background ({done} of {total} functions are compiled): this run is slower"
 )
-_LAST_COMPILED = (
-    "search/astar.search"  # calls most of what is compiled for a search, and is there only once all of that is
-)
-_CHECK_INTERVAL_S = 0.2  # seconds between two looks at what is compiled
-_START_TIMEOUT_S = 5.0  # seconds that the background process may take to begin
-_MAX_PROCESSES = 3  # processes at most that share the work
-_NICENESS = 10  # by which processes in the background are nicer than others
-_MIN_FREE_BYTES = (
-    200e6  # bytes free on the disk, below which nothing is compiled in the background; all code takes 15 MB
-)
+_LAST_COMPILED = "search/astar.search"  # calls most compiled functions of a search, and is saved after them
+_MIN_FREE_BYTES = 200e6  # free disk space needed to compile in the background; the code takes 15 MB
 
 
 @command("motionmind warm")
@@ -55,18 +47,18 @@ _MIN_FREE_BYTES = (
     "is_stopping",
     section=Section.OUTPUT,
     is_flag=True,
-    help="End the process that the first run has started in the background.",
+    help="Stop the background process that the first run started.",
 )
 def warm(is_stopping: bool) -> None:
-    """Compile the inner loops, so that no search or film has to wait for it.
+    """Compile the inner loops ahead of time, so that no search or film waits for them.
 
-    The first run starts this in the background. It takes one or two minutes, once for each version of MotionMind and
-    Python. What is compiled is kept in the user's cache directory, or in NUMBA_CACHE_DIR.
+    The first run starts this in the background. It takes one or two minutes, once per version of MotionMind and Python.
+    The code is stored in the user's cache directory, or in NUMBA_CACHE_DIR.
     """
     from motionmind.codecache import compiled_names, is_all_compiled, place_of_code
 
     if (place := place_of_code()) is None:
-        raise MotionMindError("compiled code can be kept neither in the user's cache directory nor in NUMBA_CACHE_DIR")
+        raise MotionMindError("cannot store compiled code: make the cache directory or NUMBA_CACHE_DIR writable")
     if is_stopping:
         click.echo("stopped preparing" if _stop(place) else "nothing is preparing in the background")
         return
@@ -79,9 +71,9 @@ def warm(is_stopping: bool) -> None:
 
 
 def prepare() -> None:
-    """Have the inner loops compiled in the background, unless they are, and say so.
+    """Start to compile the inner loops in the background, unless they are compiled, and print a note.
 
-    Nothing is started where compiled code cannot be kept: each run then compiles what it calls.
+    Start nothing if compiled code cannot be stored: each run then compiles the functions that it calls.
     """
     from motionmind.codecache import compiled_names, decorated_names, is_all_compiled, place_of_code
 
@@ -96,7 +88,7 @@ def prepare() -> None:
 
 @contextmanager
 def preparing() -> Iterator[None]:
-    """Do what `prepare` does; on a terminal, show within the context how many functions are compiled."""
+    """Call `prepare`; on a terminal, show the number of compiled functions within the context."""
     from motionmind.codecache import is_all_compiled
 
     prepare()
@@ -114,10 +106,10 @@ def preparing() -> Iterator[None]:
 
 
 def prepare_in_steps() -> Generator[tuple[int, int, bool]]:
-    """Have the inner loops compiled in the background, as `prepare` does without a word, and yield how far that is.
+    """Start to compile the inner loops in the background like `prepare`, without a note, and yield the progress.
 
-    Yields the number of functions that are compiled, that of all, and whether the search is, so that searches may begin
-    and need not compile it themselves. To close the iterator ends nothing.
+    Each item is the number of compiled functions, the number of all, and whether the search is compiled, so that
+    searches may begin. Closing the iterator does not stop the compilation.
     """
     from motionmind.codecache import compiled_names, decorated_names, place_of_code
 
@@ -126,40 +118,39 @@ def prepare_in_steps() -> Generator[tuple[int, int, bool]]:
     if not _is_running(place):
         _start([[compile_before_searches]], in_background=True)
     began = monotonic()
-    while _is_running(place) or monotonic() < began + _START_TIMEOUT_S:
+    while _is_running(place) or monotonic() < began + 5.0:  # seconds to start
         names = compiled_names()
         yield len(names), len(decorated_names()), _LAST_COMPILED in names
 
 
 def compile_beside_search() -> None:
-    """Compile all beside a command that learns a corpus, searches, realises and draws: the whole of a process that
-    `prepare` has started.
+    """Compile all functions beside a command that learns a corpus, searches, realises and draws; run by `prepare`.
 
-    Processes that run in step compile the same functions. So this one begins with work that needs no learned corpus,
-    until the command has learned and saved one, and then realises while the command searches.
+    Processes that run in step would compile the same functions. So this one begins with work that needs no learned
+    corpus, until the command has learned and saved one, and then realises while the command searches.
     """
     _compile_in_background([turn, film, realise, seek, draw, learn, search], max(_processors() - 1, 1))
 
 
 def compile_before_searches() -> None:
-    """Compile all, what searches need first: the whole of a process that `prepare_in_steps` has started."""
+    """Compile all functions, those of searches first; run by `prepare_in_steps`."""
     _compile_in_background([turn, search, realise, film, learn, draw, seek], _processors())
 
 
 def _compile_in_background(works: Sequence[Callable[[], None]], processes: int) -> None:
-    """Compile what some works come by, unless another process does; SIGTERM ends it."""
+    """Compile the functions that `works` call, unless another process does; SIGTERM ends it."""
     from motionmind.codecache import place_of_code
 
     place = place_of_code()
     assert place is not None
     with suppress(OSError), _alone(place) as is_alone:
         if is_alone:
-            signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # workers are ended on the way out
+            signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # exits through the code that ends the workers
             _compile(works, processes, hidden=True)
 
 
 def _wait_or_compile(place: Path) -> None:
-    """Compile all, unless a process does so already, and then what that has left; with a bar on a terminal."""
+    """Wait for a process that compiles, if any, then compile the rest; with a progress bar on a terminal."""
     from motionmind.codecache import is_all_compiled
 
     hidden = not sys.stderr.isatty()
@@ -172,13 +163,13 @@ def _wait_or_compile(place: Path) -> None:
 
 
 def _compile(works: Sequence[Callable[[], None]], processes: int, *, hidden: bool) -> None:
-    """Compile all that the works come by, dealt out among some processes, with or without a bar.
+    """Compile the functions that `works` call, with at most three processes and a progress bar unless hidden.
 
-    A worker that fails leaves its part to whoever needs it: its errors are not of interest here.
+    Ignore workers that fail: the next run compiles their part.
     """
     from motionmind.codecache import note_all_compiled
 
-    side_by_side = min(processes, _MAX_PROCESSES)
+    side_by_side = min(processes, 3)
     programs = [works[first::side_by_side] for first in range(side_by_side)]
     workers = _start(programs)
     try:
@@ -191,17 +182,17 @@ def _compile(works: Sequence[Callable[[], None]], processes: int, *, hidden: boo
     note_all_compiled()
 
 
-def _show_progress(is_going_on: Callable[[], bool], *, hidden: bool) -> None:
-    """Show how many functions are compiled, of how many, and the seconds left, unless hidden."""
+def _show_progress(is_running: Callable[[], bool], *, hidden: bool) -> None:
+    """Show the progress of the compilation until it ends, unless hidden."""
     from motionmind.codecache import compiled_names, decorated_names
 
     total, known = len(decorated_names()), 0
     with click.progressbar(length=total, label="compiling", file=sys.stderr, hidden=hidden, show_pos=True) as bar:
-        while is_going_on():
+        while is_running():
             now = len(compiled_names())
             bar.update(now - known)
             known = now
-            sleep(_CHECK_INTERVAL_S)
+            sleep(0.2)
 
 
 def _start(
@@ -210,13 +201,13 @@ def _start(
     """Start a process for each program, with this package on its path, and without the working directory.
 
     Args:
-        programs: functions of this module to call in turn, for each process.
-        in_background: whether they go on without this process, and let others go first.
+        programs: for each process, the functions of this module to call in turn.
+        in_background: whether the processes outlive this one, at low priority.
     """
     root = str(Path(__file__).parents[2])
-    # Compiling makes many objects that stay: with rarer collections it takes a tenth less time and a sixth more memory.
+    # Compiling makes many lasting objects: rarer collections save a tenth of the time for a sixth more memory.
     begin = f"import gc, sys; gc.set_threshold(100_000); sys.path.insert(0, {root!r}); import os"
-    begin += f"; os.nice({_NICENESS})" * (in_background and hasattr(os, "nice"))
+    begin += "; os.nice(10)" * (in_background and hasattr(os, "nice"))
     begin += "; from motionmind.cli import warming"
     begin += f"; warming.end_with({os.getpid()})" * (not in_background)
     calls = ["; ".join(f"warming.{work.__name__}()" for work in works) for works in programs]
@@ -236,7 +227,7 @@ def _start(
 
 
 def end_with(parent: int) -> None:
-    """End this process when the one that started it has ended, even if that was killed."""
+    """End this process after its parent has ended, even if killed."""
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -247,12 +238,12 @@ def end_with(parent: int) -> None:
         threading.Thread(target=watch, daemon=True).start()
 
 
-_started = list[subprocess.Popen[bytes]]()  # processes in the background, which Python would else warn of as they go on
+_started = list[subprocess.Popen[bytes]]()  # keeps a reference, or Python would warn that they still run
 
 
 @contextmanager
 def _alone(place: Path) -> Iterator[bool]:
-    """Hold the lock of the one process that compiles, and note its number; yields False where another has it."""
+    """Hold the lock of the one process that compiles, and store its id; yield False if another process has it."""
     descriptor = os.open(place / "preparing", os.O_RDWR | os.O_CREAT, 0o600)
     try:
         if is_alone := lock_alone(descriptor):
@@ -276,7 +267,7 @@ def _is_running(place: Path) -> bool:
 
 
 def _stop(place: Path) -> bool:
-    """End the process that compiles, if one does, and its workers with it; return whether one did."""
+    """End the process that compiles, if any, and its workers; return whether there was one."""
     if not _is_running(place):
         return False
     try:
@@ -292,7 +283,7 @@ def _processors() -> int:
 
 
 def turn() -> None:
-    """Take means of rotations, and a curve through some, to which learning comes last; no corpus need be learned."""
+    """Take means of rotations and a spline through some, the last step of learning; needs no learned corpus."""
     import numpy as np
 
     from motionmind.geometry import rotations as rot
@@ -306,7 +297,7 @@ def turn() -> None:
 
 
 def search() -> None:
-    """Find a movement between two postures, and another one that differs."""
+    """Find a movement between two postures, and an alternative."""
     from motionmind.tween.engine import Engine
 
     engine = Engine.load("ballet")
@@ -316,7 +307,7 @@ def search() -> None:
 
 
 def realise() -> None:
-    """Realise moves of the corpus, which no search has to find."""
+    """Realise moves of the corpus, without a search."""
     from motionmind.tween.engine import Engine
 
     engine = Engine.load("ballet")
@@ -324,7 +315,7 @@ def realise() -> None:
 
 
 def seek() -> None:
-    """Search by A* alone, which a search comes to last, and bound paths by pair chains alone."""
+    """Search by A* alone, the last step of a search, and bound paths by pair chains alone."""
     import numpy as np
 
     from motionmind.search import astar, trws
@@ -363,7 +354,7 @@ def learn() -> None:
 
 
 def _read(clip: Motion) -> None:
-    """Read a clip from a file, as if recorded."""
+    """Read a clip from a file like a recording."""
     from motionmind.body.plausibility import at_rate
     from motionmind.formats import read_motion, write_motion
 
@@ -392,7 +383,7 @@ def _realise(engine: Engine, carriage: Carriage) -> None:
 
 
 def film() -> None:
-    """Film a posture, as a command does last; no corpus need be learned."""
+    """Film a posture, the last step of a command; needs no learned corpus."""
     from motionmind.names.finding import find_motion
     from motionmind.names.spelling import parse_source
     from motionmind.render.pictures import draw_picture
@@ -402,7 +393,7 @@ def film() -> None:
 
 
 def draw() -> None:
-    """Draw a clip in all other ways."""
+    """Draw a clip in all other formats."""
     from motionmind.plots.attractor import draw_attractor
     from motionmind.render.pictures import draw_picture
     from motionmind.tween.engine import Engine

@@ -1,4 +1,4 @@
-"""Parsers of the words that are given to options which may be repeated: tolerances, mixtures, pins, ..."""
+"""Parsers of the values of repeatable options: tolerances, mixtures, pins, ..."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ def parse_tolerances(words: Sequence[str], default: float) -> tuple[float, dict[
     """Parse tolerances such as "15", for all joints, and "left_hip=10", for one.
 
     Args:
-        words: as given to --tolerance.
-        default: degrees for all joints if no word gives any.
+        words: values of --tolerance.
+        default: degrees for all joints if no value sets them.
 
     Returns:
         Degrees for all joints, and those of single joints.
@@ -41,7 +41,7 @@ def parse_mixture(words: Sequence[str]) -> dict[str, float]:
     """Parse corpora to mix, such as "ballet", of weight 1, and "ballet:0.3"; a path may hold colons, too.
 
     Args:
-        words: as given to --mix.
+        words: values of --mix.
 
     Returns:
         Each corpus's weight.
@@ -88,7 +88,7 @@ def parse_pins(words: Sequence[str]) -> dict[str, str]:
     """Parse pinned joints, such as "left_wrist", to A, and "left_wrist=B".
 
     Args:
-        words: as given to --pin.
+        words: values of --pin.
 
     Returns:
         The end, "A" or "B", that each joint is pinned to.
@@ -110,7 +110,7 @@ def parse_avoided(words: Sequence[str]) -> list[tuple[str, int | str]]:
     """Parse states to avoid, such as "left_hip=7" and "left_hip=passe".
 
     Args:
-        words: as given to --avoid.
+        words: values of --avoid.
 
     Returns:
         Joints, each with a state by its number or name.
@@ -132,8 +132,8 @@ def parse_vias(words: Sequence[str], home: Path | None = None) -> list[tuple[Pos
     "clip.bvh@150@" are frame 150 at move 3 and at any.
 
     Args:
-        words: as given to --via.
-        home: the folder of the user's corpora; None for the usual one.
+        words: values of --via.
+        home: the folder of the user's corpora; None for the default folder.
 
     Returns:
         Each posture and its move.

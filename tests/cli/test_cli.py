@@ -93,7 +93,7 @@ def test_a_tween_is_summarised_in_a_line_and_a_missing_output_reported(run: Run)
 def test_a_second_file_is_not_ignored(line: str, run: Run, tmp_path: Path) -> None:
     ran = run(*line.split())
     assert ran.code == 2
-    assert "-o is given 2 times, and one file is written; give it once" in ran.err
+    assert "-o is given 2 times; this command writes one file" in ran.err
     assert not list(tmp_path.iterdir())
 
 
@@ -154,7 +154,7 @@ def test_a_recording_is_varied_as_the_corpus_learned_it(run: Run) -> None:
     assert run("corpus", "build", "mine", "clip.bvh", "--rate", 6, "--skip", 1).code == 0
     vary = ("vary", "clip.bvh", "--corpus", "mine", "--nudge", 0, "-o", "v.json")
     ran = run(*vary)
-    assert "note: clip.bvh: begins at frame 1, as the recordings of mine do (--from 0 for all of it)\n" in ran.err
+    assert "note: clip.bvh: begins at frame 1, like the recordings of mine (--from 0 keeps all frames)\n" in ran.err
     learned, piece = Engine.load("mine").corpus, read_variation("v.json").piece
     assert len(learned.rotations) == len(piece)
     assert rot.angle(piece.motion.rotations[piece.frames], learned.rotations).max() < 1e-6
@@ -166,7 +166,7 @@ def test_a_recording_is_varied_as_the_corpus_learned_it(run: Run) -> None:
 
 def test_a_recording_that_is_varied_frame_by_frame_is_noticed(run: Run) -> None:
     write_motion("clip.bvh", clip(fps=30.0))
-    said = "note: clip.bvh: every frame is a posture, 30 a second: --rate 5 takes as many as corpus build does\n"
+    said = "note: clip.bvh: every frame is a posture, 30 per second; --rate 5 is the rate of corpus build\n"
     for words, is_said in (((), True), (("--rate", 5), False)):
         ran = run("vary", "clip.bvh", *words, "-o", "v.json")
         assert (said in ran.err) is is_said

@@ -37,7 +37,7 @@ BAD = [
     # corpora
     ("tween A.json B.json --corpus nobody", r"no corpus 'nobody'; there are ballet"),
     ("corpus info balet", r"no corpus 'balet'; did you mean ballet\?"),
-    ("tween ballet/arabesque ballet/fifth --unit m", r"--unit is for files of movement, and no posture here is in one"),
+    ("tween ballet/arabesque ballet/fifth --unit m", r"--unit is only for motion files, and no posture here is in one"),
     ("tween clip.bvh@0 clip.bvh@1 --corpus ballet --unit parsec", r"unit 'parsec' is unknown; give one of cm, m"),
     ("tween clip.bvh@0 clip.bvh@1 --corpus ballet --joints broken.toml", r"broken\.toml: not a joint mapping"),
     (f"{TWEEN} --up x", r"'--up': 'x' is not one of 'y', 'z'"),
@@ -98,7 +98,7 @@ BAD = [
     (f"{TWEEN} --weights heavy", r"'--weights': 'heavy' is not one of 'conditional', 'printed'"),
     (f"{TWEEN} --foo", r"No such option"),
     ("tween A.json", r"Missing argument 'B'\. \(motionmind tween --help shows how\)"),
-    ("tween A.json B.json", r"Missing option '--corpus': no corpus names A or B"),
+    ("tween A.json B.json", r"Missing option '--corpus': neither A nor B is a posture of a corpus"),
     ("dance", r"No such command 'dance'"),
 ]
 

@@ -231,7 +231,7 @@ def test_a_tween_of_named_postures_is_of_their_corpus(run: Run) -> None:
     assert tween(run, "karate/yoi", "ballet/fifth").code == 0
     alone = run("tween", FIFTH, FIFTH)
     assert alone.code == 2
-    assert "Missing option '--corpus': no corpus names A or B" in alone.err
+    assert "Missing option '--corpus': neither A nor B is a posture of a corpus" in alone.err
 
 
 def test_clips_of_a_corpus_of_ones_own_are_named_too(run: Run) -> None:
@@ -272,11 +272,11 @@ def test_a_posture_by_name_is_drawn_measured_and_converted(run: Run) -> None:
     assert len(read_motion("jump.json")) == 7
     assert run("measure", "ballet/jump", "--corpus", "ballet").out.startswith("ballet/jump: 7 frames in 1.20 s")
     for words, message in (
-        (["sheet", "ballet/adagio@23", "--from", 3, "-o", "x.png"], "names a frame, and so do --from and --to"),
-        (["posture", "ballet/adagio@23", "--frame", 3, "-o", "x.json"], "names a frame, and so does --frame"),
+        (["sheet", "ballet/adagio@23", "--from", 3, "-o", "x.png"], "already names a frame; leave out --from and --to"),
+        (["posture", "ballet/adagio@23", "--frame", 3, "-o", "x.json"], "already names a frame; leave out --frame"),
         (["posture", "ballet/adagio", "-o", "x.json"], "say which, from ballet/adagio@0 to ballet/adagio@67"),
-        (["render", "ballet/adagio@23~", "-o", "x.png"], "~ is for the ends of tween"),
-        (["sheet", "ballet/jump", "--clip", "jump", "-o", "x.png"], "names a clip, and so does --clip"),
+        (["render", "ballet/adagio@23~", "-o", "x.png"], "~ is only for the ends of a tween"),
+        (["sheet", "ballet/jump", "--clip", "jump", "-o", "x.png"], "already names a clip; leave out --clip"),
     ):
         ran = run(*words)
         assert (ran.code, ran.out) == (2, "")
@@ -294,10 +294,10 @@ def test_postures_lists_what_other_commands_take_and_draws_it(run: Run) -> None:
     with Image.open("karate.png") as picture:
         assert picture.width > 600
     for words, message in (
-        (["A.json"], "give a corpus or a score"),
+        (["A.json"], "not a corpus or a score"),
         (["karate/yoi"], "give karate alone"),
         (["karte"], "did you mean karate?"),
-        (["hands", "-o", "hands.png"], "hands: names no postures; motionmind sheet draws those of its clips"),
+        (["hands", "-o", "hands.png"], "hands: has no named postures; `motionmind sheet` draws its clips"),
         (["karate", "-o", "karate.bvh"], "the name must end in one of .png"),
     ):
         ran = run("postures", *words)

@@ -203,7 +203,7 @@ def test_files_that_cannot_be_read_are_reported(run: Run, files: dict[Path, str]
         ran = run("corpus", "build", "mine", *files, bad, "--mirror", "--workers", workers, "--home", home)
         assert ran.code == 0
         assert f"note: {bad}:1: not a BVH file: it must begin with HIERARCHY; left out\n" in ran.err
-        assert "note: nothing is learned from 1 file of 6\n" in ran.err
+        assert "note: left out 1 file of 6\n" in ran.err
     assert files_in(homes[1]) == files_in(homes[2])
     ran = run("corpus", "build", "mine", bad, *files, "--strict-files")
     assert ran.code == 2
@@ -221,7 +221,7 @@ def test_files_on_other_joints_than_most_are_reported(run: Run, files: dict[Path
     ran = run("corpus", "build", "mine", odd, *files)
     assert ran.code == 0
     assert f"note: {odd}: is on another skeleton than {next(iter(files))}: odd lacks " in ran.err
-    assert "may bring it there); left out\nnote: nothing is learned from 1 file of 6\n" in ran.err
+    assert "may bring it there); left out\nnote: left out 1 file of 6\n" in ran.err
     assert run("corpus", "info", "mine", "--json").json["joints"][0] == "pelvis"
     ran = run("corpus", "build", "mine", odd, *files, "--strict-files")
     assert (ran.code, f"error: {odd}: is on another skeleton than " in ran.err) == (2, True)

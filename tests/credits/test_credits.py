@@ -435,7 +435,7 @@ def test_a_format_without_credits_is_told(run: Run, tmp_path: Path) -> None:
     write_motion(tmp_path / "walk.json", replace(ballet_clip("plies"), name="walk", recorded=()))
     assert run("convert", tmp_path / "walk.json", tmp_path / "walk.bvh").code == 0
     ran = run("credits", tmp_path / "walk.bvh")
-    assert "walk.bvh: .bvh holds no credits; if the engine made it, name its .json, its .glb or its report" in ran.err
+    assert "walk.bvh: .bvh files hold no credits; for movement from the engine, give its .json" in ran.err
     assert "credits;" not in run("credits", tmp_path / "walk.json").err
 
 

@@ -186,7 +186,7 @@ def test_the_format_to_take_instead(convert: Run) -> None:
 
 def test_units_that_cannot_be(convert: Run) -> None:
     write_motion("in.json", moving(human23()))
-    assert "--out-unit mm: only BVH has no unit of its own" in convert("in.json", "a.glb", "--out-unit", "mm").err
+    assert "--out-unit mm: only BVH needs a unit" in convert("in.json", "a.glb", "--out-unit", "mm").err
     assert "unit 'furlong' is unknown" in convert("in.json", "a.bvh", "--out-unit", "furlong").err
     assert [path.name for path in Path().iterdir()] == ["in.json"]
 

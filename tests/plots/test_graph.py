@@ -203,7 +203,7 @@ def test_one_state_is_one(run: Run) -> None:
     write_motion("still.json", replace(motion, rotations=np.repeat(motion.rotations[:1], len(motion), axis=0)))
     assert run("corpus", "build", "still", "still.json").code == 0
     ran = run("graph", "--corpus", "still", "--joint", "left_hip", "-o", "hip.svg")
-    assert ran.out == "hip.svg: left_hip, 1 state, 1 transition; 1 state that none joins to another\n"
+    assert ran.out == "hip.svg: left_hip, 1 state, 1 transition; 1 isolated state\n"
 
 
 def test_what_cannot_be_drawn_is_refused_in_a_line(run: Run, tmp_path: Path) -> None:

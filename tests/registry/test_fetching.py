@@ -380,7 +380,7 @@ def test_what_an_index_says_is_displayed_and_not_acted_on(run: Run, published: P
 def test_a_recipe_is_printed_and_is_no_corpus(run: Run) -> None:
     result = run("corpus", "fetch", "lafan1")
     assert result.code == 2
-    assert result.err == "error: lafan1 is not passed on; the steps above lead to it\n"
+    assert result.err == "error: lafan1 may not be redistributed; the steps above build it\n"
     assert "CC BY-NC-ND 4.0" in result.out
     assert "\nstep 2       motionmind corpus build lafan1 " in result.out
     assert "https://github.com/ubisoft/ubisoft-laforge-animation-dataset" in result.out.split()  # in one piece

@@ -192,7 +192,7 @@ def test_a_sheet_of_a_part_keeps_the_numbers_of_the_whole(run: Run, tmp_path: Pa
         ("render a.json -o none/a.gif", r"none/a\.gif: cannot be written: there is no folder"),
         ("render none.json -o a.gif", r"none\.json: cannot be read: there is no such file"),
         ("render nan.json -o a.gif", r"nan\.json:"),
-        ("render a.json -o a.gif --clip b", r"a\.json: --clip chooses from a score or a corpus"),
+        ("render a.json -o a.gif --clip b", r"a\.json: --clip is only for a score or a corpus"),
         ("render walk-hexapod -o a.gif", r"walk-hexapod: holds 4 clips; choose one by --clip"),
         ("render walk-hexapod --clip tripd -o a.gif", r"no clip 'tripd'; did you mean tripod\?"),
         ("render a.json -o a.html --fps 5", r"a\.html: fps is for films"),

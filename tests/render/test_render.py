@@ -864,7 +864,7 @@ def test_a_corpus_is_drawn_clip_by_clip(by: str, run: Run, tmp_path: Path) -> No
         ((BALLET / "nothing.score", "-o", "sheets"), r"nothing\.score: cannot be read: there is no such file"),
         (
             (BALLET / "postures" / "fifth.json", "-o", "x.png", "--clip", "plies"),
-            r"--clip chooses from a score or a corpus",
+            r"--clip is only for a score or a corpus",
         ),
     ],
 )

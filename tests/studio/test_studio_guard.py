@@ -323,7 +323,7 @@ def test_other_computers_are_let_in_only_where_that_is_asked_for(tmp_path: Path)
         assert here.send("GET", "/api/project", Host=f"192.0.2.7:{port}").status == 401
         process.terminate()
         _, err = process.communicate(timeout=20)
-    assert "whoever has the URL" in err
+    assert "anyone with the URL" in err
     assert "nothing is encrypted" in err
 
 

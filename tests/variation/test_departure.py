@@ -119,9 +119,9 @@ def test_the_command_line_says_what_was_reached(run: Run) -> None:
     ran = run("vary", "piece.json", "--depart", 0.25, "-o", "v.json")
     assert ran.code == 0
     assert any(f" seams ({share}% of steps): " in ran.out for share in range(20, 31))
-    assert "no nudge was found" not in ran.err
+    assert "no nudge found" not in ran.err
     ran = run("vary", "piece.json", "--depart", 1, "-o", "v.json")
-    assert "note: no nudge was found by which 100% of steps leave the piece's order; the nearest is " in ran.err
+    assert "note: no nudge found for --depart 100%; the nearest share is " in ran.err
     ran = run("vary", "piece.json", "--depart", 0.3, "--nudge", 1, "-o", "w.json")
     assert ran.code == 2
-    assert "--depart seeks a nudge, and --nudge gives one; leave out one of them" in ran.err
+    assert "--depart chooses a nudge, and --nudge sets one; give one of them" in ran.err

@@ -210,10 +210,10 @@ def test_what_cannot_be_reached_is_refused_in_a_line(
     quick = ("--alternatives", 1, "--length", 20)
     ran = run("vary", "ballet/promenade", "--inserted", 0.3, *quick, "-o", "v.json")
     assert ran.code == 0
-    assert "kept within 30% inserted, in stretches of 4 postures at least" in ran.out
+    assert "limits: at most 30% inserted, stretches of at least 4 postures" in ran.out
     assert "insertions take" not in ran.err
     cut = run("review", "v.json", "--cut", "1..2", "--paste", 8, "-o", "cut.json", "--list")
-    assert "kept within 30% inserted; " in cut.out
+    assert "limits: at most 30% inserted; " in cut.out
     smoothed = run("review", "cut.json", "--smooth", "ballet", "--alternatives", 1, "--list")
     assert smoothed.code == 0
     assert "kept" not in smoothed.out
@@ -223,10 +223,10 @@ def test_what_cannot_be_reached_is_refused_in_a_line(
     other = ("--corpus", "ballet", "--to", 7, "--length", 15, "--alternatives", 1)
     ran = run("vary", "karate/heian-shodan", "--inserted", 0, *other, "-o", "v.json")
     assert ran.code == 0
-    assert "note: no order was found with 0% of the time inserted at most; this one has " in ran.err
+    assert "note: no order found with at most 0% of the time inserted; this one has " in ran.err
     write_motion("piece.json", ballet_clip("jump"))
     ran = run("vary", "piece.json", "--inserted", 0.1, "-o", "v.json")
-    assert (ran.code, "--inserted is for --corpus, which is not given" in ran.err) == (2, True)
+    assert (ran.code, "--inserted needs --corpus" in ran.err) == (2, True)
 
 
 def test_seams_that_a_viewer_would_wince_at_are_named(

@@ -306,7 +306,7 @@ def test_review_on_the_command_line_is_review_from_python(run: Run, file: Path, 
         (("--cut", "0..19", "--paste", 20), ["nothing changed"]),
         (
             ("--smooth", "karate"),
-            ["nothing is left to smooth: --discard the seams to smooth again", "nothing changed"],
+            ["no seam left to smooth; --discard a seam to smooth it again", "nothing changed"],
         ),
     ],
 )
@@ -325,9 +325,9 @@ def test_what_changes_nothing_is_said(run: Run, file: Path, arguments: tuple[obj
     [
         (("--approve", "999"), "no seam 999"),
         (("--approve", "one"), "'one' is neither a number"),
-        (("--cut", "1..2"), "--cut and --paste go together"),
+        (("--cut", "1..2"), "--cut and --paste need each other"),
         (("--cut", "1...2", "--paste", "3"), "'1...2' is neither a posture's number"),
-        (("--replace", "1"), "--replace and --alternative go together"),
+        (("--replace", "1"), "--replace and --alternative need each other"),
         (("--undo",), "there is no edit to undo"),
         (("--smooth", "nothing"), "no corpus 'nothing'"),
         (("--strict",), "--strict is for --smooth"),

@@ -139,8 +139,8 @@ def test_a_seam_is_played_with_another_insertion_and_nothing_is_edited(
         (("--play", 999, "-o", "x.gif"), "no seam 999"),
         (("--play", seam.number, "--alternative", 9, "-o", "x.gif"), "has alternatives 1 to 3, no alternative 9"),
         (("--play", 1, "-o", "x.json"), "the name must end in one of .png, .gif, .mp4, .svg, .html"),
-        (("--play", 1, "--undo", "-o", "x.gif"), "--play draws one seam, and does nothing else"),
-        (("--alternative", 2), "--replace and --alternative go together"),
+        (("--play", 1, "--undo", "-o", "x.gif"), "--play draws one seam; leave out"),
+        (("--alternative", 2), "--replace and --alternative need each other"),
         (("--sheet", "x.gif"), "the name must end in one of .png"),
     ):
         done = run("review", file, *words)

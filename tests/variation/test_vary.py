@@ -697,7 +697,7 @@ def test_vary_says_what_there_is_to_know(run: Run) -> None:
     write_motion("clip.json", ballet_clip("adagio").slice(0, 30))
     done = run("vary", "clip.json", "--attractor", "rossler", "--length", 80, "-o", "out.json")
     assert done.code == 0
-    assert "note: no corpus says which transitions are abrupt" in done.err
+    assert "note: without --corpus, no transition is judged" in done.err
     assert "not judged" in done.out
     done = run("vary", "clip.json", "--attractor", "lorenz", "--skip", 0, "--length", 80, "-o", "out.json")
     counts = run("review", "out.json", "--json").json["counts"]
@@ -707,7 +707,7 @@ def test_vary_says_what_there_is_to_know(run: Run) -> None:
     assert said in done.out.splitlines()
     done = run("vary", "clip.json", "--nudge", 0, "-o", "out.json")
     assert "steps stay" not in done.out + done.err
-    assert "note: the variation does not leave the piece's order" in done.err
+    assert "note: the variation keeps the piece's order" in done.err
 
 
 def test_what_the_documents_show_runs(run: Run) -> None:
@@ -740,17 +740,17 @@ def test_what_the_documents_show_runs(run: Run) -> None:
         (("nowhere.bvh",), "nowhere.bvh: cannot be read: there is no such file"),
         (("karate",), "karate: holds 4 clips; choose one by --clip"),
         (("karate/nothing",), "karate: no posture or clip 'nothing'; there are yoi, "),
-        (("karate/heian-shodan", "--clip", "heian-shodan"), "names a clip, and so does --clip"),
+        (("karate/heian-shodan", "--clip", "heian-shodan"), "already names a clip; leave out --clip"),
         (("macarena", "--attractor", "moon"), "no flow 'moon'"),
         (("macarena", "--parameter", "rho"), "--parameter rho: give NAME=VALUE"),
         (("macarena", "--parameter", "rho=1"), "lorenz (sigma 16, rho 1, beta 4)"),
         (("macarena", "--nudge", "far"), "'far' is neither a number"),
-        (("clip.json", "--strict", "--hold", "left_ankle"), "--hold is for --corpus, which is not given"),
-        (("clip.json", "--alternatives", "3"), "--alternatives is for --corpus, which is not given"),
-        (("clip.json", "--lambda", "2"), "--lambda is for --corpus, which is not given"),
-        (("macarena", "--unit", "cm"), "macarena: --unit is for a file of movement"),
-        (("karate/heian-shodan", "--source-fps", "30"), "--source-fps is for a file of movement"),
-        (("some.score", "--joints", "some.toml"), "some.score: --joints is for a file of movement"),
+        (("clip.json", "--strict", "--hold", "left_ankle"), "--hold needs --corpus"),
+        (("clip.json", "--alternatives", "3"), "--alternatives needs --corpus"),
+        (("clip.json", "--lambda", "2"), "--lambda needs --corpus"),
+        (("macarena", "--unit", "cm"), "macarena: --unit is only for motion files"),
+        (("karate/heian-shodan", "--source-fps", "30"), "--source-fps is only for motion files"),
+        (("some.score", "--joints", "some.toml"), "some.score: --joints is only for motion files"),
         (("macarena", "--corpus", "nothing"), "no corpus 'nothing'"),
         (("macarena", "--rate", "0.0001", "--via", "x.json"), "x.json: cannot be read"),
     ],
@@ -768,7 +768,7 @@ def test_bad_input_is_one_line(run: Run, tmp_path: Path, arguments: tuple[str, .
 def test_pictures_too_refuse_what_is_for_files(run: Run, command: str) -> None:
     done = run(command, "macarena", "--unit", "cm", "-o", "out.png")
     assert done.code == 2
-    assert "macarena: --unit is for a file of movement, which this is not" in done.err
+    assert "macarena: --unit is only for motion files" in done.err
 
 
 def test_the_exponent_is_reported_and_says_how_fast_trajectories_part(kata: Piece) -> None:
