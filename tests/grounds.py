@@ -14,7 +14,7 @@ from motionmind.body.human import human23
 from motionmind.body.limbs import limbs_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.footing.ground import Given, Stance
-from motionmind.synth.synthesise import Bounds, synthesise
+from motionmind.solver.motion import Bounds, solve_motion
 
 TIGHT = np.zeros(23, dtype=np.bool_)  # no joint is loose
 
@@ -49,7 +49,7 @@ def grounded(
     none_of_joints = np.zeros(len(skeleton), dtype=np.bool_)
     touches = np.zeros(len(capsules_of(skeleton).pairs())) if usual is None else usual
     bounds = Bounds(fixed, none_of_joints, none_of_joints, touches, fastest, np.inf, travels, np.inf, pushes)
-    made = synthesise(
+    made = solve_motion(
         skeleton, q, np.arange(len(q)) / fps, stance, Given(low, (root[0], root[-1]), rates), bounds, **options
     )
     return made.rotations, made.root

@@ -10,9 +10,9 @@ from motionmind._typing import Floats
 from motionmind.body.human import human23
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
-from motionmind.synth.kinematics import Freedom, State, body_of
-from motionmind.synth.system import Normal
-from motionmind.synth.terms import Term
+from motionmind.solver.kinematics import Freedom, State, body_of
+from motionmind.solver.system import Normal
+from motionmind.solver.terms import Term
 
 FPS = 30.0
 HUMAN = human23()

@@ -16,7 +16,7 @@ def assert_learned_alike(one: Learned, other: Learned) -> None:
     assert (mine.clips, mine.faults, mine.rate) == (theirs.clips, theirs.faults, theirs.rate)
     for name in ("rotations", "root", "times", "detail"):
         np.testing.assert_array_equal(getattr(mine, name), getattr(theirs, name), err_msg=name)
-    for name in ("space", "grammar", "carriage", "pace", "plausibility", "gauge"):
+    for name in ("space", "grammar", "statistics", "pace", "plausibility", "gauge"):
         _assert_same_arrays(getattr(one, name), getattr(other, name))
     np.testing.assert_array_equal(one.states, other.states)
 

@@ -384,7 +384,7 @@ def test_the_nearest_segment_is_the_window_itself_wherever_it_faces() -> None:
 
 
 def test_generative_motion_matching_keeps_what_is_made_of_the_examples() -> None:
-    from experiments.inbetween.genmm import Examples, described, freely, restored, synthesise
+    from experiments.inbetween.genmm import Examples, described, freely, restored, solve_motion
     from experiments.material import movement
     from motionmind.geometry import rotations as rot
 
@@ -394,7 +394,7 @@ def test_generative_motion_matching_keeps_what_is_made_of_the_examples() -> None
     assert rot.angle(rotations, whole.rotations).max() < 1e-6
     assert root == pytest.approx(whole.root, abs=1e-9)
     examples = Examples.of([whole])
-    again = synthesise(frames, examples.patches, [1.0], lambda made: made)
+    again = solve_motion(frames, examples.patches, [1.0], lambda made: made)
     assert again == pytest.approx(frames, abs=1e-5)
     free, _ = freely(examples, 90, seed=1)
     nearest = [rot.angle(one, whole.rotations).mean(axis=-1).min() for one in free[:, None]]

@@ -59,7 +59,7 @@ def scales(frames: int, coarsest: int) -> list[float]:
     return out
 
 
-def synthesise(
+def solve_motion(
     begun: Floats, patches: Callable[[float], Floats], at: Sequence[float], fix: Callable[[Floats], Floats]
 ) -> Floats:
     """Return movement [T, F] of the examples' patches.
@@ -91,7 +91,7 @@ def between(ends: Ends, patches: Callable[[float], Floats]) -> Made:
         made[[0, -1], :-3] = given
         return made
 
-    found = synthesise(begun, patches, scales(len(begun), PATCH), fix)
+    found = solve_motion(begun, patches, scales(len(begun), PATCH), fix)
     return warped(*restored(found, ends.a.rotations[0], ends.a.root), ends)
 
 
@@ -99,7 +99,7 @@ def freely(examples: Examples, frames: int, seed: int) -> Made:
     """Return movement of so many frames, made of noise and the examples alone."""
     longest = max(map(len, examples.frames))
     begun = np.random.default_rng(seed).normal(scale=NOISE, size=(frames, examples.frames[0].shape[1]))
-    found = synthesise(begun, examples.patches, scales(longest, COARSEST), lambda made: made)
+    found = solve_motion(begun, examples.patches, scales(longest, COARSEST), lambda made: made)
     return restored(found, rot.IDENTITY, np.zeros(3))
 
 

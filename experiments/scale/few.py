@@ -59,7 +59,7 @@ def measured(by: str, part: int, options: argparse.Namespace) -> list[tuple[floa
     groups = families(options.folder, by)
     held = {take: number for number, family in enumerate(groups) if number % 2 == part for take in family}
     few = learned(by, part, [take for family in groups for take in family if take not in held], options)
-    every = replace(few, carriage=replace(few.carriage, trees=None))
+    every = replace(few, statistics=replace(few.statistics, trees=None))
     out = []
     for seconds in GAPS:
         frames = round(seconds * FPS)

@@ -16,9 +16,9 @@ from tweens import build, name_of, posture
 from motionmind import Engine
 from motionmind._typing import Bools, Floats
 from motionmind.geometry.distances import squared_distance
-from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import N_LEAVES_VISITED
 from motionmind.learned.neighbours import build_neighbours
+from motionmind.learned.posture_statistics import PostureStatistics
 from motionmind.walks.likelihood import end_variance, squared_distances
 from motionmind.walks.marginals import posterior_marginals
 from motionmind.walks.sparse import all_samples, choose
@@ -56,42 +56,42 @@ def main() -> None:
             found = np.array([shares(engine, *pair) for pair in drawn])
             middle = "  ".join(f"{np.median(row):6.3f} ({row.min():5.3f})" for row in found.T)
             short = np.mean(found[:, 0] < found[:, 2])
-            print(f"{times:5} {len(engine.carriage.weights):8} | {middle} | {short:.0%}", flush=True)
+            print(f"{times:5} {len(engine.statistics.weights):8} | {middle} | {short:.0%}", flush=True)
 
 
 def shares(engine: Engine, a: int, b: int) -> Shares:
     """Return what walks from one posture of the corpus to another leave out."""
-    carriage, joints = engine.carriage, len(engine.corpus.skeleton)
+    statistics, joints = engine.statistics, len(engine.corpus.skeleton)
     ends = engine.corpus.to_chains(np.stack([posture(engine, one).rotations for one in (a, b)]))[:, :joints]
-    trees = carriage.trees or build_neighbours(engine.corpus.skeleton, carriage.orientations, carriage.weights)
-    carriage = Carriage(**vars(carriage) | {"trees": trees})
-    return Shares(*np.max([in_part(carriage, number, ends) for number in range(len(trees.parts))], axis=0))
+    trees = statistics.trees or build_neighbours(engine.corpus.skeleton, statistics.orientations, statistics.weights)
+    statistics = PostureStatistics(**vars(statistics) | {"trees": trees})
+    return Shares(*np.max([in_part(statistics, number, ends) for number in range(len(trees.parts))], axis=0))
 
 
-def in_part(carriage: Carriage, number: int, ends: Floats) -> Floats:
+def in_part(statistics: PostureStatistics, number: int, ends: Floats) -> Floats:
     """Return the shares in one part of the body, each the greater one of both ends."""
-    trees = carriage.trees
+    trees = statistics.trees
     assert trees is not None
-    part, weights = trees.parts[number], carriage.weights
-    chosen = choose(carriage, number, ends, STEPS).chosen
+    part, weights = trees.parts[number], statistics.weights
+    chosen = choose(statistics, number, ends, STEPS).chosen
     assert chosen.near is not None
-    assert not isinstance(chosen.moments, slice)
-    shown = np.ascontiguousarray(carriage.orientations[:, part])
+    assert not isinstance(chosen.samples, slice)
+    shown = np.ascontiguousarray(statistics.orientations[:, part])
     whole, given = np.zeros((len(part), 1), dtype=np.int64), np.ascontiguousarray(ends[:, part])
     off = squared_distances(shown, whole, 1, given)[0]
     near, out = np.ones((STEPS + 1, len(weights))), []
     for k in range(2):
-        few = off[k, chosen.moments]
+        few = off[k, chosen.samples]
         variance = end_variance(float(np.sqrt(few.min())))
         near[-k] = np.exp(0.5 * (few.min() - off[k]) / variance)
         seen = np.zeros(len(weights), dtype=bool)
-        seen[chosen.moments[chosen.near[k]]] = True
+        seen[chosen.samples[chosen.near[k]]] = True
         kept, rest = weights[seen] @ near[-k, seen], weights[~seen] @ near[-k, ~seen]
-        stands = chosen.weights @ near[-k, chosen.moments]
+        stands = chosen.weights @ near[-k, chosen.samples]
         farthest = weights[~seen].sum() * near[-k, ~seen].max()
-        by_leaves = _by_leaves(carriage, number, given[k], seen, near[-k], (few.min(), variance))
+        by_leaves = _by_leaves(statistics, number, given[k], seen, near[-k], (few.min(), variance))
         out.append([1.0 - kept / stands, *(x / (kept + x) for x in (rest, by_leaves, farthest)), seen])
-    every = all_samples(carriage, number)
+    every = all_samples(statistics, number)
     marginals = posterior_marginals(every.begins, every.ends, every.shares, every.clusters, weights, near)
     walks = [1.0 - marginals[-k, out[k][-1]].sum() for k in range(2)]
     said, rest, leaves, radius = np.max([one[:-1] for one in out], axis=0)
@@ -99,13 +99,13 @@ def in_part(carriage: Carriage, number: int, ends: Floats) -> Floats:
 
 
 def _by_leaves(
-    carriage: Carriage, number: int, given: Floats, seen: Bools, near: Floats, nearest: tuple[float, float]
+    statistics: PostureStatistics, number: int, given: Floats, seen: Bools, near: Floats, nearest: tuple[float, float]
 ) -> float:
     """Return at most how much is not `seen`, by what no moment of a leaf's ball can exceed.
 
     In as many leaves as are searched, the nearest ones, each moment is known.
     """
-    trees, (least, variance) = carriage.trees, nearest
+    trees, (least, variance) = statistics.trees, nearest
     assert trees is not None
     first = len(trees.bounds) // 2
     centres, radii, bounds = trees.centres_of(number)[first:], trees.radii[number, first:], trees.bounds[first:]
@@ -114,10 +114,10 @@ def _by_leaves(
     most = np.exp(0.5 * (least - within**2) / variance)
     total = 0.0
     for rank, leaf in enumerate(np.argsort(within, kind="stable")):
-        moments = trees.order[number, slice(*bounds[leaf])]
-        moments = moments[~seen[moments]]
-        weights = carriage.weights[moments]
-        total += float(weights @ near[moments]) if rank < N_LEAVES_VISITED else float(weights.sum() * most[leaf])
+        samples = trees.order[number, slice(*bounds[leaf])]
+        samples = samples[~seen[samples]]
+        weights = statistics.weights[samples]
+        total += float(weights @ near[samples]) if rank < N_LEAVES_VISITED else float(weights.sum() * most[leaf])
     return total
 
 

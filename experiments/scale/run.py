@@ -89,7 +89,9 @@ def measure(data: str | None, times: int, workers: int, room: str | None = None,
     """
     kind = make_discretization("codebook", TOLERANCE)
     first = Engine.learn(gather("first", [own_skeleton(_recorded(data)[0])], rate=RATE), kind)
-    build_neighbours(first.corpus.skeleton, first.carriage.orientations, first.carriage.weights)  # loads what is needed
+    build_neighbours(
+        first.corpus.skeleton, first.statistics.orientations, first.statistics.weights
+    )  # loads what is needed
     spent: list[Spent] = []
     with tempfile.TemporaryDirectory(dir=room) as scratch, open_team(workers) as team, Memory() as memory:
         workshop = Workshop.of(workers, Path(scratch))

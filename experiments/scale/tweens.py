@@ -129,11 +129,11 @@ class Asked:
 
     def row(self) -> str:
         """Return a line of the table."""
-        took, searching, realising, used = 1e3 * np.median(self.took, axis=0)
+        took, searching, synthesising, used = 1e3 * np.median(self.took, axis=0)
         late = 1e3 * np.percentile([one[0] for one in self.took], 95)
         return (
             f"{self.times:5} {len(self.engine.corpus):8} | {1e3 * self.loaded:7.1f} {self.more:8.1f} | "
-            f"{1e3 * self.first:8.0f} {took:7.1f} {late:7.1f} | {searching:12.1f} {realising:8.1f} | {used:9.1f}"
+            f"{1e3 * self.first:8.0f} {took:7.1f} {late:7.1f} | {searching:12.1f} {synthesising:8.1f} | {used:9.1f}"
         )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from experiments.material import corpus, families, part, take_of
 from motionmind._typing import Floats
-from motionmind.learned.carriage import learn_carriage
+from motionmind.learned.posture_statistics import learn_posture_statistics
 from motionmind.learned.trust import DISTANCE_RATIOS, Squares
 from motionmind.walks.evidence import DECAY_CANDIDATES_S, end_velocity_errors, gather_evidence
 
@@ -28,7 +28,7 @@ def main(data: str) -> None:
     for name in DANCERS:
         whole, takes = corpus(data, name), {family[0] for family in families(data, name)}
         movement = part(whole, [number for number, clip in enumerate(whole.clips) if take_of(clip.name) in takes])
-        found = Squares.summed(gather_evidence(movement, learn_carriage(movement), WINDOWS))
+        found = Squares.summed(gather_evidence(movement, learn_posture_statistics(movement), WINDOWS))
         shares.append(Squares(found.inner / found.whole, found.along / found.whole, 1.0))
         errors = end_velocity_errors(movement, WINDOWS)
         lasting.append(errors / errors.min())

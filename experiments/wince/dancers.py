@@ -13,9 +13,9 @@ from experiments.material import FPS, RECORDED, corpus, movement
 from motionmind import Motion, Posture
 from motionmind._typing import Bools, Floats, Ints
 from motionmind.body.capsules import legs_depth
-from motionmind.body.contact import FAR, floor_height, foot_slides, lowest_height
+from motionmind.body.contact import STANCE_STEP_M, floor_height, foot_slides, lowest_height
 from motionmind.body.legs import find_legs
-from motionmind.body.plausibility import CALM, FALLING, GRAVITY
+from motionmind.body.plausibility import CALM_MPS2, FALLING_RATIO, GRAVITY_MPS2
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import find_support, stands_alone
 from motionmind.geometry import rotations as rot
@@ -23,7 +23,7 @@ from motionmind.geometry import rotations as rot
 MEASURES = ("root speed", "root acceleration", "slide", "joints", "legs")
 BEYOND = 99.5  # percentile of the dancers' own windows
 TOUCHING = 0.01  # metres: legs that are no deeper in each other touch
-REST = 0.5  # metres a second squared: level acceleration of a body at rest; weight is looked at up to CALM
+REST = 0.5  # metres a second squared: level acceleration of a body at rest; weight is looked at up to CALM_MPS2
 STILL_JOINT = 0.5  # rad/s: no joint's limit is less
 _ENOUGH = 30  # frames of which the greatest hundredth says something
 _FEW = 50  # windows; where clips have fewer of a length, whole clips count as well
@@ -67,13 +67,13 @@ def see(motion: Motion) -> Seen:
         accelerations = FPS**2 * np.diff(support.mass, 2, axis=0)
         level = np.full(len(motion), np.inf)
         level[1:-1] = np.hypot(accelerations[:, 0], accelerations[:, 2])
-        calm = np.stack([level < CALM, level < REST, minimum_filter1d(level < REST, 3, mode="constant")], axis=1)
+        calm = np.stack([level < CALM_MPS2, level < REST, minimum_filter1d(level < REST, 3, mode="constant")], axis=1)
         alone = support.bears.sum(axis=1, keepdims=True) == 1
         lean = np.where(calm & alone, support.overhang[:, None], np.nan)
         bounce = np.abs(accelerations[:, 1])
         up = support.airborne
         fall = accelerations[up[:-2] & up[1:-1] & up[2:], 1]
-        falls[1:-1] = up[1:-1] & (accelerations[:, 1] < -FALLING * GRAVITY)
+        falls[1:-1] = up[1:-1] & (accelerations[:, 1] < -FALLING_RATIO * GRAVITY_MPS2)
     slides = foot_slides(body, rotations, root).max(axis=1, initial=0.0)
     greatest = {
         "root speed": FPS * np.linalg.norm(np.diff(root, axis=0), axis=1),
@@ -82,8 +82,10 @@ def see(motion: Motion) -> Seen:
         "legs": legs_depth(body, rotations),
     }
     joints = FPS * rot.angle(rotations[:-1], rotations[1:])
-    swings = foot_slides(body, rotations, root, np.inf).max(axis=1, initial=0.0) > FAR  # all are under such a floor
-    return Seen(greatest, joints, bounce, lean, fall, slides > FAR, swings, support.airborne, falls)
+    swings = (
+        foot_slides(body, rotations, root, np.inf).max(axis=1, initial=0.0) > STANCE_STEP_M
+    )  # all are under such a floor
+    return Seen(greatest, joints, bounce, lean, fall, slides > STANCE_STEP_M, swings, support.airborne, falls)
 
 
 class Limits(NamedTuple):

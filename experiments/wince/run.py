@@ -14,7 +14,7 @@ from experiments.material import FPS, engine, recorded
 from experiments.wince.dancers import MEASURES, Dancers, Seen, dancers, nearer, on_the_same_spot, see
 from motionmind import Motion, NoPathError, Posture
 from motionmind._typing import Bools, Floats
-from motionmind.body.plausibility import GRAVITY
+from motionmind.body.plausibility import GRAVITY_MPS2
 from motionmind.body.support import standing_rise
 from motionmind.geometry import rotations as rot
 from motionmind.learned.pace import way_between
@@ -161,7 +161,7 @@ def row_of(
 
 
 def _is_falling(accelerations: Floats) -> Bools:
-    return np.asarray(np.abs(accelerations + GRAVITY) < NEAR_GRAVITY * GRAVITY)
+    return np.asarray(np.abs(accelerations + GRAVITY_MPS2) < NEAR_GRAVITY * GRAVITY_MPS2)
 
 
 def _share_of_falls(accelerations: list[Floats]) -> float:

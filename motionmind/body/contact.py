@@ -24,10 +24,10 @@ from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.limbs import limb_of_points, limbs_of
 from motionmind.body.skeleton import Points, Skeleton, place, places_of, points_of, remembered
 
-RATE = 30.0  # frames a second, to measure feet
-LOW = 0.05  # metres above the floor: a lower foot should stand
-FAR = 0.025  # metres that a standing foot may move from one frame to the next
-TALL = 1.0  # metres: the limits of feet hold for bodies of at least this height
+CONTACT_FPS = 30.0  # frames a second, to measure feet
+STANCE_HEIGHT_M = 0.05  # metres above the floor: a lower foot should stand
+STANCE_STEP_M = 0.025  # metres that a standing foot may move from one frame to the next
+TALL_BODY_M = 1.0  # metres: the limits of feet hold for bodies of at least this height
 
 
 class Heel(NamedTuple):
@@ -261,7 +261,7 @@ def skating(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float = 
         floor: height of the floor, metres; for a recording, from `find_floor`.
     """
     slides = foot_slides(skeleton, rotations, root, floor)
-    return float((slides > FAR).any(axis=-1).mean()) if len(slides) else 0.0
+    return float((slides > STANCE_STEP_M).any(axis=-1).mean()) if len(slides) else 0.0
 
 
 def foot_slides(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float | Floats = 0.0) -> Floats:
@@ -282,7 +282,7 @@ def foot_slides(skeleton: Skeleton, rotations: Floats, root: Floats, floor: floa
 def slides_between(skeleton: Skeleton, places: Floats, floor: float | Floats) -> Floats:
     """Return the `foot_slides`, given places [T, P, 3] of joints and tips, then of any other points, metres."""
     moved, height = _foot_ends(skeleton, places, floor)
-    least = np.where(height < LOW, moved, np.inf).min(axis=-1)
+    least = np.where(height < STANCE_HEIGHT_M, moved, np.inf).min(axis=-1)
     return np.where(np.isfinite(least), least, 0.0)
 
 
@@ -298,7 +298,7 @@ def feet_that_stay(skeleton: Skeleton, rotations: Floats, root: Floats, floor: f
         floor: height of the floor, metres.
     """
     moved, height = _foot_ends(skeleton, skeleton.positions_and_tips(rotations, root), floor)
-    least = np.where(height < LOW, moved, np.inf).min(axis=-1)
+    least = np.where(height < STANCE_HEIGHT_M, moved, np.inf).min(axis=-1)
     return np.asarray(least.sum(axis=0) <= 0.05)  # metres that a foot may slide as it rolls
 
 

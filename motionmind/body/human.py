@@ -16,7 +16,7 @@ _Row = tuple[str, str, tuple[float, float, float]]
 
 
 # Metres, of people and of what is animated as people: a body beyond them has another unit.
-SHORTEST, TALLEST = 0.5, 2.6
+SHORTEST_PERSON_M, TALLEST_PERSON_M = 0.5, 2.6
 
 # human23: the tree of [I98] figure 4 with hands and toes. Segment lengths for a height of 1.70 m after Drillis and
 # Contini, "Body segment parameters" (1966), as given in Winter, "Biomechanics and Motor Control of Human Movement"

@@ -21,7 +21,7 @@ from motionmind.geometry import rotations as rot
 LEFT, RIGHT, MIDDLE = "left", "right", "middle"
 # Of the distance from the root to the farthest joint. Measured bodies are not quite symmetric: left and right bones
 # differ by up to 1.2 cm in one dancer's recordings, by 2.5 cm in other people's.
-TOLERANCE = 0.05
+MIRROR_TOLERANCE_RATIO = 0.05
 _X, _Y, _Z = 0, 1, 2
 
 
@@ -94,7 +94,9 @@ def find_sides(skeleton: Skeleton) -> Sides:
     reach = float(np.linalg.norm(at_rest, axis=-1).max())
     # Distance of each joint from its partner's image, for each axis [3, J].
     off = np.stack([np.linalg.norm(offsets * _reflection(axis) - offsets[partners], axis=-1) for axis in range(3)])
-    possible = [axis for axis in ((_X, _Z, _Y) if paired.any() else (_X,)) if off[axis].max() <= TOLERANCE * reach]
+    possible = [
+        axis for axis in ((_X, _Z, _Y) if paired.any() else (_X,)) if off[axis].max() <= MIRROR_TOLERANCE_RATIO * reach
+    ]
     if not possible:
         raise SkeletonError(_asymmetry(skeleton, partners, off if paired.any() else off[:1]))
     apart = np.abs(offsets - offsets[partners]).sum(axis=0)

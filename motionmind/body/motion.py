@@ -26,7 +26,7 @@ from motionmind.arguments import (
     check_type,
 )
 from motionmind.body.frozen import freeze_checked
-from motionmind.body.rates import FASTEST, check_size
+from motionmind.body.rates import MAX_FPS, check_size
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.tables import data_frame, data_set
 from motionmind.credits.credit import Credit, add_up, check_shares
@@ -290,9 +290,9 @@ class Motion:
             MotionMindError: the rate is out of range, or gives too many frames (as for `at`).
         """
         check_real("rate", rate)
-        if not 0.0 < rate <= FASTEST:
+        if not 0.0 < rate <= MAX_FPS:
             raise MotionMindError(
-                f"a rate must be a positive number of postures a second, {FASTEST:g} at most, not {rate}"
+                f"a rate must be a positive number of postures a second, {MAX_FPS:g} at most, not {rate}"
             )
         span = self.times[-1] - self.times[0]
         steps = np.floor(span * rate + 1e-3)

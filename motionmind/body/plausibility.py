@@ -20,7 +20,7 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats
 from motionmind.body.capsules import penetration
-from motionmind.body.contact import RATE, lowest_height
+from motionmind.body.contact import CONTACT_FPS, lowest_height
 from motionmind.body.motion import Motion
 from motionmind.body.rates import check_size
 from motionmind.body.skeleton import Skeleton
@@ -28,9 +28,9 @@ from motionmind.body.support import find_support
 from motionmind.geometry.splines import natural_spline, rotation_spline
 
 SEEN = ("balance", "bounce", "flight", "crossed_limbs")
-GRAVITY = 9.81  # metres a second squared
-CALM = 2.0  # metres a second squared: level acceleration up to which a body should be in balance
-FALLING = 0.5  # share of gravity: a body off the floor that falls faster is in the air
+GRAVITY_MPS2 = 9.81  # metres a second squared
+CALM_MPS2 = 2.0  # metres a second squared: level acceleration up to which a body should be in balance
+FALLING_RATIO = 0.5  # share of gravity: a body off the floor that falls faster is in the air
 
 
 def implausibility(skeleton: Skeleton, rotations: Floats, root: Floats, fps: float, floor: float = 0.0) -> Floats:
@@ -48,7 +48,7 @@ def implausibility(skeleton: Skeleton, rotations: Floats, root: Floats, fps: flo
     if support.mass is not None and support.overhang is not None and len(rotations) > 2:
         accelerations = fps**2 * np.diff(support.mass, 2, axis=0)
         calm = np.zeros(len(rotations), dtype=bool)
-        calm[1:-1] = np.hypot(accelerations[:, 0], accelerations[:, 2]) < CALM
+        calm[1:-1] = np.hypot(accelerations[:, 0], accelerations[:, 2]) < CALM_MPS2
         alone = support.bears.sum(axis=1) == 1
         out[:, 0] = np.where(calm & alone, support.overhang, np.nan)
         out[1:-1, 1] = np.abs(accelerations[:, 1])
@@ -72,12 +72,12 @@ def greatest(values: Floats) -> Floats:
 
 def at_rate(motion: Motion) -> Motion:
     """Resample movement to 30 frames per second: interpolate coarser movement by splines, thin finer movement."""
-    if motion.fps >= RATE or len(motion) < 2:
-        return motion.resample(RATE)
+    if motion.fps >= CONTACT_FPS or len(motion) < 2:
+        return motion.resample(CONTACT_FPS)
     start, keys = motion.times[0], motion.times
-    steps = np.floor((keys[-1] - start) * RATE + 1e-3)
+    steps = np.floor((keys[-1] - start) * CONTACT_FPS + 1e-3)
     check_size(steps + 1.0, len(motion.skeleton), motion.name)
-    times = start + np.arange(steps + 1) / RATE
+    times = start + np.arange(steps + 1) / CONTACT_FPS
     rotations, root = rotation_spline(keys, motion.rotations, times), natural_spline(keys, motion.root, times)
     return replace(motion, rotations=rotations, root=root, times=times, insertions=(), keyframed=False)
 
@@ -93,5 +93,5 @@ def _lack_of_gravity(heights: Floats, airborne: Bools, fps: float) -> Floats:
         if end - begin >= 3:  # a parabola needs three frames
             times = np.arange(end - begin) / fps
             acceleration = 2.0 * np.polynomial.polynomial.polyfit(times - times.mean(), heights[begin:end], 2)[2]
-            out[begin:end] = 1.0 + acceleration / GRAVITY
+            out[begin:end] = 1.0 + acceleration / GRAVITY_MPS2
     return out

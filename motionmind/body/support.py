@@ -26,8 +26,8 @@ from motionmind.body.skeleton import Skeleton, joints_of, place, remembered
 from motionmind.geometry.rotations import norm
 from motionmind.jit import jit
 
-NEAR = 0.05  # metres above the body's lowest point within which a limb can bear
-STILL = 0.3  # metres a second: a point that moves faster does not bear
+SUPPORT_HEIGHT_M = 0.05  # metres above the body's lowest point within which a limb can bear
+SUPPORT_SPEED_MPS = 0.3  # metres a second: a point that moves faster does not bear
 # Metres above the floor of the lowest point of a body in the air. Dancers on half-pointe, and recordings whose floor is
 # a little off, reach 8 to 12 cm; above it, the mass of the dancers of `cmu-05` and `cmu-16` falls freely.
 AIRBORNE_M = 0.12
@@ -84,7 +84,9 @@ def find_bearers(
     """
     lowest = places[..., 1].min(axis=-1)
     airborne = lowest > floor + AIRBORNE_M * size
-    bears, touches = _find_bearers(places, limb, lowest + NEAR * size, airborne, STILL * size, fps)
+    bears, touches = _find_bearers(
+        places, limb, lowest + SUPPORT_HEIGHT_M * size, airborne, SUPPORT_SPEED_MPS * size, fps
+    )
     return bears, airborne, touches
 
 
@@ -150,7 +152,7 @@ def stands_alone(skeleton: Skeleton, rotations: Floats, root: Floats) -> Ints:
         root: positions of the root [..., 3], metres.
     """
     heights = limb_heights(skeleton, rotations, root)
-    low = heights <= heights.min(axis=-1, keepdims=True) + NEAR * size_of(skeleton)
+    low = heights <= heights.min(axis=-1, keepdims=True) + SUPPORT_HEIGHT_M * size_of(skeleton)
     return np.where(low.sum(axis=-1) == 1, low.argmax(axis=-1), -1)
 
 

@@ -21,9 +21,9 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats
 from motionmind.body.contact import floor_height, lowest_height
-from motionmind.body.human import SHORTEST, TALLEST, human23
+from motionmind.body.human import SHORTEST_PERSON_M, TALLEST_PERSON_M, human23
 from motionmind.body.motion import Motion
-from motionmind.body.plausibility import GRAVITY
+from motionmind.body.plausibility import GRAVITY_MPS2
 from motionmind.body.support import centre_of_mass
 
 # CMU's subjects 05 and 16: recordings fall at 17 m/s2 at most (with hips that were recorded badly); walks take 0.45 to
@@ -47,7 +47,7 @@ def question_tempo(motion: Motion) -> str:
         return ""
     if motion.keyframed or motion.insertions:
         return ""
-    if not SHORTEST <= motion.skeleton.height <= TALLEST:  # the unit is wrong, not the frame rate
+    if not SHORTEST_PERSON_M <= motion.skeleton.height <= TALLEST_PERSON_M:  # the unit is wrong, not the frame rate
         return ""
     if np.ptp(np.diff(motion.times)) > 0.01 / motion.fps:  # each frame has a time of its own
         return ""
@@ -64,16 +64,18 @@ def question_tempo(motion: Motion) -> str:
 def _question(motion: Motion, heights: Floats) -> str:
     """Describe how movement contradicts its frame rate, given the heights of its mass [T]; "" if it does not."""
     flights = _flights(motion, heights)
-    gravities = float(np.median(flights)) / GRAVITY if flights else 1.0
+    gravities = float(np.median(flights)) / GRAVITY_MPS2 if flights else 1.0
     if not 0.6 < gravities < 1.6:
-        return _phrase(np.sqrt(gravities), f"in the air it falls at {gravities * GRAVITY:.2g} m/s2, gravity is 9.8")
+        return _phrase(
+            np.sqrt(gravities), f"in the air it falls at {gravities * GRAVITY_MPS2:.2g} m/s2, gravity is 9.8"
+        )
     falls = float(np.percentile(_falls(heights, motion.fps), 99.0))
     if falls > MAX_FALL_MPS2:
-        return _phrase(np.sqrt(falls / GRAVITY), f"it falls at {falls:.2g} m/s2, gravity is 9.8")
+        return _phrase(np.sqrt(falls / GRAVITY_MPS2), f"it falls at {falls:.2g} m/s2, gravity is 9.8")
     cadence, leg = _cadence(motion)
     # A runner at this cadence falls faster than 0.8 g for a hundredth of the time.
-    if cadence > RUN_CADENCE_RATIO and falls < 0.8 * GRAVITY:
-        rate = cadence / np.sqrt(leg / GRAVITY)
+    if cadence > RUN_CADENCE_RATIO and falls < 0.8 * GRAVITY_MPS2:
+        rate = cadence / np.sqrt(leg / GRAVITY_MPS2)
         return _phrase(cadence / WALK_CADENCE_RATIO, f"it walks with {rate:.2g} steps a second, and never runs")
     return ""
 
@@ -153,5 +155,5 @@ def _cadence(motion: Motion) -> tuple[float, float]:
             and some.max() < 1.4 * some.min()
             and long.max() < 1.5 * long.min()
         ):
-            quickest = max(quickest, float(np.sqrt(leg / GRAVITY) / some.mean()))
+            quickest = max(quickest, float(np.sqrt(leg / GRAVITY_MPS2) / some.mean()))
     return quickest, leg

@@ -37,8 +37,8 @@ def question_recording(path: Path, motion: Motion, up: str | None = None) -> Non
         motion: its movement; joints that do not map to human23 are not checked.
         up: the axis that is up in the movement; None finds it.
     """
-    from motionmind.body.human import SHORTEST, TALLEST
-    from motionmind.body.rates import FILM_RATE
+    from motionmind.body.human import SHORTEST_PERSON_M, TALLEST_PERSON_M
+    from motionmind.body.rates import FILM_FPS
     from motionmind.body.tempo import question_tempo
     from motionmind.corpus.dropped import describe_gaps, fill_gaps
     from motionmind.corpus.recordings import FLOOR_OFFSET_M, added_frames, floor_of
@@ -57,8 +57,8 @@ def question_recording(path: Path, motion: Motion, up: str | None = None) -> Non
     doubts = [gaps] if (gaps := describe_gaps(person, added)) else []
     if clock := question_tempo(fill_gaps(person, added).motion if gaps else person):
         doubts.append(f"seems to play {clock} (check the frames per second, --source-fps, and the unit)")
-    is_long = person.fps >= FILM_RATE and len(person) - added > person.fps
-    if is_long and SHORTEST <= person.skeleton.height <= TALLEST:  # else the unit is wrong
+    is_long = person.fps >= FILM_FPS and len(person) - added > person.fps
+    if is_long and SHORTEST_PERSON_M <= person.skeleton.height <= TALLEST_PERSON_M:  # else the unit is wrong
         floor = floor_of(person.slice(added, len(person)))
         if abs(floor) > FLOOR_OFFSET_M:
             where = "over" if floor > 0.0 else "under"

@@ -29,7 +29,7 @@ from motionmind.files import lock_alone
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
-    from motionmind.learned.carriage import Carriage
+    from motionmind.learned.posture_statistics import PostureStatistics
     from motionmind.search.problem import Problem
     from motionmind.tween.engine import Engine
 
@@ -124,17 +124,17 @@ def prepare_in_steps() -> Generator[tuple[int, int, bool]]:
 
 
 def compile_beside_search() -> None:
-    """Compile all functions beside a command that learns a corpus, searches, realises and draws; run by `prepare`.
+    """Compile all functions beside a command that learns a corpus, searches, synthesises and draws; run by `prepare`.
 
     Processes that run in step would compile the same functions. So this one begins with work that needs no learned
-    corpus, until the command has learned and saved one, and then realises while the command searches.
+    corpus, until the command has learned and saved one, and then synthesises while the command searches.
     """
-    _compile_in_background([turn, film, realise, seek, draw, learn, search], max(_processors() - 1, 1))
+    _compile_in_background([turn, film, synthesise, seek, draw, learn, search], max(_processors() - 1, 1))
 
 
 def compile_before_searches() -> None:
     """Compile all functions, those of searches first; run by `prepare_in_steps`."""
-    _compile_in_background([turn, search, realise, film, learn, draw, seek], _processors())
+    _compile_in_background([turn, search, synthesise, film, learn, draw, seek], _processors())
 
 
 def _compile_in_background(works: Sequence[Callable[[], None]], processes: int) -> None:
@@ -157,7 +157,7 @@ def _wait_or_compile(place: Path) -> None:
     while not is_all_compiled():
         with _alone(place) as is_alone:
             if is_alone:
-                _compile([turn, search, realise, film, learn, draw, seek], _processors(), hidden=hidden)
+                _compile([turn, search, synthesise, film, learn, draw, seek], _processors(), hidden=hidden)
                 return
         _show_progress(lambda: _is_running(place), hidden=hidden)
 
@@ -306,12 +306,12 @@ def search() -> None:
         pass
 
 
-def realise() -> None:
+def synthesise() -> None:
     """Realise moves of the corpus, without a search."""
     from motionmind.tween.engine import Engine
 
     engine = Engine.load("ballet")
-    _realise(engine, engine.carriage)
+    _synthesise(engine, engine.statistics)
 
 
 def seek() -> None:
@@ -335,7 +335,7 @@ def seek() -> None:
 
 
 def learn() -> None:
-    """Learn a clip anew, realise its moves by few of its moments; sample a path; read it."""
+    """Learn a clip anew, synthesise its moves from few of its samples; sample a path; read it."""
     from motionmind.discretize import make_discretization
     from motionmind.learned.neighbours import build_neighbours
     from motionmind.search.sample import sample_path
@@ -344,9 +344,9 @@ def learn() -> None:
 
     engine = Engine.load("ballet")
     clip = engine.corpus.motion(engine.corpus.clips[0])
-    trees = build_neighbours(engine.corpus.skeleton, engine.carriage.orientations, engine.carriage.weights)
-    of_few = replace(engine.carriage, trees=trees)
-    _realise(engine, of_few)
+    trees = build_neighbours(engine.corpus.skeleton, engine.statistics.orientations, engine.statistics.weights)
+    of_few = replace(engine.statistics, trees=trees)
+    _synthesise(engine, of_few)
     Engine.fit([clip], discretization=make_discretization("codebook", 15.0)).check()
     problem = _problem()
     sample_path(problem, solve(problem), 0)
@@ -364,22 +364,22 @@ def _read(clip: Motion) -> None:
         read_motion(path)
 
 
-def _realise(engine: Engine, carriage: Carriage) -> None:
+def _synthesise(engine: Engine, statistics: PostureStatistics) -> None:
     """Realise a clip's moves by what the corpus knows of how bodies carry themselves."""
     import numpy as np
 
     from motionmind.body.motion import Velocity
-    from motionmind.realise.realise import realise as realise_path
-    from motionmind.realise.wishes import Style, Wishes
+    from motionmind.synthesis.synthesise import synthesise as synthesise_path
+    from motionmind.synthesis.wishes import Style, Wishes
 
     clip = engine.corpus.motion(engine.corpus.clips[0])
     none = np.zeros(len(engine.space), dtype=np.bool_)
     slides = float(engine.plausibility.slides[0])
     speeds = engine.pace.fastest, engine.pace.peaks_in, slides
-    style = Style(engine.corpus, engine.grammar, carriage, np.radians(engine.space.tolerances), *speeds)
+    style = Style(engine.corpus, engine.grammar, statistics, np.radians(engine.space.tolerances), *speeds)
     ends = clip.posture(0), clip.posture(len(clip) - 1)
     path = engine.space.assign(engine.corpus.to_chains(clip.rotations))
-    realise_path(path, style, Wishes(*ends, none, none, 30.0, leaving=Velocity.at_start(clip)))
+    synthesise_path(path, style, Wishes(*ends, none, none, 30.0, leaving=Velocity.at_start(clip)))
 
 
 def film() -> None:

@@ -8,7 +8,7 @@ from typing import Literal
 
 Repair = Literal["put back", "reconstructed", "none"]
 
-FLIP_DEGREES = 45.0  # default: a joint that turns farther in one frame is a fault of the recording
+FLIP_DEG = 45.0  # default: a joint that turns farther in one frame is a fault of the recording
 MIRRORED = " (mirrored)"  # after the name of a clip
 
 

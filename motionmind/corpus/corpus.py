@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from motionmind._typing import Floats, Ints
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.clip import FLIP_DEGREES, MIRRORED, Clip, JointFlip
+from motionmind.corpus.clip import FLIP_DEG, MIRRORED, Clip, JointFlip
 from motionmind.corpus.entries import Columns, StoredClips, key_of
 from motionmind.corpus.moves import Moves
 from motionmind.credits.credit import Credit, Origin, credit_clip
@@ -79,7 +79,7 @@ class Corpus:
     skip: int = 0
     origins: tuple[Origin, ...] = ()
     citation: str = ""
-    flip_degrees: float = FLIP_DEGREES
+    flip_degrees: float = FLIP_DEG
 
     def __post_init__(self) -> None:
         if len(self.rotations) == 0:

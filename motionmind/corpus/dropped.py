@@ -20,7 +20,7 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats
 from motionmind.body.motion import Motion
-from motionmind.body.rates import FILM_RATE
+from motionmind.body.rates import FILM_FPS
 from motionmind.corpus.clip import JointRepair
 from motionmind.errors import enumerated
 from motionmind.geometry import rotations as rot
@@ -63,7 +63,7 @@ def find_gaps(motion: Motion) -> list[Gap]:
     >>> find_gaps(Motion(human23(), at_rest, root, np.arange(60) / 30))
     [Gap(start=30, stop=32, kind='elsewhere')]
     """
-    if motion.keyframed or len(motion) < 4 or motion.fps < FILM_RATE:
+    if motion.keyframed or len(motion) < 4 or motion.fps < FILM_FPS:
         return []
     # No more than 45 degrees of a turn in a frame count: joints that flip are no whole body.
     turned = np.minimum(rot.angle(motion.rotations[:-1], motion.rotations[1:]), np.radians(45.0)).mean(axis=1)

@@ -21,7 +21,7 @@ import numpy as np
 from motionmind._typing import Bools, Floats
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.clip import FLIP_DEGREES, JointFlip, JointRepair, Repair
+from motionmind.corpus.clip import FLIP_DEG, JointFlip, JointRepair, Repair
 from motionmind.geometry import rotations as rot
 
 
@@ -32,7 +32,7 @@ class _Jump(NamedTuple):
     after: int
 
 
-def find_flips(motion: Motion, degrees: float = FLIP_DEGREES) -> tuple[JointFlip, ...]:
+def find_flips(motion: Motion, degrees: float = FLIP_DEG) -> tuple[JointFlip, ...]:
     """Find joints that turn by more than `degrees` between consecutive frames, and faster than 3,000 degrees a second.
 
     The second condition spares keyframes and slow cameras, whose frames are far apart, and quick throws and kicks.
@@ -65,7 +65,7 @@ class Mended(NamedTuple):
     repairs: tuple[JointRepair, ...]
 
 
-def repair_flips(motion: Motion, degrees: float = FLIP_DEGREES) -> Mended:
+def repair_flips(motion: Motion, degrees: float = FLIP_DEG) -> Mended:
     """Repair the flips of a recording, as this module's docstring describes.
 
     Flips remain if a joint jumps back and forth for more than a second.

@@ -23,7 +23,7 @@ from motionmind.arguments import (
     check_type,
 )
 from motionmind.body.motion import Motion
-from motionmind.corpus.clip import FLIP_DEGREES, Clip
+from motionmind.corpus.clip import FLIP_DEG, Clip
 from motionmind.corpus.corpus import MAX_PRICE, Corpus, Facing
 from motionmind.corpus.origins import gather_origins, warn_of_licences
 from motionmind.corpus.recordings import (
@@ -74,7 +74,7 @@ def gather(
     skip: int = 0,
     facing: Facing = "free",
     flips: Flips = "repair",
-    flip_degrees: float = FLIP_DEGREES,
+    flip_degrees: float = FLIP_DEG,
     mirror: bool = False,
     reverse: float | None = None,
     mix: Sequence[tuple[Corpus, float]] = (),

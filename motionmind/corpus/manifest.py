@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from motionmind.corpus.arrays import ArrayEntry
-from motionmind.corpus.clip import FLIP_DEGREES
+from motionmind.corpus.clip import FLIP_DEG
 from motionmind.corpus.corpus import Facing
 from motionmind.credits.credit import Origin
 from motionmind.errors import FormatError
@@ -80,7 +80,7 @@ class BuiltManifest(Provenance, frozen=True, kw_only=True):
     skeleton: BodyEntry
     space: SpaceEntry
     origins: tuple[Origin, ...] = ()
-    flip_degrees: float = FLIP_DEGREES
+    flip_degrees: float = FLIP_DEG
 
 
 def parse_manifest(manifest: dict[str, Any], schema: type[_Schema], path: Path) -> _Schema:

@@ -16,9 +16,9 @@ from motionmind._typing import Floats, Ints
 from motionmind.body.contact import find_floor
 from motionmind.body.mirror import find_sides, mirrored
 from motionmind.body.motion import Motion
-from motionmind.body.rates import FILM_RATE
+from motionmind.body.rates import FILM_FPS
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.clip import FLIP_DEGREES, Clip, JointFlip, JointRepair
+from motionmind.corpus.clip import FLIP_DEG, Clip, JointFlip, JointRepair
 from motionmind.corpus.corpus import Corpus, subdivide_times
 from motionmind.corpus.dropped import Gap, fill_gaps
 from motionmind.corpus.flips import find_flips, repair_flips
@@ -41,7 +41,7 @@ class Taking:
     rate: Rate = "auto"
     skip: int = 0
     flips: Flips = "repair"
-    flip_degrees: float = FLIP_DEGREES
+    flip_degrees: float = FLIP_DEG
     mirror: bool = False
 
 
@@ -151,13 +151,13 @@ def added_frames(recording: Motion) -> int:
 
     Nothing moves in these frames; then several joints jump at once.
     """
-    if recording.keyframed or recording.fps < FILM_RATE:
+    if recording.keyframed or recording.fps < FILM_FPS:
         return 0
     stop = int(2.0 * recording.fps) + 2  # they last two seconds at most
     rotations = recording.rotations[:stop]
     turned = np.degrees(rot.angle(rotations[:-1], rotations[1:]))
     moving = np.flatnonzero(turned.max(axis=1) > 0.05)  # degrees in a frame
-    if not len(moving) or np.count_nonzero(turned[moving[0]] > FLIP_DEGREES) < 3:
+    if not len(moving) or np.count_nonzero(turned[moving[0]] > FLIP_DEG) < 3:
         return 0
     return int(moving[0]) + 1
 
@@ -211,7 +211,7 @@ def frames_between(rate: float | None) -> int:
 
 def posture_rate(motion: Motion) -> float | None:
     """Return the postures a second to take of a motion; None, every frame, for keyframes."""
-    return None if motion.keyframed or motion.fps < FILM_RATE else POSTURE_RATE_FPS
+    return None if motion.keyframed or motion.fps < FILM_FPS else POSTURE_RATE_FPS
 
 
 # --- helpers ----------------------------------------------------------------------------------------------------------

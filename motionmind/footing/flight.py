@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.body.contact import LOW, Posed
-from motionmind.body.plausibility import FALLING, GRAVITY
+from motionmind.body.contact import STANCE_HEIGHT_M, Posed
+from motionmind.body.plausibility import FALLING_RATIO, GRAVITY_MPS2
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import mass_of, size_of
 from motionmind.body.tempo import runs_of
@@ -157,13 +157,13 @@ def find_falls(skeleton: Skeleton, posed: Posed, given: Bools, fps: float) -> tu
         fps: frames a second.
     """
     low = posed.lowest
-    off_floor = low > low.min() + LOW * size_of(skeleton)
+    off_floor = low > low.min() + STANCE_HEIGHT_M * size_of(skeleton)
     up = ~given & off_floor
     mass = mass_of(skeleton, posed) if up.any() else None
     if mass is None:
         return posed.places[:, 0], []
     fall = np.zeros(len(low))
-    fall[1:-1] = -(fps**2) * np.diff(mass[:, 1], 2) / GRAVITY
+    fall[1:-1] = -(fps**2) * np.diff(mass[:, 1], 2) / GRAVITY_MPS2
     # A fall may be slower for 0.1 s, as when the legs draw up.
     return mass, _falls(fall, up, (bool(off_floor[0]), bool(off_floor[-1])), round(0.1 * fps))
 
@@ -179,16 +179,16 @@ def _falls(fall: Floats, up: Bools, in_air: tuple[bool, bool], pauses: int) -> l
         in_air: whether it is off the floor in the first and in the last frame, which may not change.
         pauses: largest number of frames in a pause.
     """
-    fast = up & (fall > FALLING)
+    fast = up & (fall > FALLING_RATIO)
     whole = fast.copy()
     for start, stop in runs_of(~fast):
         inner = slice(max(start, 1), min(stop, len(fast) - 1))
         between = (start > 0 or in_air[0]) and (stop < len(fast) or in_air[1])
         if between and inner.stop - inner.start <= pauses:
-            whole[inner] = np.all(up[inner] & (fall[inner] > -FALLING))
+            whole[inner] = np.all(up[inner] & (fall[inner] > -FALLING_RATIO))
     out = []
     for start, stop in runs_of(whole):
         # A trembling body falls no faster than that on average: then pauses separate its falls.
-        parts = [(0, stop - start)] if fall[start:stop].mean() > FALLING else runs_of(fast[start:stop])
+        parts = [(0, stop - start)] if fall[start:stop].mean() > FALLING_RATIO else runs_of(fast[start:stop])
         out += [(start + first, start + last) for first, last in parts if last - first > 1]
     return out

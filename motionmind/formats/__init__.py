@@ -24,7 +24,7 @@ from numbers import Real
 from pathlib import Path
 
 from motionmind.arguments import check_integer, check_path, check_real, check_type
-from motionmind.body.human import SHORTEST, TALLEST
+from motionmind.body.human import SHORTEST_PERSON_M, TALLEST_PERSON_M
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
@@ -125,7 +125,7 @@ def _question_height(path: FilePath, skeleton: Skeleton) -> None:
 
     mapping = joint_mapping(skeleton)
     height = person_height(skeleton, mapping) if mapping else 0.0
-    if height > 0.0 and not SHORTEST <= height <= TALLEST:
+    if height > 0.0 and not SHORTEST_PERSON_M <= height <= TALLEST_PERSON_M:
         remedy = "its ASF file states it" if Path(path).suffix.lower() == ".amc" else "--unit gives another"
         message = f"{path}: a person {height:.3g} m tall; the unit seems wrong ({remedy})"
         warnings.warn(message, MotionMindWarning, stacklevel=3)

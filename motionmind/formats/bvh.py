@@ -16,7 +16,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
-from motionmind.body.rates import FASTEST, check_size
+from motionmind.body.rates import MAX_FPS, check_size
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, quoted
 from motionmind.files import FilePath, name_of, write_atomically
@@ -62,8 +62,8 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None, fps: float | No
     Warns:
         MotionMindWarning: something was repaired, as described above; or the frame time or all angles are implausible.
     """
-    if fps is not None and not 0.0 < fps <= FASTEST:
-        raise MotionMindError(f"fps must be a positive number of frames a second, {FASTEST:g} at most, not {fps}")
+    if fps is not None and not 0.0 < fps <= MAX_FPS:
+        raise MotionMindError(f"fps must be a positive number of frames a second, {MAX_FPS:g} at most, not {fps}")
     body, stated = _read_body(path)
     frame_time = stated if fps is None else 1.0 / fps
     if unit is None:

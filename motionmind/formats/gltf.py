@@ -20,7 +20,7 @@ import numpy as np
 from motionmind._typing import Floats
 from motionmind.body.human import BODIES
 from motionmind.body.motion import Motion
-from motionmind.body.rates import FILM_RATE, check_size
+from motionmind.body.rates import FILM_FPS, check_size
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindWarning, enumerated
 from motionmind.files import FilePath, name_of
@@ -297,7 +297,7 @@ def _clock(tracks: Tracks, joints: int, name: str) -> Floats:
         rate = round(rate, 2)  # times have seven digits
     if all(track.kind == "LINEAR" or len(track.times) == 1 for track in tracks.values()):
         return np.asarray(times[0] + np.arange(frames[-1] + 1) / rate if even else times)
-    if rate < FILM_RATE:
+    if rate < FILM_FPS:
         rate *= float(np.ceil(_CURVE_FPS / rate))
     count = np.floor(span * rate + 1e-3)
     check_size(count + 1.0, joints, name)

@@ -9,7 +9,7 @@ import numpy as np
 from motionmind.arguments import check_path, check_type
 from motionmind.body.human import BODIES
 from motionmind.body.motion import Motion
-from motionmind.body.rates import FILM_RATE
+from motionmind.body.rates import FILM_FPS
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import enumerated
 from motionmind.files import FilePath
@@ -68,7 +68,7 @@ def lossy_fields(motion: Motion, path: FilePath, source: FilePath | None = None)
 def _lossy_marks(motion: Motion) -> list[str]:
     """Name the marks of frames that are lost."""
     lossy = []
-    if motion.keyframed and motion.fps >= FILM_RATE:
+    if motion.keyframed and motion.fps >= FILM_FPS:
         lossy.append("that its frames are postures of a score, not of a recording")
     inserted = int(motion.inserted().sum())
     if inserted:

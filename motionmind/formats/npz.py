@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
-from motionmind.body.rates import FASTEST, MOST_PLACES
+from motionmind.body.rates import MAX_FPS, MAX_POSITIONS
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.files import FilePath, name_of, read_bytes, write_atomically
@@ -113,8 +113,8 @@ def write_npz(path: FilePath, motion: Motion) -> None:
             so), or the file cannot be written.
     """
     step = even_step(motion, "AMASS")
-    if 1.0 / step > FASTEST:
-        raise MotionMindError(f"{path}: {1.0 / step:g} frames a second are more than {FASTEST:g}")
+    if 1.0 / step > MAX_FPS:
+        raise MotionMindError(f"{path}: {1.0 / step:g} frames a second are more than {MAX_FPS:g}")
     body, rotations, root = to_smpl(motion)
     rotations[:, 0] = rot.inv_mul(Z_UP_TO_Y_UP, rotations[:, 0])
     arrays: dict[str, Any] = {
@@ -178,7 +178,7 @@ def check_array(stream: IO[bytes], size: int, what: str, path: FilePath) -> None
 
 def _max_array_bytes(size: int) -> int:
     """Return the bytes allowed for an array: twice the file's `size`, or the largest made motion's, up to a limit."""
-    return min(max(24 * MOST_PLACES, 2 * size), _MAX_ARRAY_BYTES)
+    return min(max(24 * MAX_POSITIONS, 2 * size), _MAX_ARRAY_BYTES)
 
 
 def checked_numbers(array: NDArray[np.generic], what: str, path: FilePath) -> Floats:
@@ -215,7 +215,7 @@ def _rate(arrays: dict[str, Floats], fps: float | None, path: FilePath) -> float
     if name is None:
         raise FormatError(f"no array {_RATE_NAMES[0]!r}: give the frames per second (--source-fps, or fps=)", path=path)
     rate = arrays.get(name, np.array(fps, dtype=np.float64))
-    if rate.size != 1 or not 1.0 / MAX_NUMBER <= rate.item() <= FASTEST:
+    if rate.size != 1 or not 1.0 / MAX_NUMBER <= rate.item() <= MAX_FPS:
         raise FormatError(f"{name!r} must be one number of frames per second, not {in_one_line(rate)}", path=path)
     return float(rate.item())
 

@@ -30,7 +30,7 @@ import numpy as np
 from motionmind._typing import Floats, Indices
 from motionmind.body.human import BODIES
 from motionmind.body.motion import Motion
-from motionmind.body.rates import FASTEST
+from motionmind.body.rates import MAX_FPS
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath, name_of, write_atomically
@@ -133,8 +133,8 @@ def _stated_rate(lines: list[str], path: FilePath) -> float:
             break
         if match := _RATE.fullmatch(line):
             (rate,) = to_numbers([match[1]], path, number)
-            if not 0.0 < rate <= FASTEST:
-                message = f"{match[1]} postures a second: must be more than 0, and at most {FASTEST:g}"
+            if not 0.0 < rate <= MAX_FPS:
+                message = f"{match[1]} postures a second: must be more than 0, and at most {MAX_FPS:g}"
                 raise FormatError(message, path=path, line=number)
             return rate
     return 1.0

@@ -22,7 +22,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
-from motionmind.body.rates import FASTEST
+from motionmind.body.rates import MAX_FPS
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.files import FilePath, name_of, read_bytes
@@ -139,8 +139,8 @@ def _from_rows(rows: Floats) -> Floats:
 
 def _motion(path: FilePath, body: Skeleton, turns: Floats, trans: Floats, rate: float, *, pelvis_m: float) -> Motion:
     """Build the motion from rotations [T, J, 4], places of the model's origin [T, 3] and the pelvis's height there."""
-    if not 0.0 < rate <= FASTEST:
-        raise MotionMindError(f"fps must be a positive number of frames a second, {FASTEST:g} at most, not {rate}")
+    if not 0.0 < rate <= MAX_FPS:
+        raise MotionMindError(f"fps must be a positive number of frames a second, {MAX_FPS:g} at most, not {rate}")
     _log.info("%s: the file has no lengths of bones; joints have human44's places", path)
     times = np.arange(len(turns), dtype=np.float64) / rate
     return Motion(body, rot.normalise(turns), trans + np.array([0.0, pelvis_m, 0.0]), times, name=name_of(path))

@@ -11,7 +11,7 @@ from motionmind._typing import Ints, States
 from motionmind.corpus.corpus import FACING
 from motionmind.grammar.grammar import learn
 from motionmind.learned.model import LearnedCorpus
-from motionmind.realise.timeline import usual
+from motionmind.synthesis.timeline import usual
 
 
 class Transition(NamedTuple):

@@ -18,10 +18,10 @@ from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.grammar import learn as learn_grammar
-from motionmind.learned.carriage import Carriage, learn_carriage
 from motionmind.learned.gauge import Gauge
 from motionmind.learned.pace import Pace, measure_pace, refit_pace
 from motionmind.learned.plausibility import Plausibility, learn_plausibility
+from motionmind.learned.posture_statistics import PostureStatistics, learn_posture_statistics
 from motionmind.walks.evidence import learn_trust
 
 MAX_STATES_LEARNED = 50_000  # per joint: a search among them takes about 6 GB
@@ -37,7 +37,7 @@ class Learned:
         space: the states of each chain.
         states: states of the corpus's postures [N, L].
         grammar: joint graphs, bridges and coordination.
-        carriage: posture statistics: orientations, travel and support.
+        statistics: posture statistics: orientations, travel and support.
         pace: speeds, and durations by displacement.
         plausibility: limits of plausible movement.
         gauge: measurements of pace per clip.
@@ -47,7 +47,7 @@ class Learned:
     space: StateSpace
     states: States
     grammar: Grammar
-    carriage: Carriage
+    statistics: PostureStatistics
     pace: Pace
     plausibility: Plausibility
     gauge: Gauge
@@ -178,17 +178,19 @@ def _learn_all(
         posture_weights=corpus.weights,
         team=workshop.team,
     )
-    carriage_before, gauge_before = (before.carriage, before.gauge) if before else (None, None)
+    statistics_before, gauge_before = (before.statistics, before.gauge) if before else (None, None)
 
     def pace_of() -> tuple[Gauge, Pace]:
         gauge = measure_pace(kept, gauge_before, workshop)
         return gauge, refit_pace(corpus, gauge)
 
     # These overlap well: one makes many short NumPy calls, the other long compiled loops without the interpreter lock.
-    (gauge, pace), carriage = workshop.both(pace_of, partial(learn_carriage, corpus, workshop, kept, carriage_before))
-    carriage = replace(carriage, trust=learn_trust(corpus, carriage, workshop))
+    (gauge, pace), statistics = workshop.both(
+        pace_of, partial(learn_posture_statistics, corpus, workshop, kept, statistics_before)
+    )
+    statistics = replace(statistics, trust=learn_trust(corpus, statistics, workshop))
     plausibility = learn_plausibility(corpus, pace.fastest)
-    return Learned(corpus, space, states, grammar, carriage, pace, plausibility, gauge)
+    return Learned(corpus, space, states, grammar, statistics, pace, plausibility, gauge)
 
 
 def _keep_visited(space: StateSpace, states: States) -> tuple[StateSpace, States]:

@@ -117,7 +117,7 @@ class LearnedCorpus(Learned):
             learned.space,
             learned.states,
             learned.grammar,
-            learned.carriage,
+            learned.statistics,
             learned.pace,
             learned.plausibility,
             learned.gauge,

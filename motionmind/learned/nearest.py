@@ -56,8 +56,8 @@ def postures_near(
         leaves: number of leaves to visit.
     """
     tree = _tree_of(trees, 0)
-    moments, off = _leaves(read_only(orientations), tree, np.ascontiguousarray(posture[tree.part]), leaves)
-    return _nearest(moments[moments < below], off[moments < below], count)
+    samples, off = _leaves(read_only(orientations), tree, np.ascontiguousarray(posture[tree.part]), leaves)
+    return _nearest(samples[samples < below], off[samples < below], count)
 
 
 class _Tree(NamedTuple):
@@ -88,9 +88,9 @@ def _tree_of(trees: Neighbours, number: int) -> _Tree:
     )
 
 
-def _nearest(moments: Int32s, off: Singles, count: int) -> Ints:
+def _nearest(samples: Int32s, off: Singles, count: int) -> Ints:
     """Return the `count` samples of least distance `off`, or all if fewer, nearest first [n]."""
-    return moments[np.argsort(off, kind="stable")[:count]].astype(np.int64)
+    return samples[np.argsort(off, kind="stable")[:count]].astype(np.int64)
 
 
 @jit
@@ -193,15 +193,15 @@ def _measure(codes: Int8s, posture: Singles, out: Singles) -> None:
 
 
 @jit
-def _measure_apart(orientations: Floats, part: Ints, posture: Floats, moments: Int32s, out: Singles) -> None:
+def _measure_apart(orientations: Floats, part: Ints, posture: Floats, samples: Int32s, out: Singles) -> None:
     """Write squared distances between samples [n], of all [N, L, 4], and a posture of the part [m, 4]: sums [n]."""
-    for k in range(len(moments)):  # prefetch: request the memory of all before waiting for the first
+    for k in range(len(samples)):  # prefetch: request the memory of all before waiting for the first
         touched = 0.0
         for j in range(0, len(part), 2):
-            touched += orientations[moments[k], part[j], 0]
+            touched += orientations[samples[k], part[j], 0]
         out[k] = touched
-    for k in range(len(moments)):
+    for k in range(len(samples)):
         total = 0.0
         for j in range(len(part)):
-            total += squared_turn(orientations[moments[k], part[j]], posture[j])
+            total += squared_turn(orientations[samples[k], part[j]], posture[j])
         out[k] = total

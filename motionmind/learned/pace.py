@@ -7,7 +7,7 @@ seconds at the corpus's usual speeds. As a body turns while it travels, the disp
     s = mean joint angle + hypot(travel, half the body's turn).
 
 The same displacement takes less time amid quick movement than from rest to rest. Between movements a body slows down,
-but seldom stands still. The resting speed r (*lull*) of a frame is the mean joint speed in the resting frames before
+but seldom stands still. The resting speed r of a frame is the mean joint speed in the resting frames before
 and after it, divided by the usual speed. The logarithm of a movement's duration is normal about
 
     level + slope log(DURATION_OFFSET_S + s) + pull log(RESTING_OFFSET_RATIO + r),
@@ -130,7 +130,7 @@ class Pace:
         slowest: 1st percentile of the mean joint speed over a second, rad/s [1].
         peaks: 99th percentiles, over windows of each of PEAK_WINDOWS_S, of the greatest speeds of the same parts and of
             the root's rise or fall, heights/s, and of the root's acceleration, heights/s^2 [6, J + 4].
-        lulls: resting speeds of the corpus's N postures, in usual mean joint speeds [N].
+        resting_speeds: resting speeds of the corpus's N postures, in usual mean joint speeds [N].
         law: level, slope, pull and spread of the logarithm of durations [4].
     """
 
@@ -139,7 +139,7 @@ class Pace:
     greatest: Floats
     slowest: Floats
     peaks: Floats
-    lulls: Floats
+    resting_speeds: Floats
     law: Floats
 
     @property
@@ -147,10 +147,10 @@ class Pace:
         """Standard deviation of the logarithm of a movement's duration, given its displacement."""
         return float(self.law[3])
 
-    def expected(self, way: Way, lulls: tuple[Floats, Floats]) -> Floats:
+    def expected(self, way: Way, resting_speeds: tuple[Floats, Floats]) -> Floats:
         """Return the median duration, seconds, of movements with given displacements and resting speeds [...]."""
         level, slope, pull, _ = self.law
-        return np.asarray(np.exp(level + slope * _effort(way, self.usual) + pull * _quickness(*lulls)))
+        return np.asarray(np.exp(level + slope * _effort(way, self.usual) + pull * _quickness(*resting_speeds)))
 
     def peaks_in(self, seconds: float, pace: float = 1.0) -> Floats:
         """Return the peaks in windows of a duration [J + 4], for movement at a multiple of the corpus's pace."""
@@ -158,7 +158,7 @@ class Pace:
         peaks[-1] *= pace  # accelerations scale with its square
         return peaks
 
-    def lulls_of(self, postures: Floats, shown: Floats) -> Floats:
+    def resting_speeds_of(self, postures: Floats, shown: Floats) -> Floats:
         """Return the resting speeds of postures [n]: means over the corpus's most similar postures.
 
         Args:
@@ -168,11 +168,11 @@ class Pace:
         # Similarity is the sum of squared cosines of half the angles. Ties, up to rounding, go by index on any machine.
         alike = (np.sum(np.einsum("njc,jc->nj", shown, one) ** 2, axis=1) for one in postures)
         order = (np.argsort(-np.round(one, 9), kind="stable") for one in alike)
-        return np.array([self.lull_of(near[:N_NEIGHBORS]) for near in order])
+        return np.array([self.resting_speed_of(near[:N_NEIGHBORS]) for near in order])
 
-    def lull_of(self, numbers: Ints) -> float:
+    def resting_speed_of(self, numbers: Ints) -> float:
         """Return the mean resting speed of some of the corpus's postures, given by index [n]."""
-        return float(np.exp(np.log(RESTING_OFFSET_RATIO + self.lulls[numbers]).mean()) - RESTING_OFFSET_RATIO)
+        return float(np.exp(np.log(RESTING_OFFSET_RATIO + self.resting_speeds[numbers]).mean()) - RESTING_OFFSET_RATIO)
 
 
 def measure_pace(kept: Kept, before: Gauge | None = None, workshop: Workshop | None = None) -> Gauge:
@@ -209,7 +209,7 @@ def _show(corpus: Corpus, clip: Clip) -> tuple[Singles, Floats, Floats]:
         np.column_stack([steps_of(block), moved_in(block)]) for block in recording.blocks(BLOCK_FRAMES, overlap=1)
     ]
     steps = np.concatenate(blocks)
-    still, speeds = _lulls(steps[:, : len(corpus.skeleton)].mean(axis=1))
+    still, speeds = _resting_frames(steps[:, : len(corpus.skeleton)].mean(axis=1))
     stills = np.column_stack([recording.times[still], speeds])
     return steps.astype(np.float32), stills, _windows(recording, still, speeds)
 
@@ -251,13 +251,13 @@ def refit_pace(corpus: Corpus, gauge: Gauge) -> Pace:
         fastest = np.maximum(of_joints, [*[least] * joints, *MIN_PEAK_SPEEDS[1:]])
         greatest = np.maximum(most, np.append(fastest, [MIN_PEAK_SPEEDS[2], MIN_PEAK_ROOT_ACCELERATION]))
         slowest = seconds.value()
-    lulls = np.ones(len(corpus))
+    resting_speeds = np.ones(len(corpus))
     for number, clip in shown:
         here = slice(clip.start, clip.stop)
         times, speed = gauge.stills[gauge.starts[number, 1] : gauge.starts[number + 1, 1]].T
-        lulls[here] = np.interp(corpus.times[here], times, speed / usual[0])
+        resting_speeds[here] = np.interp(corpus.times[here], times, speed / usual[0])
     peak = peaks.values(greatest, np.append(fastest, [MIN_PEAK_SPEEDS[2], MIN_PEAK_ROOT_ACCELERATION]))
-    return Pace(usual, fastest, greatest[:-2], slowest, peak, lulls, _fit_windows(gauge.windows, usual))
+    return Pace(usual, fastest, greatest[:-2], slowest, peak, resting_speeds, _fit_windows(gauge.windows, usual))
 
 
 def _usual_parts(speeds: Floats, joints: int) -> Floats:
@@ -339,7 +339,7 @@ def _fit_windows(windows: Floats, usual: Floats) -> Floats:
     return _fit(efforts, _quickness(first / usual[0], last / usual[0]), np.log(seconds))
 
 
-def _lulls(steps: Floats) -> tuple[Ints, Floats]:
+def _resting_frames(steps: Floats) -> tuple[Ints, Floats]:
     """Return a clip's resting frames, in order [S], and the mean joint speed in them [S], rad/s.
 
     A clip without resting frames has its first frame, with its mean speed.

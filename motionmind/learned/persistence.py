@@ -21,7 +21,7 @@ from motionmind._typing import States
 from motionmind.body.limbs import parts_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import cache, store
-from motionmind.corpus.clip import FLIP_DEGREES, Clip, JointFlip
+from motionmind.corpus.clip import FLIP_DEG, Clip, JointFlip
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.entries import Columns, Entries, Packed, StoredClips
 from motionmind.corpus.fingerprint import fingerprint
@@ -38,18 +38,18 @@ from motionmind.grammar.bridges import Bridges
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.transitions import Transitions
-from motionmind.learned.carriage import Carriage
 from motionmind.learned.gauge import Gauge
 from motionmind.learned.learning import Learned, learn, learn_from_states
 from motionmind.learned.neighbours import Neighbours
 from motionmind.learned.pace import Pace
 from motionmind.learned.plausibility import Plausibility
+from motionmind.learned.posture_statistics import PostureStatistics
 from motionmind.learned.trust import Trust
 from motionmind.learned.validity import MOVEMENT, check_forms, check_values
 from motionmind.notation.sources import sources
 from motionmind.retarget.retarget import own_skeleton
 
-_Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage, Pace, Plausibility, Gauge, Trust)
+_Part = TypeVar("_Part", Transitions, Bridges, Coordination, PostureStatistics, Pace, Plausibility, Gauge, Trust)
 
 _CORPUS_KEYS = ("name", "title", "author", "source", "licence", "facing", "rate", "skip", "citation")
 
@@ -102,19 +102,19 @@ def _movement(learned: Learned) -> dict[str, NDArray[Any]]:
 
 def learned_arrays(learned: Learned) -> dict[str, NDArray[Any]]:
     """Return the arrays that were learned, by name."""
-    grammar, carriage = learned.grammar, learned.carriage
+    grammar, statistics = learned.grammar, learned.statistics
     parts = {
         "transitions": grammar.transitions,
         "bridges": grammar.bridges,
         "coordination": grammar.coordination,
-        "carriage": carriage,
+        "statistics": statistics,
         "pace": learned.pace,
         "plausibility": learned.plausibility,
         "gauge": learned.gauge,
-        "trust": carriage.trust,
+        "trust": statistics.trust,
     }
     arrays = {f"{name}.{key}": getattr(part, key) for name, part in parts.items() for key in _array_names(type(part))}
-    trees = carriage.trees.arrays if carriage.trees is not None else {}
+    trees = statistics.trees.arrays if statistics.trees is not None else {}
     return arrays | {f"neighbours.{key}": array for key, array in trees.items()}
 
 
@@ -137,7 +137,7 @@ def _manifest(learned: Learned) -> dict[str, Any]:
             "labels": space.labels,
         },
     }
-    if corpus.flip_degrees != FLIP_DEGREES:
+    if corpus.flip_degrees != FLIP_DEG:
         manifest["flip_degrees"] = corpus.flip_degrees
     if corpus.origins:
         manifest["origins"] = [asdict(origin) for origin in corpus.origins]
@@ -194,8 +194,8 @@ def _open(folder: Path, stored: store.Stored) -> Learned:
         _part(Coordination, "coordination", arrays),
     )
     trees = {name.partition(".")[2]: array for name, array in arrays.items() if name.startswith("neighbours.")}
-    carriage = replace(
-        _part(Carriage, "carriage", arrays),
+    statistics = replace(
+        _part(PostureStatistics, "statistics", arrays),
         trees=Neighbours(parts_of(corpus.skeleton), **trees) if trees else None,
         trust=_part(Trust, "trust", arrays),
     )
@@ -204,7 +204,7 @@ def _open(folder: Path, stored: store.Stored) -> Learned:
         space,
         states,
         grammar,
-        carriage,
+        statistics,
         _part(Pace, "pace", arrays),
         _part(Plausibility, "plausibility", arrays),
         _part(Gauge, "gauge", arrays),

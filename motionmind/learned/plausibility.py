@@ -24,7 +24,15 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.body.contact import FAR, RATE, TALL, find_feet, floor_height, foot_slides, lowest_height
+from motionmind.body.contact import (
+    CONTACT_FPS,
+    STANCE_STEP_M,
+    TALL_BODY_M,
+    find_feet,
+    floor_height,
+    foot_slides,
+    lowest_height,
+)
 from motionmind.body.motion import Motion
 from motionmind.body.plausibility import SEEN, at_rate, floor_of, greatest, implausibility
 from motionmind.corpus.corpus import FACING, Corpus
@@ -157,9 +165,9 @@ class _Shown(NamedTuple):
 
 def _show(sampled: Motion, fastest: Floats, floor: float) -> _Shown:
     """Measure movement at 30 frames per second, above a floor at a height in metres."""
-    frames = implausibility(sampled.skeleton, sampled.rotations, sampled.root, RATE, floor)
+    frames = implausibility(sampled.skeleton, sampled.rotations, sampled.root, CONTACT_FPS, floor)
     pace = np.full((len(sampled), 1), np.nan)
-    speeds = RATE * way_of(sampled).parts / fastest
+    speeds = CONTACT_FPS * way_of(sampled).parts / fastest
     pace[1:, 0] = speeds.max(axis=1)
     sliding, slides = _sliding(sampled, floor)
     return _Shown(np.concatenate([frames, pace, sliding[:, None]], axis=1), speeds, slides)
@@ -171,12 +179,12 @@ def _sliding(motion: Motion, floor: float) -> tuple[Floats, Floats]:
     Time before the movement counts as not sliding.
     """
     body = motion.skeleton
-    if body.height < TALL or not find_feet(body):
+    if body.height < TALL_BODY_M or not find_feet(body):
         return np.full(len(motion), np.nan), np.full(len(motion), np.nan)
     slides = foot_slides(body, motion.rotations, motion.root, floor)
-    so_far = np.concatenate([np.zeros(round(RATE) + 1), np.cumsum((slides > FAR).any(axis=-1))])
-    share = (so_far[round(RATE) :] - so_far[: len(motion)]) / RATE
-    return np.asarray(share), np.append(0.0, RATE * slides.max(axis=-1) / body.height)
+    so_far = np.concatenate([np.zeros(round(CONTACT_FPS) + 1), np.cumsum((slides > STANCE_STEP_M).any(axis=-1))])
+    share = (so_far[round(CONTACT_FPS) :] - so_far[: len(motion)]) / CONTACT_FPS
+    return np.asarray(share), np.append(0.0, CONTACT_FPS * slides.max(axis=-1) / body.height)
 
 
 def _frames_of(corpus: Corpus, fastest: Floats) -> Iterator[Floats]:
@@ -187,10 +195,10 @@ def _frames_of(corpus: Corpus, fastest: Floats) -> Iterator[Floats]:
     If a corpus has more than _N_FRAMES_MEASURED frames, evenly spread pieces with about that many are measured.
     """
     seconds = sum(corpus.times[clip.stop - 1] - corpus.times[clip.start] for clip in corpus.clips)
-    every = int(np.ceil(RATE * seconds / _N_FRAMES_MEASURED))
+    every = int(np.ceil(CONTACT_FPS * seconds / _N_FRAMES_MEASURED))
     pieces = 0
     for clip in corpus.clips:
-        recording = Sampled(corpus, clip, RATE, smooth=True)
+        recording = Sampled(corpus, clip, CONTACT_FPS, smooth=True)
         size = max(len(recording), BLOCK_FRAMES) if every <= 1 else _PIECE_FRAMES
         many = -(-len(recording) // size)
         chosen = range(-pieces % every, many, every) if every > 1 else range(many)
@@ -218,5 +226,5 @@ def _pieces_of(recording: Sampled, size: int, chosen: range) -> tuple[list[Motio
 def _greatest_of_stretches(values: Floats) -> Floats:
     """Return the maximum of each column [T, M] in each stretch [stretches, M]; minus infinity if all are NaN."""
     known = np.where(np.isnan(values), -np.inf, values)
-    windows = np.lib.stride_tricks.sliding_window_view(known, min(round(STRETCH_S * RATE), len(known)), axis=0)
+    windows = np.lib.stride_tricks.sliding_window_view(known, min(round(STRETCH_S * CONTACT_FPS), len(known)), axis=0)
     return np.asarray(windows.max(axis=-1))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from motionmind._typing import Floats, States
 from motionmind.arguments import check_type
-from motionmind.body.contact import RATE, find_feet, find_floor, foot_slide, skating
+from motionmind.body.contact import CONTACT_FPS, find_feet, find_floor, foot_slide, skating
 from motionmind.body.motion import Motion
 from motionmind.body.plausibility import at_rate
 from motionmind.body.skeleton import Skeleton
@@ -23,8 +23,8 @@ from motionmind.metrics.paths import Habits, arrival_spread, learn_habits
 from motionmind.metrics.smoothness import angular_jerk, angular_speed, sparc
 from motionmind.metrics.style import WINDOW_FRAMES, Styles, features, learn_styles
 from motionmind.metrics.verbatim import MAX_NGRAM, Phrasebook, learn_phrases
-from motionmind.realise.timeline import usual
 from motionmind.retarget.retarget import own_skeleton
+from motionmind.synthesis.timeline import usual
 
 _MIN_FRAMES = 4  # a jerk needs as many
 
@@ -161,8 +161,8 @@ def measure(motion: Motion, learned: LearnedCorpus, path: States | None = None) 
         raise MotionMindError(f"a path through {corpus.name} has {len(corpus.chains)} chains, not {path.shape[1:]}")
     if len(sampled) < _MIN_FRAMES or len(path) < 2:
         raise MotionMindError(
-            f"{motion.name or 'the movement'} is too short to measure: that takes {_MIN_FRAMES} frames at {RATE:g} a "
-            f"second, and two postures {step:.2f} s apart"
+            f"{motion.name or 'the movement'} is too short to measure, which takes {_MIN_FRAMES} frames at "
+            f"{CONTACT_FPS:g} a second, and two postures {step:.2f} s apart"
         )
     habits, phrases = learn_habits(learned.grammar), learn_phrases(corpus, np.asarray(learned.states))
     clips = [at_rate(corpus.recording(clip)) for clip in corpus.clips]
@@ -213,11 +213,11 @@ def _assign_states(motion: Motion, learned: LearnedCorpus, step: float) -> State
 def _measure_motion(motion: Motion, style: Styles | None, fastest: Floats) -> dict[str, float]:
     """Measure movement at 30 frames a second, its distance from a style, and its pace beside `fastest` [J + 2]."""
     body, rotations, root = motion.skeleton, motion.rotations, motion.root
-    speed = angular_speed(rotations, RATE)
+    speed = angular_speed(rotations, CONTACT_FPS)
     out = {
         "speed": float(speed.mean()),
-        "jerk": float(angular_jerk(rotations, RATE).mean()),
-        "sparc": sparc(speed.mean(axis=1), RATE),
+        "jerk": float(angular_jerk(rotations, CONTACT_FPS).mean()),
+        "sparc": sparc(speed.mean(axis=1), CONTACT_FPS),
     }
     if style is not None and len(motion) >= WINDOW_FRAMES:
         out["style"] = float(style.distances(rotations)[0])

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.body.contact import RATE
+from motionmind.body.contact import CONTACT_FPS
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 
@@ -35,7 +35,7 @@ def features(rotations: Floats) -> Floats:
         rotations: local rotations [T, J, 4] at 30 frames a second.
     """
     step = 2  # frames
-    seconds = step / RATE
+    seconds = step / CONTACT_FPS
     velocity = rot.log(rot.inv_mul(rotations[:-step], rotations[step:])) / seconds
     change = (velocity[step:] - velocity[:-step]) / seconds
     starts = range(0, len(rotations) - WINDOW_FRAMES + 1, WINDOW_FRAMES // 2)
@@ -155,7 +155,7 @@ def fit_style_classifier(corpora: Mapping[str, Sequences], frames: int) -> Style
             than a window.
     """
     if frames < WINDOW_FRAMES:
-        raise MotionMindError(f"style needs {WINDOW_FRAMES} frames or more, at {RATE:g} a second, not {frames}")
+        raise MotionMindError(f"style needs {WINDOW_FRAMES} frames or more, at {CONTACT_FPS:g} a second, not {frames}")
     rows = {
         corpus: {name: np.concatenate([features(piece) for piece in pieces]) for name, pieces in sequences.items()}
         for corpus, sequences in corpora.items()
@@ -176,7 +176,7 @@ def fit_style_classifier(corpora: Mapping[str, Sequences], frames: int) -> Style
             for styles in [without[corpus, name]]
         ]
         if not own:
-            raise MotionMindError(f"style: {corpus} has no clip of {frames} frames at {RATE:g} a second")
+            raise MotionMindError(f"style: {corpus} has no clip of {frames} frames at {CONTACT_FPS:g} a second")
         limits[corpus] = float(np.quantile(own, 0.95))
     return StyleClassifier(corpora, frames, without, limits)
 

@@ -14,7 +14,7 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from motionmind.body.motion import Motion
-from motionmind.body.rates import FILM_RATE
+from motionmind.body.rates import FILM_FPS
 from motionmind.corpus import store
 from motionmind.corpus.recordings import POSTURE_RATE_FPS
 from motionmind.errors import MotionMindError
@@ -259,7 +259,7 @@ def locked_in(state: State) -> set[str]:
 
 def clock_of(motion: Motion, rate: float) -> Clock:
     """Return the clock of a movement: a recording has units at `rate`, any other movement has a unit for each frame."""
-    recorded = len(motion) > 1 and not motion.keyframed and motion.fps >= FILM_RATE
+    recorded = len(motion) > 1 and not motion.keyframed and motion.fps >= FILM_FPS
     return Clock(motion.times, rate if recorded else None)
 
 

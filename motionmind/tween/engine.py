@@ -20,12 +20,12 @@ from motionmind.errors import InfeasibleError, MotionMindWarning, NoPathError
 from motionmind.geometry.splines import rotation_spline
 from motionmind.learned import graphs, summary
 from motionmind.learned.model import LearnedCorpus
-from motionmind.realise.realise import Realised, realise
-from motionmind.realise.wishes import Style, Wishes
 from motionmind.search.diverse import TooSimilarError, difference, solve_diverse
 from motionmind.search.problem import places
 from motionmind.search.sample import sample_path
 from motionmind.search.solve import Certificate, Watch, solve
+from motionmind.synthesis.synthesise import Synthesised, synthesise
+from motionmind.synthesis.wishes import Style, Wishes
 from motionmind.tween.certificate import (
     break_down_cost,
     credit_tween,
@@ -123,16 +123,16 @@ class Engine(LearnedCorpus):
             what_if = find_what_if(Answer(request, formulation.searched, certificate), answer)
         if search.sample and len(certificate.path) > 1:
             certificate = sample_path(formulation.searched, certificate, search.seed)
-        realising = perf_counter()
-        realised = self._realise(formulation, certificate)
+        synthesising = perf_counter()
+        synthesised = self._synthesise(formulation, certificate)
         seconds = {
             "load": self.load_seconds,
             "problem": formulated - began + certificate.seconds["problem"],
             "bound": certificate.seconds["bound"],
             "search": certificate.seconds["search"],
-            "realise": perf_counter() - realising,
+            "realise": perf_counter() - synthesising,
         }
-        return self._account_for(formulation, certificate, realised, seconds, what_if)
+        return self._account_for(formulation, certificate, synthesised, seconds, what_if)
 
     def posture(self, name: str) -> Posture:
         """Return a posture by name, such as "ballet/arabesque" or "clip.bvh@240": see `find_posture`.
@@ -253,16 +253,16 @@ class Engine(LearnedCorpus):
         )
         return NoPathError(str(found), found.plain())
 
-    def _realise(self, formulation: Formulation, certificate: Certificate) -> Realised:
+    def _synthesise(self, formulation: Formulation, certificate: Certificate) -> Synthesised:
         """Synthesise the motion of a path."""
         request, ends = formulation.request, formulation.ends
         paced = request.paced and request.moves is None
-        return realise(
+        return synthesise(
             places(formulation.searched.model, certificate.path),
             Style(
                 self.corpus,
                 self.grammar,
-                self.carriage,
+                self.statistics,
                 np.radians(self.space.tolerances),
                 self.pace.fastest if paced else None,
                 self.pace.peaks_in if request.paced else None,
@@ -290,7 +290,7 @@ class Engine(LearnedCorpus):
         self,
         formulation: Formulation,
         certificate: Certificate,
-        realised: Realised,
+        synthesised: Synthesised,
         seconds: dict[str, float],
         what_if: tuple[WhatIf, ...],
     ) -> Tween:
@@ -314,13 +314,13 @@ class Engine(LearnedCorpus):
             formulation.coordination,
             search.coordination_factor,
         )
-        motion = realised.motion
+        motion = synthesised.motion
         tempo = tempo_of(self, formulation.times, formulation.usual_moves, formulation.detours, motion)
         if tempo.faster and (request.fixes_length or request.pace > 1.0):
             warnings.warn(
                 f"faster than anything in the corpus: {worded(tempo.faster)}", MotionMindWarning, stacklevel=3
             )
-        begins = np.zeros(0, dtype=np.int64) if realised.danced is None else realised.danced.passage.postures
+        begins = np.zeros(0, dtype=np.int64) if synthesised.danced is None else synthesised.danced.passage.postures
         last = self.corpus.columns.starts[np.searchsorted(self.corpus.columns.starts, begins, side="right")] - 1
         # Use a spline: a move may fall between two frames, and the arc between them cuts the corner.
         reached = rotation_spline(motion.times, motion.rotations, motion.insertions[0].times)
@@ -347,8 +347,8 @@ class Engine(LearnedCorpus):
             via_degrees=formulation.snap_degrees[1:-1],
             sources=shown,
             detail=found,
-            left_out=realised.left_out,
-            gave=realised.residuals,
+            left_out=synthesised.left_out,
+            gave=synthesised.residuals,
             expansions=certificate.expansions,
             peak_nodes=certificate.peak_nodes,
             costs=costs,

@@ -16,10 +16,10 @@ from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.progression import fit_progression
 from motionmind.grammar.schemes import Weights
 from motionmind.learned.model import LearnedCorpus
-from motionmind.realise.timeline import usual
 from motionmind.search.length import fewest_moves
 from motionmind.search.problem import Model, Problem, Rules, Via
 from motionmind.search.solve import MAX_CHAIN_STATES
+from motionmind.synthesis.timeline import usual
 from motionmind.tween.constraints import Constraint, constraints_of, restrict
 from motionmind.tween.ends import Ends, bring
 from motionmind.tween.guide import find_detour, make_guide

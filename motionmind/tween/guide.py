@@ -26,8 +26,8 @@ from motionmind.geometry.splines import rotation_spline
 from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.pace import over_seconds, way_between
 from motionmind.learned.trust import ZERO_DISPLACEMENT_RAD
-from motionmind.realise.detour import detour
-from motionmind.realise.timeline import usual
+from motionmind.synthesis.detour import detour
+from motionmind.synthesis.timeline import usual
 from motionmind.tween.pacing import usual_times
 from motionmind.walks.expectation import expect
 from motionmind.walks.passages import Place, dance
@@ -70,14 +70,14 @@ def make_guide(
         walked = max(1, round(length / seconds))
         half_steps = np.linspace(0.0, length, 2 * walked + 1)
         passed = {0: stops[0], walked: stops[1]}
-        expected = expect(learned.corpus, learned.carriage, passed, half_steps, path, duration is None)
+        expected = expect(learned.corpus, learned.statistics, passed, half_steps, path, duration is None)
         at = np.linspace(0.0, length, moves + 1)[1:-1]
         chains = expected.chains(learned.corpus, at)
         if path is not None:  # follow it exactly: the mean of walks near it moves less
             chains[:, : path.shape[1]] = rotation_spline(half_steps[::2], path, at)
         else:
             met: dict[float, Stop] = {0.0: stops[0], length: stops[1]}
-            danced = dance(learned.corpus, learned.carriage, expected, met, 1.0 if place else liveliness, place)
+            danced = dance(learned.corpus, learned.statistics, expected, met, 1.0 if place else liveliness, place)
             if danced is not None:
                 chains = danced.move(chains, at)
         price = kappa * length / moves / PRICED_MOVE_S
@@ -92,7 +92,7 @@ def find_detour(
     stops: tuple[Stop, Stop],
     duration: float,
 ) -> Floats | None:
-    """Return a detour that fills spare time, in moves of the usual length [T + 1, J, 4] (`motionmind.realise.detour`).
+    """Return a detour that fills spare time in usual moves [T + 1, J, 4]: see `motionmind.synthesis.detour`.
 
     Return None if corpus walks between the postures creep for at most a quarter of that time, or the duration is
     common for the distance.
@@ -111,11 +111,11 @@ def find_detour(
         return None
     walked = max(1, round(duration / seconds))
     half_steps = np.linspace(0.0, duration, 2 * walked + 1)
-    expected = expect(learned.corpus, learned.carriage, {0: stops[0], walked: stops[1]}, half_steps)
+    expected = expect(learned.corpus, learned.statistics, {0: stops[0], walked: stops[1]}, half_steps)
     if creeps(learned, expected.poses, half_steps) <= 0.25:
         return None
     chains = stops[0].chains, stops[1].chains
-    return detour(learned.corpus, learned.carriage, chains, walked, max(1, round(own / seconds)))
+    return detour(learned.corpus, learned.statistics, chains, walked, max(1, round(own / seconds)))
 
 
 def creeps(learned: LearnedCorpus, poses: Floats, times: Floats) -> float:

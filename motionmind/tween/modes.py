@@ -66,7 +66,7 @@ class Modes:
             stop_at(learned.corpus, first.posture(-1), Velocity.at_end(first) if arrives else None),
         )
         seconds = float(first.times[-1] - first.times[0])
-        self._places = find_modes(learned.corpus, learned.carriage, stops, seconds, self._known)
+        self._places = find_modes(learned.corpus, learned.statistics, stops, seconds, self._known)
 
     def know(self, motion: Motion) -> None:
         """Add a movement to the known ones."""

@@ -20,7 +20,7 @@ from motionmind.arguments import (
     check_text,
     described,
 )
-from motionmind.body.rates import FASTEST
+from motionmind.body.rates import MAX_FPS
 from motionmind.errors import MotionMindError, WrongTypeError
 from motionmind.footing.corrections import Correction
 from motionmind.grammar.schemes import Scheme, Weights
@@ -160,7 +160,7 @@ OPTIONS: Mapping[str, _Rule] = {
     "liveliness": _share,
     "passage": _or_none(_checked(check_text)),
     "without": _items("corrections' names", str, each=_choice(get_args(Correction))),
-    "fps": _number(0.01, FASTEST, " of frames a second"),
+    "fps": _number(0.01, MAX_FPS, " of frames a second"),
 }
 
 

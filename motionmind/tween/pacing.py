@@ -30,7 +30,7 @@ from motionmind.display import displayed
 from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.nearest import postures_near
 from motionmind.learned.pace import N_NEIGHBORS, over_seconds, way_between, way_of
-from motionmind.realise.timeline import usual
+from motionmind.synthesis.timeline import usual
 
 PEAK_SPEED_RATIO = 15.0 / 8.0  # peak speed of a smooth movement over its mean
 
@@ -53,7 +53,7 @@ class UsualTime:
 def usual_times(learned: LearnedCorpus, stops: Sequence[Posture]) -> tuple[UsualTime, ...]:
     """Return the corpus's usual time from each posture to the next."""
     parts = _parts(learned)
-    resting = resting_speeds(learned, np.stack([posture.rotations for posture in stops]))
+    resting = find_resting_speeds(learned, np.stack([posture.rotations for posture in stops]))
     out = []
     for (a, first), (b, last) in pairwise(zip(stops, resting, strict=True)):
         displacement = way_between(a, b)
@@ -64,15 +64,15 @@ def usual_times(learned: LearnedCorpus, stops: Sequence[Posture]) -> tuple[Usual
     return tuple(out)
 
 
-def resting_speeds(learned: LearnedCorpus, rotations: Floats) -> Floats:
-    """Return the resting speeds of postures [n, J, 4], as far as the corpus knows them [n] (`Pace.lulls_of`)."""
+def find_resting_speeds(learned: LearnedCorpus, rotations: Floats) -> Floats:
+    """Return the resting speeds [n] of postures [n, J, 4], where the corpus knows them (`Pace.resting_speeds_of`)."""
     corpus, joints = learned.corpus, len(learned.corpus.skeleton)
-    shown, trees = learned.carriage.orientations, learned.carriage.trees
+    shown, trees = learned.statistics.orientations, learned.statistics.trees
     postures = corpus.to_chains(rotations)[:, :joints]
     if trees is None:
-        return learned.pace.lulls_of(postures, shown[: len(corpus), :joints])
+        return learned.pace.resting_speeds_of(postures, shown[: len(corpus), :joints])
     near = (postures_near(trees, shown, posture, N_NEIGHBORS, len(corpus)) for posture in postures)
-    return np.array([learned.pace.lull_of(numbers) for numbers in near])
+    return np.array([learned.pace.resting_speed_of(numbers) for numbers in near])
 
 
 class FasterPart(msgspec.Struct, frozen=True):

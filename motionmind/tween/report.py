@@ -18,7 +18,7 @@ from motionmind.errors import FormatError
 from motionmind.files import FilePath, read_bytes
 from motionmind.learned.plausibility import Sighting
 from motionmind.search.length import LengthChoice
-from motionmind.synth.residual import Residual
+from motionmind.solver.residual import Residual
 from motionmind.tween.certificate import Bridge, Source, Wait
 from motionmind.tween.pacing import Tempo
 from motionmind.tween.what_if import WhatIf

@@ -17,7 +17,7 @@ from motionmind.search.cfn import Ingredients, cfn
 from motionmind.search.length import LengthChoice
 from motionmind.search.problem import Problem, Via
 from motionmind.search.solve import Status
-from motionmind.synth.residual import Residual
+from motionmind.solver.residual import Residual
 from motionmind.tween.certificate import Bridge, CostBreakdown, Source, Wait, gap_of
 from motionmind.tween.pacing import Tempo, UsualTime
 from motionmind.tween.report import PassedPosture, ReportedCosts, TweenReport, plain

@@ -6,7 +6,7 @@ import numpy as np
 
 from motionmind._typing import Singles
 from motionmind.learned.pace import ways
-from motionmind.tween.pacing import PEAK_SPEED_RATIO, resting_speeds
+from motionmind.tween.pacing import PEAK_SPEED_RATIO, find_resting_speeds
 from motionmind.variation.piece import Piece
 from motionmind.variation.seams import TransitionTest
 
@@ -30,10 +30,10 @@ def estimate_insertions(piece: Piece, test: TransitionTest) -> Singles:
     test.check_skeleton(ends[0])
     rotations, root = np.stack([end.rotations for end in ends]), np.stack([end.root for end in ends])
     seconds = np.empty((len(piece), len(piece)), dtype=np.float32)
-    lulls = resting_speeds(engine, rotations)
+    resting_speeds = find_resting_speeds(engine, rotations)
     for i in range(len(piece)):
         way = ways(skeleton, (rotations[i], rotations), (root[i], root))
         least = PEAK_SPEED_RATIO * np.max(way.parts / engine.pace.fastest, axis=-1)
-        seconds[i] = np.maximum(engine.pace.expected(way, (lulls[i], lulls)), least)
+        seconds[i] = np.maximum(engine.pace.expected(way, (resting_speeds[i], resting_speeds)), least)
     seconds[test.known(rotations, piece.durations)] = 0.0
     return seconds

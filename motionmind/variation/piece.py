@@ -18,7 +18,7 @@ from motionmind._cells import html_of
 from motionmind._typing import Floats, Ints
 from motionmind.arguments import as_integers, check_flag, check_text, check_type
 from motionmind.body.motion import Insertion, Motion, Posture
-from motionmind.body.rates import FASTEST, check_size
+from motionmind.body.rates import MAX_FPS, check_size
 from motionmind.corpus.corpus import Facing
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
@@ -115,9 +115,9 @@ class Piece:
         check_type("motion", motion, Motion)
         if rate is None:
             return cls(motion, np.arange(len(motion)), facing)
-        if not 0.0 < check_number("rate", rate) <= FASTEST:
+        if not 0.0 < check_number("rate", rate) <= MAX_FPS:
             raise MotionMindError(
-                f"a rate must be a number of postures a second above 0, at most {FASTEST:g}, not {rate}"
+                f"a rate must be a number of postures a second above 0, at most {MAX_FPS:g}, not {rate}"
             )
         own = motion.times
         last = np.floor((own[-1] - own[0]) * rate + 1e-3)  # the clock may jitter, as in Motion.resample

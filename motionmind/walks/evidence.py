@@ -22,7 +22,7 @@ from motionmind.corpus.clip import Clip
 from motionmind.corpus.corpus import Corpus
 from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot
-from motionmind.learned.carriage import Carriage
+from motionmind.learned.posture_statistics import PostureStatistics
 from motionmind.learned.trust import PRIOR_TRUST, ZERO_DISPLACEMENT_RAD, Squares, Trust, counts, fit_table
 from motionmind.walks.likelihood import BODY_PART_WEIGHTS
 from motionmind.walks.mean_walk import Walk, walk_between
@@ -60,19 +60,19 @@ class _Window(NamedTuple):
     last: int
 
 
-def learn_trust(corpus: Corpus, carriage: Carriage, workshop: Workshop | None = None) -> Trust:
+def learn_trust(corpus: Corpus, statistics: PostureStatistics, workshop: Workshop | None = None) -> Trust:
     """Learn how far to trust walks through a corpus, and how long the effect of an end velocity lasts.
 
     A corpus with fewer than `MIN_FAMILIES` families of clips takes the prior.
 
     Args:
         corpus: the movement.
-        carriage: posture statistics of its samples.
+        statistics: posture statistics of its samples.
         workshop: threads; None for the current one.
     """
-    spread = spread_of(corpus, carriage)
+    spread = spread_of(corpus, statistics)
     evidence = (
-        gather_evidence(corpus, carriage, N_WINDOWS_PER_LENGTH, workshop) if len(corpus.clips) >= MIN_FAMILIES else []
+        gather_evidence(corpus, statistics, N_WINDOWS_PER_LENGTH, workshop) if len(corpus.clips) >= MIN_FAMILIES else []
     )
     if len(evidence) < MIN_FAMILIES:
         return replace(PRIOR_TRUST, spread=spread)
@@ -81,40 +81,42 @@ def learn_trust(corpus: Corpus, carriage: Carriage, workshop: Workshop | None = 
     return Trust(fit_table(evidence, PRIOR_TRUST.table), np.array([decay]), spread)
 
 
-def gather_evidence(corpus: Corpus, carriage: Carriage, count: int, workshop: Workshop | None = None) -> list[Squares]:
+def gather_evidence(
+    corpus: Corpus, statistics: PostureStatistics, count: int, workshop: Workshop | None = None
+) -> list[Squares]:
     """Compare walks with the recording in windows of each family of clips; the walks use the other families only.
 
     Args:
         corpus: the movement.
-        carriage: posture statistics of its samples.
+        statistics: posture statistics of its samples.
         count: windows per length.
         workshop: threads; None for the current one.
     """
-    pieces, spread = [piece for piece in _pieces(corpus) if piece.stop - piece.start > 1], spread_of(corpus, carriage)
+    pieces, spread = [piece for piece in _pieces(corpus) if piece.stop - piece.start > 1], spread_of(corpus, statistics)
     windows = [window for seconds in WINDOW_LENGTHS_S for window in _windows(corpus, pieces, seconds, count)]
     families = sorted({window.piece.family for window in windows})
     if len({piece.family for piece in pieces}) < 2:
         return []
 
     def learn(family: tuple[str, str]) -> Squares:
-        others = restrict(corpus, carriage, [piece for piece in pieces if piece.family != family])
+        others = restrict(corpus, statistics, [piece for piece in pieces if piece.family != family])
         own = (window for window in windows if window.piece.family == family)
-        return Squares.summed(_compare(corpus, carriage, others, spread, window) for window in own)
+        return Squares.summed(_compare(corpus, statistics, others, spread, window) for window in own)
 
     return list((workshop or Workshop()).map(learn, families))
 
 
-def spread_of(corpus: Corpus, carriage: Carriage) -> Floats:
+def spread_of(corpus: Corpus, statistics: PostureStatistics) -> Floats:
     """Return the RMS distance per joint between two random postures, for each body part [P], radians."""
     one, other = np.random.default_rng(0).integers(len(corpus), size=(2, 1_000))
-    turned = rot.angle(carriage.orientations[one], carriage.orientations[other]) ** 2
+    turned = rot.angle(statistics.orientations[one], statistics.orientations[other]) ** 2
     return np.array(
         [max(float(np.sqrt(turned[:, part].mean())), ZERO_DISPLACEMENT_RAD) for part in parts_of(corpus.skeleton)]
     )
 
 
-def restrict(corpus: Corpus, carriage: Carriage, pieces: Sequence[_Piece]) -> Carriage:
-    """Restrict a carriage to pieces of clips, given in corpus order; only the fields that walks need are updated."""
+def restrict(corpus: Corpus, statistics: PostureStatistics, pieces: Sequence[_Piece]) -> PostureStatistics:
+    """Restrict posture statistics to pieces of clips, in corpus order; update only the fields that walks need."""
     starts, firsts, count = corpus.columns.starts, corpus.moves.firsts, len(corpus.columns.weights)
     postures = np.concatenate([np.arange(piece.start, piece.stop) for piece in pieces])
     moves = np.concatenate(
@@ -127,18 +129,18 @@ def restrict(corpus: Corpus, carriage: Carriage, pieces: Sequence[_Piece]) -> Ca
             if firsts[(number := round_ + piece.clip) + 1] > firsts[number]
         ]
     )
-    kept, steps = np.concatenate([postures, len(corpus) + moves]), np.concatenate([moves, len(carriage.turn) + moves])
-    shares, begins = carriage.shares[steps], np.searchsorted(kept, carriage.begins[steps])
+    kept, steps = np.concatenate([postures, len(corpus) + moves]), np.concatenate([moves, len(statistics.turn) + moves])
+    shares, begins = statistics.shares[steps], np.searchsorted(kept, statistics.begins[steps])
     return replace(
-        carriage,
-        orientations=np.ascontiguousarray(carriage.orientations[kept]),
-        weights=carriage.weights[kept],
+        statistics,
+        orientations=np.ascontiguousarray(statistics.orientations[kept]),
+        weights=statistics.weights[kept],
         begins=begins,
-        ends=np.searchsorted(kept, carriage.ends[steps]),
+        ends=np.searchsorted(kept, statistics.ends[steps]),
         shares=shares / np.bincount(begins, shares, len(kept))[begins],  # a piece may end where its clip goes on
-        clusters=np.ascontiguousarray(carriage.clusters[kept]),
-        turn=carriage.turn[moves],
-        travel=carriage.travel[moves],
+        clusters=np.ascontiguousarray(statistics.clusters[kept]),
+        turn=statistics.turn[moves],
+        travel=statistics.travel[moves],
         trees=None,
     )
 
@@ -184,17 +186,19 @@ def _windows(corpus: Corpus, pieces: Sequence[_Piece], seconds: float, count: in
     return out
 
 
-def _compare(corpus: Corpus, carriage: Carriage, others: Carriage, spread: Floats, window: _Window) -> Squares:
+def _compare(
+    corpus: Corpus, statistics: PostureStatistics, others: PostureStatistics, spread: Floats, window: _Window
+) -> Squares:
     """Compare the departure of walks through the other clips with the true departure in a window.
 
     Departures are in the joints' global rotations, at the inner postures. They are divided by the window's true
     departure, so that quiet windows count as much as lively ones.
     """
     skeleton, here = corpus.skeleton, slice(window.first, window.last + 1)
-    true, times = carriage.orientations[here, : len(skeleton)], corpus.times[here]
+    true, times = statistics.orientations[here, : len(skeleton)], corpus.times[here]
     half_steps = np.interp(np.arange(2 * len(times) - 1), np.arange(0, 2 * len(times), 2), times)
     size = skeleton.height or 1.0
-    ends = tuple(Stop(carriage.orientations[end], corpus.root[end] / size) for end in (window.first, window.last))
+    ends = tuple(Stop(statistics.orientations[end], corpus.root[end] / size) for end in (window.first, window.last))
     walk = walk_between(parts_of(skeleton), others, None, (ends[0], ends[1]), half_steps, None)
     minimal = walk.minimal[2:-2:2]
     made = rot.mul(minimal, rot.exp(walk.departs[2:-2:2]))

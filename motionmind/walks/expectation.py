@@ -15,10 +15,10 @@ from motionmind._typing import Floats, Ints
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
-from motionmind.learned.carriage import Carriage
+from motionmind.learned.posture_statistics import PostureStatistics
 from motionmind.walks.headings import turn_with_walks
 from motionmind.walks.mean_walk import mean_walk
-from motionmind.walks.stops import Stop, moments_rates
+from motionmind.walks.stops import Stop, sample_rates
 
 
 class Expectation(NamedTuple):
@@ -28,10 +28,10 @@ class Expectation(NamedTuple):
         half_steps: times [2 T + 1], seconds.
         poses: orientations of the joints [2 T + 1, J, 4], without the body's turn where the facing is free.
         headings: heading of the body [2 T + 1], radians.
-        moments: probabilities of the corpus's samples [2 T + 1, n].
+        samples: probabilities of the corpus's samples [2 T + 1, n].
         moves: probabilities of the corpus's moves in each half step [2 T, m].
         trust: trust in the walks per joint and half step [2 T, J], from 0 to 1.
-        of_moments: indices of these samples [n]; a slice means all.
+        of_samples: indices of these samples [n]; a slice means all.
         of_moves: indices of these moves [m]; a slice means all.
         left_out: share of walks whose end samples are represented by others (`motionmind.walks.mean_walk.MeanWalk`).
     """
@@ -39,10 +39,10 @@ class Expectation(NamedTuple):
     half_steps: Floats
     poses: Floats
     headings: Floats
-    moments: Floats
+    samples: Floats
     moves: Floats
     trust: Floats
-    of_moments: Ints | slice = slice(None)
+    of_samples: Ints | slice = slice(None)
     of_moves: Ints | slice = slice(None)
     left_out: float = 0.0
 
@@ -57,7 +57,7 @@ class Expectation(NamedTuple):
 
 def expect(
     corpus: Corpus,
-    carriage: Carriage,
+    statistics: PostureStatistics,
     stops: Mapping[int, Stop],
     half_steps: Floats,
     path: Floats | None = None,
@@ -67,7 +67,7 @@ def expect(
 
     Args:
         corpus: the movement learned from.
-        carriage: its posture statistics.
+        statistics: its posture statistics.
         stops: postures to pass exactly, keyed by the number of moves before each; increasing, first and last included.
         half_steps: times of the ends and middles of the moves [2 T + 1], seconds.
         path: orientations of the joints at the moves, which the walks follow [T + 1, J, 4]; None for all walks.
@@ -75,34 +75,34 @@ def expect(
             the short way.
     """
     moving = any(stop.rates is not None for stop in stops.values())
-    rates = partial(moments_rates, corpus, carriage) if moving else None
-    walk = mean_walk(corpus.skeleton, carriage, rates, stops, half_steps, path)
+    rates = partial(sample_rates, corpus, statistics) if moving else None
+    walk = mean_walk(corpus.skeleton, statistics, rates, stops, half_steps, path)
     # Each half step leads to or from the middle of a move.
-    middles, of = _middles(walk.of, len(carriage.weights), len(carriage.turn))
-    moves = walk.moments[:-1, middles] + walk.moments[1:, middles]
+    middles, of = _middles(walk.of, len(statistics.weights), len(statistics.turn))
+    moves = walk.samples[:-1, middles] + walk.samples[1:, middles]
     moves /= moves.sum(axis=1, keepdims=True)
     if corpus.facing == "free":
         first, *_, last = stops.values()
         ends = tuple(None if stop.rates is None else float(stop.rates.turn) for stop in (first, last))
         facing = {move: stop.chains[-1] for move, stop in stops.items()}
-        turned = carriage.turn[of]
+        turned = statistics.turn[of]
         turn, spread = moves @ turned, moves @ turned**2
-        decay = float(carriage.trust.lasts[0])
+        decay = float(statistics.trust.lasts[0])
         headings = turn_with_walks(turn, spread, walk.trust[:, 0], half_steps, facing, (ends[0], ends[1]), near, decay)
     else:
         headings = rot.heading(walk.poses[:, 0])
-    return Expectation(half_steps, walk.poses, headings, walk.moments, moves, walk.trust, walk.of, of, walk.left_out)
+    return Expectation(half_steps, walk.poses, headings, walk.samples, moves, walk.trust, walk.of, of, walk.left_out)
 
 
-def _middles(moments: Ints | slice, count: int, moves: int) -> tuple[Ints | slice, Ints | slice]:
+def _middles(samples: Ints | slice, count: int, moves: int) -> tuple[Ints | slice, Ints | slice]:
     """Return the columns of samples that are middles of moves, and the indices of their moves.
 
     Args:
-        moments: indices of the samples; a slice means all.
+        samples: indices of the samples; a slice means all.
         count: number of samples in the corpus.
         moves: number of moves in the corpus; their middles are its last samples.
     """
-    if isinstance(moments, slice):
-        return slice(count - moves, None), moments
-    middles = np.flatnonzero(moments >= count - moves)
-    return middles, moments[middles] - (count - moves)
+    if isinstance(samples, slice):
+        return slice(count - moves, None), samples
+    middles = np.flatnonzero(samples >= count - moves)
+    return middles, samples[middles] - (count - moves)

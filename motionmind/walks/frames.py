@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Floats, Ints
-from motionmind.body.contact import RATE
+from motionmind.body.contact import CONTACT_FPS
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
-from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import postures_near
+from motionmind.learned.posture_statistics import PostureStatistics
 from motionmind.walks.likelihood import squared_distances
 
 N_FRAME_NEIGHBORS = 8  # of each posture of a movement, in a large corpus
@@ -49,14 +49,16 @@ def all_frames(corpus: Corpus) -> Frames:
     return _concatenate([_sample(corpus, int(a), int(b) - 1, (int(a), int(b))) for a, b in pairwise(starts)])
 
 
-def frames_near(corpus: Corpus, carriage: Carriage, poses: Floats, beside: int = N_POSTURES_BESIDE) -> Frames:
+def frames_near(
+    corpus: Corpus, statistics: PostureStatistics, poses: Floats, beside: int = N_POSTURES_BESIDE
+) -> Frames:
     """Return the recordings within `beside` postures of the neighbours of `poses` [K, J, 4]; all recordings of a
     corpus without trees."""
-    if carriage.trees is None:
+    if statistics.trees is None:
         return all_frames(corpus)
     count, starts = len(corpus), corpus.columns.starts
     near = [
-        postures_near(carriage.trees, carriage.orientations, pose, N_FRAME_NEIGHBORS, count, N_LEAVES_SEARCHED)
+        postures_near(statistics.trees, statistics.orientations, pose, N_FRAME_NEIGHBORS, count, N_LEAVES_SEARCHED)
         for pose in poses
     ]
     around = np.unique(np.clip(np.concatenate(near)[:, None] + np.arange(-beside, beside + 1), 0, count - 1))
@@ -83,7 +85,7 @@ def _sample(corpus: Corpus, first: int, last: int, known: tuple[int, int]) -> tu
     """
     knots, between = slice(*known), corpus.detail.shape[1]
     keys, begin = corpus.times[knots], corpus.times[first]
-    times = begin + np.arange(np.floor((corpus.times[last] - begin) * RATE + 1e-3) + 1.0) / RATE
+    times = begin + np.arange(np.floor((corpus.times[last] - begin) * CONTACT_FPS + 1e-3) + 1.0) / CONTACT_FPS
     times = np.minimum(times, corpus.times[last])
     rotations = rotation_spline(keys, corpus.rotations[knots], times)
     postures = first + np.searchsorted(corpus.times[first : last + 1], times + 1e-6, side="right") - 1
@@ -109,7 +111,7 @@ def _concatenate(parts: Sequence[tuple[Floats, Ints, Floats]]) -> Frames:
 
 def _rates(chains: Floats) -> Floats:
     """Return angular velocities [n, L, 3], radians per second, to the next frame; at the last, the one before."""
-    rates = RATE * rot.log(rot.inv_mul(chains[:-1], chains[1:]))
+    rates = CONTACT_FPS * rot.log(rot.inv_mul(chains[:-1], chains[1:]))
     last = rates[-1:] if len(rates) else np.zeros((1, *chains.shape[1:-1], 3))
     return np.concatenate([rates, last])
 

@@ -74,17 +74,17 @@ def _sums_of_squares(orientations: Floats, members: Ints, parts: int, postures: 
 
 
 @jit
-def gather_orientations(orientations: Floats, moments: Ints, part: Ints) -> Floats:
+def gather_orientations(orientations: Floats, samples: Ints, part: Ints) -> Floats:
     """Gather the orientations of a body part's joints in some samples [m, n, 4].
 
     Args:
         orientations: of all joint chains in the corpus's N samples [N, L, 4].
-        moments: indices of samples [n].
+        samples: indices of samples [n].
         part: the joints of the part [m].
     """
-    out = np.empty((len(part), len(moments), 4))
-    for first in range(0, len(moments), N_INTERLEAVED):
-        here = moments[first : first + N_INTERLEAVED]
+    out = np.empty((len(part), len(samples), 4))
+    for first in range(0, len(samples), N_INTERLEAVED):
+        here = samples[first : first + N_INTERLEAVED]
         for i in range(len(here)):  # prefetch: request the memory of all before waiting for the first
             touched = 0.0
             for j in range(0, len(part), 2):

@@ -18,7 +18,7 @@ from motionmind.executors.here import Here
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit, read_only
-from motionmind.learned.carriage import Carriage
+from motionmind.learned.posture_statistics import PostureStatistics
 from motionmind.learned.trust import Trust
 from motionmind.walks.likelihood import (
     BODY_PART_WEIGHTS,
@@ -53,7 +53,7 @@ class MeanWalk(NamedTuple):
 
     Attributes:
         poses: orientations of the joints [2 T + 1, J, 4].
-        moments: probabilities of the corpus's samples [2 T + 1, n].
+        samples: probabilities of the corpus's samples [2 T + 1, n].
         of: indices of these samples [n]; all of them in a small corpus.
         trust: trust in the walks per joint and half step [2 T, J], from 0 to 1 (`motionmind.learned.trust`).
         left_out: approximate share of walks that begin or end in samples represented by others, in the body part
@@ -61,7 +61,7 @@ class MeanWalk(NamedTuple):
     """
 
     poses: Floats
-    moments: Floats
+    samples: Floats
     of: Ints | slice
     trust: Floats
     left_out: float
@@ -69,7 +69,7 @@ class MeanWalk(NamedTuple):
 
 def mean_walk(
     skeleton: Skeleton,
-    carriage: Carriage,
+    statistics: PostureStatistics,
     rates: Callable[[Ints | slice], Rates] | None,
     stops: Mapping[int, Stop],
     half_steps: Floats,
@@ -85,7 +85,7 @@ def mean_walk(
 
     Args:
         skeleton: the body.
-        carriage: the corpus's N samples and the steps between them.
+        statistics: the corpus's N samples and the steps between them.
         rates: returns the velocities in samples; None where no stop has a velocity.
         stops: postures to pass, keyed by the number of moves before each; increasing, first and last included.
         half_steps: times of the ends and middles of the moves [2 T + 1], seconds.
@@ -97,14 +97,14 @@ def mean_walk(
     for start, end in pairwise(stops):
         here, ends = slice(2 * start, 2 * end + 1), (stops[start], stops[end])
         between = path[start + 1 : end] if path is not None and end > start + 1 else None
-        walk = walk_between(parts, carriage, rates, ends, half_steps[here], between)
-        share = walk.trusted(carriage.trust)
+        walk = walk_between(parts, statistics, rates, ends, half_steps[here], between)
+        share = walk.trusted(statistics.trust)
         poses[here] = rot.mul(walk.minimal, rot.exp(share[:, None] * walk.departs))
         trusted[2 * start : 2 * end], segments[start] = share, walk
     for move, stop in stops.items():
         poses[2 * move] = stop.chains[:joints]
     left_out = max(walk.left_out for walk in segments.values())
-    return MeanWalk(poses, *_join_segments(segments, len(half_steps), len(carriage.weights)), trusted, left_out)
+    return MeanWalk(poses, *_join_segments(segments, len(half_steps), len(statistics.weights)), trusted, left_out)
 
 
 class Walk(NamedTuple):
@@ -116,7 +116,7 @@ class Walk(NamedTuple):
         members: the body part of each of the three sizes that each joint belongs to [J, 3].
         nearest: distance of each stop from the nearest sample, by body part [P, 2], radians per joint.
         displacements: displacement of each part [P], radians per joint (`_displacement`).
-        moments: probabilities of samples [S + 1, n] and the indices of these samples, in walks of the whole body and
+        samples: probabilities of samples [S + 1, n] and the indices of these samples, in walks of the whole body and
             of the part that carries it.
         left_out: as in `MeanWalk`.
     """
@@ -126,7 +126,7 @@ class Walk(NamedTuple):
     members: Ints
     nearest: Floats
     displacements: Floats
-    moments: tuple[tuple[Floats, Ints | slice], ...]
+    samples: tuple[tuple[Floats, Ints | slice], ...]
     left_out: float
 
     def trusted(self, trust: Trust) -> Floats:
@@ -156,21 +156,21 @@ class _PartWalk(NamedTuple):
     left_out: float
 
 
-def _join_segments(segments: Mapping[int, Walk], count: int, moments: int) -> tuple[Floats, Ints | slice]:
+def _join_segments(segments: Mapping[int, Walk], count: int, samples: int) -> tuple[Floats, Ints | slice]:
     """Return the probabilities of samples at each half step [2 T + 1, n], and the indices of these samples.
 
     Args:
         segments: walks, keyed by the number of moves before their first stop.
         count: 2 T + 1.
-        moments: N, the number of samples in the corpus.
+        samples: N, the number of samples in the corpus.
     """
-    kept = [of for walk in segments.values() for _, of in walk.moments if not isinstance(of, slice)]
+    kept = [of for walk in segments.values() for _, of in walk.samples if not isinstance(of, slice)]
     chosen = reduce(np.union1d, kept) if kept else slice(None)
-    out = np.zeros((count, moments if isinstance(chosen, slice) else len(chosen)))
+    out = np.zeros((count, samples if isinstance(chosen, slice) else len(chosen)))
     for start, walk in segments.items():
         rows = out[2 * start : 2 * start + len(walk.minimal)]
         rows[0] = 0.0  # written by the previous segment
-        for share, of in walk.moments:
+        for share, of in walk.samples:
             if isinstance(of, slice) or isinstance(chosen, slice):
                 rows += 0.5 * share
             else:
@@ -188,7 +188,7 @@ def _add_half(rows: Floats, columns: Ints, shares: Floats) -> None:
 
 def walk_between(
     parts: tuple[Ints, ...],
-    carriage: Carriage,
+    statistics: PostureStatistics,
     rates: Callable[[Ints | slice], Rates] | None,
     ends: tuple[Stop, Stop],
     times: Floats,
@@ -198,7 +198,7 @@ def walk_between(
 
     Args:
         parts: of the body, as in `parts_of`.
-        carriage: the corpus's N samples and the steps between them.
+        statistics: the corpus's N samples and the steps between them.
         rates: returns the velocities in samples; or None.
         ends: both stops.
         times: of the steps' ends [S + 1], seconds.
@@ -207,18 +207,18 @@ def walk_between(
     joints = max(int(part.max()) for part in parts) + 1
     orientations = np.stack([stop.chains[:joints] for stop in ends])
     leaving, arriving = (None if stop.rates is None else stop.rates.joints for stop in ends)
-    decay = float(carriage.trust.lasts[0])
+    decay = float(statistics.trust.lasts[0])
     minimal = minimal_movement(orientations, times, leaving, arriving, decay)
     poses, nearest = np.empty_like(minimal), np.empty((len(parts), 2))
 
     members, groups = _members(parts, joints)
     displacements = [_displacement(part, ends, float(times[-1] - times[0]), decay) for part in parts]
-    shown, trees = read_only(carriage.orientations), carriage.trees
+    shown, trees = read_only(statistics.orientations), statistics.trees
 
     def off(postures: Floats) -> Floats:
         return squared_distances(shown, members, len(parts), postures)
 
-    threads = min(N_THREADS, 1 + len(carriage.weights) // MIN_SAMPLES_PER_THREAD)
+    threads = min(N_THREADS, 1 + len(statistics.weights) // MIN_SAMPLES_PER_THREAD)
     with ThreadPoolExecutor(threads - 1) if threads > 1 else Here() as pool:
         distances = []
         if trees is None:
@@ -228,10 +228,10 @@ def walk_between(
         def walk(number: int) -> _PartWalk:
             part, here = parts[number], shown
             if trees is None:
-                chosen = all_samples(carriage, number)
+                chosen = all_samples(statistics, number)
                 own = distances[0][number] if threads == 1 else np.concatenate([of[number] for of in distances])
             else:
-                chosen, seen, own = choose(carriage, number, orientations, len(times) - 1)
+                chosen, seen, own = choose(statistics, number, orientations, len(times) - 1)
                 here = seen.transpose(1, 0, 2)
                 if path is not None:
                     own = np.concatenate([own, part_distances(seen, np.ascontiguousarray(path[:, part]))])
@@ -263,9 +263,9 @@ def walk_between(
         lost = _map_in_threads(move, sorted(limbs), pool, threads)
     departs = rot.log(rot.inv_mul(minimal, poses))
     departs = _without_ends(departs, times, leaving is not None, arriving is not None, decay)
-    moments = tuple((one.marginals, one.chosen.moments) for one in (walks[0], walks[1]))
+    samples = tuple((one.marginals, one.chosen.samples) for one in (walks[0], walks[1]))
     left_out = max(*lost, *(one.left_out for one in walks.values()))
-    return Walk(minimal, departs, members, nearest, np.array(displacements), moments, left_out)
+    return Walk(minimal, departs, members, nearest, np.array(displacements), samples, left_out)
 
 
 def _map_in_threads(
@@ -325,7 +325,7 @@ def _likelihoods(
     """
     nearest = nearest_distances(off)
     squares = divide_by_variances(off, *map(end_variance, nearest))
-    known = None if rates is None else rates(chosen.moments)
+    known = None if rates is None else rates(chosen.samples)
     for k, stop in enumerate(ends):
         for differences in _rate_terms(part, known, stop):
             squares[k] += differences

@@ -91,7 +91,7 @@ def add_rotations(sums: Floats, weights: Floats, kept: Ints, orientations: Float
     Arguments are those of `mean_rotations`, except `weights`, from `scale_weights`, and `kept`, the indices of the
     orientations to add [n].
     """
-    count, moments = len(about), len(kept)
+    count, samples = len(about), len(kept)
     near, signed, shown = np.empty((4, count)), np.empty((4, count)), np.empty((4, 4))
     for j in range(len(joints)):
         for t in range(count):  # an array assignment takes seconds to compile
@@ -102,7 +102,7 @@ def add_rotations(sums: Floats, weights: Floats, kept: Ints, orientations: Float
         for first in range(0, len(weights), 4):
             added, mixed = weights[first : first + 4], False
             for k in range(4):
-                x, y, z, w = orientations[kept[min(first + k, moments - 1)], joints[j]]
+                x, y, z, w = orientations[kept[min(first + k, samples - 1)], joints[j]]
                 cosine = middle[0] * x + middle[1] * y + middle[2] * z + middle[3] * w
                 sign = -1.0 if cosine < -radius else 1.0
                 shown[0, k], shown[1, k], shown[2, k], shown[3, k] = sign * x, sign * y, sign * z, sign * w

@@ -13,10 +13,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from motionmind._typing import Floats, Ints
-from motionmind.body.contact import RATE
+from motionmind.body.contact import CONTACT_FPS
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
-from motionmind.learned.carriage import Carriage
+from motionmind.learned.posture_statistics import PostureStatistics
 from motionmind.walks.frames import Frames, frames_near
 from motionmind.walks.passages import MAX_TEMPO_RATIO, NODE_FRAMES, WARP_COST_RAD2, WARP_FRAMES, Place, node_distances
 from motionmind.walks.stops import Stop
@@ -25,24 +25,24 @@ N_CANDIDATE_PASSAGES = 16
 
 
 def find_modes(
-    corpus: Corpus, carriage: Carriage, ends: tuple[Stop, Stop], seconds: float, known: list[Floats]
+    corpus: Corpus, statistics: PostureStatistics, ends: tuple[Stop, Stop], seconds: float, known: list[Floats]
 ) -> Iterator[Place]:
     """Yield the places where likely passages begin, each the farthest from the movements `known` by then.
 
     Args:
         corpus: the movement learned from.
-        carriage: its posture statistics.
+        statistics: its posture statistics.
         ends: the first and the last posture, with velocities if given.
         seconds: duration of the movement.
         known: orientations of the joints [K, J, 4] in each known movement, at even times from its first posture to its
             last; the caller appends each yielded one.
     """
-    steps, joints = max(1, round(seconds * RATE / NODE_FRAMES)), known[0].shape[1]
+    steps, joints = max(1, round(seconds * CONTACT_FPS / NODE_FRAMES)), known[0].shape[1]
     poses = np.stack([stop.chains[:joints] for stop in ends])
     beside = (
         int(np.ceil(MAX_TEMPO_RATIO * seconds / float(np.median(corpus.moves.seconds)))) if len(corpus.moves) else 0
     )
-    recorded = frames_near(corpus, carriage, poses, beside)
+    recorded = frames_near(corpus, statistics, poses, beside)
     passages = _likeliest(recorded, ends, poses, steps)
     shown = [_held_to_ends(recorded, passage, poses, len(known[0])) for passage in passages]
     while passages:

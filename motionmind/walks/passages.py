@@ -18,11 +18,11 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Floats, Ints
-from motionmind.body.contact import RATE
+from motionmind.body.contact import CONTACT_FPS
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline
-from motionmind.learned.carriage import Carriage
+from motionmind.learned.posture_statistics import PostureStatistics
 from motionmind.learned.trust import ZERO_DISPLACEMENT_RAD
 from motionmind.walks.expectation import Expectation
 from motionmind.walks.frames import Frames, frame_distances, frames_near, frames_of
@@ -188,7 +188,7 @@ def _chains_at(recorded: Frames, passage: Passage, nodes: tuple[int, int], times
     """
     at, frames = passage.times[slice(*nodes)], passage.frames[slice(*nodes)].astype(np.float64)
     frames[1:-1] = 0.25 * frames[:-2] + 0.5 * frames[1:-1] + 0.25 * frames[2:]  # smooths the tempo
-    first = last = RATE
+    first = last = CONTACT_FPS
     if len(at) > 1:
         first, last = (np.diff(frames) / np.diff(at))[[0, -1]]
     where = np.interp(times, at, frames)
@@ -245,7 +245,7 @@ def _screened(steps: Floats, screen: float) -> Floats:
 
 def dance(
     corpus: Corpus,
-    carriage: Carriage,
+    statistics: PostureStatistics,
     walk: Expectation,
     stops: Mapping[float, Stop],
     liveliness: float,
@@ -255,7 +255,7 @@ def dance(
 
     Args:
         corpus: the movement learned from.
-        carriage: its posture statistics.
+        statistics: its posture statistics.
         walk: the mean of walks.
         stops: postures to pass exactly, keyed by time in seconds; increasing, first and last included.
         liveliness: 0 for the mean itself, 1 for the passage, displaced to meet the stops.
@@ -267,11 +267,11 @@ def dance(
     is_still = displacement < ZERO_DISPLACEMENT_RAD and len(stops) == 2 and first.rates is None and last.rates is None
     if liveliness == 0.0 or (is_still and place is None):
         return None
-    nodes = np.linspace(0.0, length, max(1, round(length * RATE / NODE_FRAMES)) + 1)
+    nodes = np.linspace(0.0, length, max(1, round(length * CONTACT_FPS / NODE_FRAMES)) + 1)
     poses = walk.chains(corpus, nodes)[:, :joints]
     given = np.unique(np.abs(nodes[:, None] - passed).argmin(axis=0))
     if place is None:
-        recorded = frames_near(corpus, carriage, poses[::4])
+        recorded = frames_near(corpus, statistics, poses[::4])
     else:
         recorded = frames_of(corpus, place.clip, place.seconds, place.seconds + MAX_TEMPO_RATIO * length)
     passage = find_passage(recorded, poses, nodes, (first, last), given)
@@ -305,7 +305,7 @@ def _frame_times(passed: Floats) -> tuple[Floats, Ints]:
     """Return times about 1 / RATE apart, evenly spaced between consecutive stops, and the rows of the stops."""
     parts, rows = [passed[:1]], [0]
     for begin, end in pairwise(passed.tolist()):
-        count = max(1, round((end - begin) * RATE))
+        count = max(1, round((end - begin) * CONTACT_FPS))
         parts.append(np.linspace(begin, end, count + 1)[1:])
         rows.append(rows[-1] + count)
     return np.concatenate(parts), np.array(rows)

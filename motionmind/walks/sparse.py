@@ -24,9 +24,9 @@ from weakref import WeakKeyDictionary, ref
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
-from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import find_near
 from motionmind.learned.neighbours import Neighbours
+from motionmind.learned.posture_statistics import PostureStatistics
 from motionmind.walks.likelihood import gather_orientations, part_distances
 from motionmind.walks.steps import follow, steps_at
 
@@ -41,9 +41,9 @@ class Chosen(NamedTuple):
     """The samples chosen for the walks of one body part, and the steps between them.
 
     Attributes:
-        moments: indices of the samples, increasing [n]; a slice means all.
+        samples: indices of the samples, increasing [n]; a slice means all.
         weights: of the samples [n].
-        begins: position in `moments` that each step leads from [m].
+        begins: position in `samples` that each step leads from [m].
         ends: position that it leads to [m].
         shares: probability of each step, given the sample that it leaves [m].
         clusters: cluster of each sample, numbered from 0 [n].
@@ -51,7 +51,7 @@ class Chosen(NamedTuple):
             each; None where all samples were chosen.
     """
 
-    moments: Ints | slice
+    samples: Ints | slice
     weights: Floats
     begins: Ints
     ends: Ints
@@ -60,11 +60,11 @@ class Chosen(NamedTuple):
     near: tuple[Bools, Bools] | None
 
 
-def all_samples(carriage: Carriage, number: int) -> Chosen:
+def all_samples(statistics: PostureStatistics, number: int) -> Chosen:
     """Return all of the corpus's samples, for the walks of a part given by its index."""
-    clusters = np.ascontiguousarray(carriage.clusters[:, number])
-    steps = carriage.begins, carriage.ends, carriage.shares
-    return Chosen(slice(None), carriage.weights, *steps, clusters, None)
+    clusters = np.ascontiguousarray(statistics.clusters[:, number])
+    steps = statistics.begins, statistics.ends, statistics.shares
+    return Chosen(slice(None), statistics.weights, *steps, clusters, None)
 
 
 class ChosenPart(NamedTuple):
@@ -81,28 +81,28 @@ class ChosenPart(NamedTuple):
     off: Floats
 
 
-def _chosen(carriage: Carriage, number: int, near: Ints, nearest: Ints, balls: _Balls, steps: int) -> Chosen:
+def _chosen(statistics: PostureStatistics, number: int, near: Ints, nearest: Ints, balls: _Balls, steps: int) -> Chosen:
     """Return the samples chosen for the walks of a part.
 
     Args:
-        carriage: all samples.
+        statistics: all samples.
         number: index of the part.
         near: samples near both ends, to follow along their clips [2, n].
         nearest: the nearest of them, which represent only themselves [2, m].
         balls: of the part's tree.
         steps: number of steps to follow them.
     """
-    chain = carriage.begins, carriage.ends, len(carriage.weights) - len(carriage.turn)
+    chain = statistics.begins, statistics.ends, len(statistics.weights) - len(statistics.turn)
     followed = [follow(near[k], k == 0, steps, *chain) for k in range(2)]
-    moments = np.unique(np.concatenate([near.ravel(), balls.middles, *followed]))
-    weights, representatives = _share_weights(moments, nearest.ravel(), balls, carriage.weights)
-    begins, leads, which = steps_at(moments, True, *chain)
-    goals = np.minimum(np.searchsorted(moments, leads), len(moments) - 1)
-    others = np.flatnonzero(moments[goals] != leads)  # steps to samples not chosen lead to their ball's representative
+    samples = np.unique(np.concatenate([near.ravel(), balls.middles, *followed]))
+    weights, representatives = _share_weights(samples, nearest.ravel(), balls, statistics.weights)
+    begins, leads, which = steps_at(samples, True, *chain)
+    goals = np.minimum(np.searchsorted(samples, leads), len(samples) - 1)
+    others = np.flatnonzero(samples[goals] != leads)  # steps to samples not chosen lead to their ball's representative
     goals[others] = representatives[_balls_of(leads[others], balls)]
-    clusters = np.unique(carriage.clusters[moments, number], return_inverse=True)[1].astype(np.int32)
-    both = _mask_of(moments, nearest[0]), _mask_of(moments, nearest[1])
-    return Chosen(moments, weights, begins, goals, carriage.shares[which], clusters, both)
+    clusters = np.unique(statistics.clusters[samples, number], return_inverse=True)[1].astype(np.int32)
+    both = _mask_of(samples, nearest[0]), _mask_of(samples, nearest[1])
+    return Chosen(samples, weights, begins, goals, statistics.shares[which], clusters, both)
 
 
 def steps_from(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
@@ -159,25 +159,25 @@ class _CachedPerOwner(Generic[_Owner, _Asked, _Found]):
         self._caches.clear()
 
 
-def choose(carriage: Carriage, number: int, ends: Floats, steps: int) -> ChosenPart:
+def choose(statistics: PostureStatistics, number: int, ends: Floats, steps: int) -> ChosenPart:
     """Choose samples for the walks of one body part, and measure their distances from the ends.
 
     Args:
-        carriage: the corpus's samples, with trees.
+        statistics: the corpus's samples, with trees.
         number: index of the part.
         ends: orientations of the joints in both given postures [2, J, 4].
         steps: number of steps in a walk.
     """
-    return _choose_cached(carriage, number, ends.tobytes(), min(steps, 12))  # 1.2 s at five postures per second
+    return _choose_cached(statistics, number, ends.tobytes(), min(steps, 12))  # 1.2 s at five postures per second
 
 
 @_CachedPerOwner  # the guide of a search and its motion need the same samples
-def _choose_cached(carriage: Carriage, number: int, ends: bytes, steps: int) -> ChosenPart:
+def _choose_cached(statistics: PostureStatistics, number: int, ends: bytes, steps: int) -> ChosenPart:
     """Implement `choose`, with hashable arguments; follow the samples near the ends for `steps` steps."""
-    trees = carriage.trees
+    trees = statistics.trees
     assert trees is not None
     postures, part = np.frombuffer(ends).reshape(2, -1, 4), trees.parts[number]
-    ranked = find_near(trees, number, carriage.orientations, postures, N_END_NEIGHBORS)
+    ranked = find_near(trees, number, statistics.orientations, postures, N_END_NEIGHBORS)
     apart = np.linspace(N_NEAREST_END_SAMPLES, ranked.shape[1] - 1, max(N_END_SAMPLES - N_NEAREST_END_SAMPLES, 0))
     ranks = np.unique(
         np.concatenate([np.arange(N_NEAREST_END_SAMPLES), apart]).astype(int).clip(max=ranked.shape[1] - 1)
@@ -187,9 +187,9 @@ def _choose_cached(carriage: Carriage, number: int, ends: bytes, steps: int) -> 
         np.ascontiguousarray(ranked[:, :N_NEAREST_END_SAMPLES]),
         _balls(trees, number),
     )
-    chosen = _chosen(carriage, number, near, nearest, balls, steps)
-    assert isinstance(chosen.moments, np.ndarray)
-    shown = gather_orientations(carriage.orientations, chosen.moments, part)
+    chosen = _chosen(statistics, number, near, nearest, balls, steps)
+    assert isinstance(chosen.samples, np.ndarray)
+    shown = gather_orientations(statistics.orientations, chosen.samples, part)
     return ChosenPart(chosen, shown, part_distances(shown, np.ascontiguousarray(postures[:, part])))
 
 
@@ -218,23 +218,23 @@ def _balls(trees: Neighbours, number: int) -> _Balls:
     return _Balls(starts, trees.weights[number][nodes], middles, trees.ranks[number])
 
 
-def _mask_of(moments: Ints, some: Ints) -> Bools:
-    """Return a mask over increasing `moments` of those in `some`, a subset [n]."""
-    out = np.zeros(len(moments), np.bool_)
-    out[np.searchsorted(moments, some)] = True
+def _mask_of(samples: Ints, some: Ints) -> Bools:
+    """Return a mask over increasing `samples` of those in `some`, a subset [n]."""
+    out = np.zeros(len(samples), np.bool_)
+    out[np.searchsorted(samples, some)] = True
     return out
 
 
-def _share_weights(moments: Ints, singles: Ints, balls: _Balls, counts: Floats) -> tuple[Floats, Ints]:
+def _share_weights(samples: Ints, singles: Ints, balls: _Balls, counts: Floats) -> tuple[Floats, Ints]:
     """Return the weights of the chosen samples [n], and the position of the first that represents each ball [B].
 
     Args:
-        moments: indices of the chosen samples, increasing [n].
+        samples: indices of the chosen samples, increasing [n].
         singles: the chosen samples that represent only themselves.
         balls: of the part's tree.
         counts: weights of all samples [N].
     """
-    ball, own, alone = _balls_of(moments, balls), counts[moments], _mask_of(moments, singles)
+    ball, own, alone = _balls_of(samples, balls), counts[samples], _mask_of(samples, singles)
     shared = np.bincount(ball[~alone], own[~alone], len(balls.weights))
     # If only near samples were chosen from a ball, they represent the rest of it, too.
     alone &= shared[ball] > 0.0
@@ -247,9 +247,9 @@ def _share_weights(moments: Ints, singles: Ints, balls: _Balls, counts: Floats) 
     return own, representatives
 
 
-def _balls_of(moments: Ints, balls: _Balls) -> Ints:
+def _balls_of(samples: Ints, balls: _Balls) -> Ints:
     """Return the ball of each sample [n]."""
-    return np.searchsorted(balls.starts, balls.ranks[moments], side="right") - 1
+    return np.searchsorted(balls.starts, balls.ranks[samples], side="right") - 1
 
 
 def _cut_tree(bounds: Int32s, radii: Floats, weights: Floats) -> Ints:

@@ -15,42 +15,42 @@ import numpy as np
 from motionmind._typing import Ints
 
 
-def follow(moments: Ints, ahead: bool, steps: int, begins: Ints, ends: Ints, postures: int) -> Ints:
-    """Return the samples [n] that at most `steps` steps reach from `moments` or, if not `ahead`, that reach `moments`.
+def follow(samples: Ints, ahead: bool, steps: int, begins: Ints, ends: Ints, postures: int) -> Ints:
+    """Return the samples [n] that at most `steps` steps reach from `samples` or, if not `ahead`, that reach `samples`.
 
     Samples may repeat.
     """
-    out, ranges = [moments[:0]], _step_ranges(ahead, begins, ends)
+    out, ranges = [samples[:0]], _step_ranges(ahead, begins, ends)
     for _ in range(steps):
-        numbers = _steps(moments, ahead, begins, ends, postures, ranges)
+        numbers = _steps(samples, ahead, begins, ends, postures, ranges)
         reached = (ends if ahead else begins)[numbers[numbers >= 0]]
-        moments = np.unique(reached) if len(reached) > len(moments) else reached  # or they could double each move
-        out.append(moments)
+        samples = np.unique(reached) if len(reached) > len(samples) else reached  # or they could double each move
+        out.append(samples)
     return np.concatenate(out)
 
 
-def steps_at(moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int) -> tuple[Ints, Ints, Ints]:
-    """Return the steps that leave `moments`, or lead to them if not `ahead`.
+def steps_at(samples: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int) -> tuple[Ints, Ints, Ints]:
+    """Return the steps that leave `samples`, or lead to them if not `ahead`.
 
     Returns:
-        The position in `moments` of each step [m], the sample at its other end [m], and its index [m].
+        The position in `samples` of each step [m], the sample at its other end [m], and its index [m].
     """
-    steps = _steps(moments, ahead, begins, ends, postures, _step_ranges(ahead, begins, ends))
+    steps = _steps(samples, ahead, begins, ends, postures, _step_ranges(ahead, begins, ends))
     at, numbers = np.flatnonzero(steps >= 0) // 2, steps[steps >= 0]
     return at, (ends if ahead else begins)[numbers], numbers
 
 
 def _steps(
-    moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int, ranges: Sequence[tuple[int, int]]
+    samples: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int, ranges: Sequence[tuple[int, int]]
 ) -> Ints:
     """Return the steps at each sample [n, 2]: one forward in its clip and one backward; -1 for none."""
     leaves, moves = begins if ahead else ends, len(begins) // 2
-    out = np.full((len(moments), 2), -1)
-    out[:, 0] = np.where(moments >= postures, moments - postures + ahead * moves, -1)
+    out = np.full((len(samples), 2), -1)
+    out[:, 0] = np.where(samples >= postures, samples - postures + ahead * moves, -1)
     for column, (start, stop) in enumerate(ranges):
-        places = start + leaves[start:stop].searchsorted(moments)
+        places = start + leaves[start:stop].searchsorted(samples)
         found = np.flatnonzero(places < stop)
-        found = found[leaves[places[found]] == moments[found]]
+        found = found[leaves[places[found]] == samples[found]]
         out[found, column] = places[found]
     return out
 

@@ -12,7 +12,7 @@ from motionmind._typing import Floats, Ints
 from motionmind.body.motion import Posture, Velocity
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
-from motionmind.learned.carriage import Carriage
+from motionmind.learned.posture_statistics import PostureStatistics
 from motionmind.walks.steps import steps_at
 
 _EVERY = slice(None)
@@ -65,35 +65,35 @@ def stop_at(corpus: Corpus, posture: Posture, velocity: Velocity | None = None) 
     return Stop(chains, place, Rates.of_chains(turned, rot.mul_vec(ahead, velocity.root), len(posture.skeleton)))
 
 
-def moments_rates(corpus: Corpus, carriage: Carriage, moments: Ints | slice = _EVERY) -> Rates:
+def sample_rates(corpus: Corpus, statistics: PostureStatistics, samples: Ints | slice = _EVERY) -> Rates:
     """Return the velocities in samples of the corpus: means over the steps that arrive and leave.
 
     Args:
         corpus: the movement learned from.
-        carriage: posture statistics of its samples.
-        moments: indices of samples [n]; a slice means all.
+        statistics: posture statistics of its samples.
+        samples: indices of samples [n]; a slice means all.
     """
-    if isinstance(moments, slice):
-        return _all_rates(corpus, carriage)
-    chain = carriage.begins, carriage.ends, len(carriage.weights) - len(carriage.turn)
-    leaving, arriving = (steps_at(moments, ahead, *chain) for ahead in (True, False))
-    return _mean_rates(corpus, carriage, len(moments), [(at, steps) for at, _, steps in (leaving, arriving)])
+    if isinstance(samples, slice):
+        return _all_rates(corpus, statistics)
+    chain = statistics.begins, statistics.ends, len(statistics.weights) - len(statistics.turn)
+    leaving, arriving = (steps_at(samples, ahead, *chain) for ahead in (True, False))
+    return _mean_rates(corpus, statistics, len(samples), [(at, steps) for at, _, steps in (leaving, arriving)])
 
 
 @lru_cache(maxsize=1)
-def _all_rates(corpus: Corpus, carriage: Carriage) -> Rates:
+def _all_rates(corpus: Corpus, statistics: PostureStatistics) -> Rates:
     """Return the velocities in all of the corpus's samples."""
-    steps = np.arange(len(carriage.begins))
+    steps = np.arange(len(statistics.begins))
     return _mean_rates(
-        corpus, carriage, len(carriage.weights), [(at, steps) for at in (carriage.begins, carriage.ends)]
+        corpus, statistics, len(statistics.weights), [(at, steps) for at in (statistics.begins, statistics.ends)]
     )
 
 
-def _mean_rates(corpus: Corpus, carriage: Carriage, count: int, steps: Sequence[tuple[Ints, Ints]]) -> Rates:
+def _mean_rates(corpus: Corpus, statistics: PostureStatistics, count: int, steps: Sequence[tuple[Ints, Ints]]) -> Rates:
     """Return mean velocities in `count` samples; `steps` pairs the sample of each step with the step's index."""
-    moves, means = len(carriage.turn), []
+    moves, means = len(statistics.turn), []
     counts = np.bincount(np.concatenate([at for at, _ in steps]), minlength=count)
-    of_steps = [_velocities(corpus, carriage, numbers, moves) for _, numbers in steps]
+    of_steps = [_velocities(corpus, statistics, numbers, moves) for _, numbers in steps]
     for k in range(2):
         sums = np.zeros((count, *of_steps[0][k].shape[1:]))
         for (at, _), velocities in zip(steps, of_steps, strict=True):
@@ -102,8 +102,8 @@ def _mean_rates(corpus: Corpus, carriage: Carriage, count: int, steps: Sequence[
     return Rates.of_chains(means[0], means[1], len(corpus.skeleton))
 
 
-def _velocities(corpus: Corpus, carriage: Carriage, steps: Ints, moves: int) -> tuple[Floats, Floats]:
+def _velocities(corpus: Corpus, statistics: PostureStatistics, steps: Ints, moves: int) -> tuple[Floats, Floats]:
     """Return the velocities of the joint chains [m, L, 3] and of the root [m, 3] in the given steps."""
-    seconds, shown = 0.5 * corpus.moves.take(steps % moves).seconds[:, None], carriage.orientations
-    turned = rot.log(rot.inv_mul(shown[carriage.begins[steps]], shown[carriage.ends[steps]]))
-    return turned / seconds[..., None], carriage.travel[steps % moves] / seconds
+    seconds, shown = 0.5 * corpus.moves.take(steps % moves).seconds[:, None], statistics.orientations
+    turned = rot.log(rot.inv_mul(shown[statistics.begins[steps]], shown[statistics.ends[steps]]))
+    return turned / seconds[..., None], statistics.travel[steps % moves] / seconds

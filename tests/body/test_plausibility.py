@@ -10,7 +10,7 @@ from motionmind._typing import Floats
 from motionmind.body.capsules import penetration
 from motionmind.body.contact import lowest_height
 from motionmind.body.human import human23
-from motionmind.body.plausibility import CALM, GRAVITY, SEEN, floor_of, greatest, implausibility
+from motionmind.body.plausibility import CALM_MPS2, GRAVITY_MPS2, SEEN, floor_of, greatest, implausibility
 from motionmind.body.support import find_support
 from motionmind.geometry import rotations as rot
 
@@ -47,7 +47,7 @@ def test_a_body_at_rest_shows_nothing() -> None:
 @pytest.mark.parametrize("gravity", [1.0, 0.9, 0.5, 0.0, 1.5])
 def test_a_flight_lacks_what_it_lacks_of_gravity(gravity: float) -> None:
     rotations, root = standing()
-    heights = 3.0 * TIMES - 0.5 * gravity * GRAVITY * TIMES**2
+    heights = 3.0 * TIMES - 0.5 * gravity * GRAVITY_MPS2 * TIMES**2
     found = seen(rotations, raised(root, np.maximum(heights, 0.0)))
     assert found["flight"] == pytest.approx(1.0 - gravity, abs=0.01)
 
@@ -55,10 +55,10 @@ def test_a_flight_lacks_what_it_lacks_of_gravity(gravity: float) -> None:
 def test_a_flight_is_told_through_the_noise_of_single_frames() -> None:
     rotations, root = standing()
     noise = np.random.default_rng(0).normal(size=30) * 0.003
-    heights = 4.9 * TIMES - 0.5 * GRAVITY * TIMES**2 + noise
+    heights = 4.9 * TIMES - 0.5 * GRAVITY_MPS2 * TIMES**2 + noise
     frames = implausibility(BODY, rotations, raised(root, heights), FPS)
     assert abs(greatest(frames)[2]) < 0.2
-    assert greatest(frames)[1] > 1.5 * GRAVITY
+    assert greatest(frames)[1] > 1.5 * GRAVITY_MPS2
 
 
 def test_bounce_is_the_acceleration_of_the_mass() -> None:
@@ -79,7 +79,7 @@ def test_a_body_that_is_accelerated_need_not_be_in_balance() -> None:
     rotations, root = standing(left_hip=[-1.0, 0.0, 0.0], left_knee=[1.0, 0.0, 0.0])
     level = np.array([1.0, 0.0, 0.0])
     for share, calm in ((0.8, True), (1.2, False)):
-        swing = 0.5 * share * CALM * (TIMES - 0.5) ** 2
+        swing = 0.5 * share * CALM_MPS2 * (TIMES - 0.5) ** 2
         frames = implausibility(BODY, rotations, root + swing[:, None] * level, FPS)
         standing_still = np.abs(TIMES - 0.5) < 0.05  # elsewhere it is carried along, and stands on nothing
         assert np.isfinite(frames[standing_still, 0]).all() == calm

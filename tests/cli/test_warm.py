@@ -61,7 +61,7 @@ def reach_everything() -> None:
     for work in (
         warming.turn,
         warming.search,
-        warming.realise,
+        warming.synthesise,
         warming.film,
         warming.learn,
         warming.draw,

@@ -114,8 +114,8 @@ def test_what_is_made_both_ways_alike_costs_what_it_did(walks: list[list[int]], 
 
 def test_the_root_travels_back_as_it_came() -> None:
     engine = learned([walk("thread", [0, 1, 3])], reverse=1.0)
-    np.testing.assert_allclose(engine.carriage.travel[:, 0], 0.5 * np.array([1.0, 2.0, -1.0, -2.0]), atol=1e-12)
-    np.testing.assert_allclose(engine.carriage.travel[:, 1:], 0.0, atol=1e-12)
+    np.testing.assert_allclose(engine.statistics.travel[:, 0], 0.5 * np.array([1.0, 2.0, -1.0, -2.0]), atol=1e-12)
+    np.testing.assert_allclose(engine.statistics.travel[:, 1:], 0.0, atol=1e-12)
 
 
 def test_the_price_leaves_postures_and_how_joints_stand_together_alone() -> None:

@@ -27,7 +27,7 @@ from motionmind.errors import CorpusError
 from motionmind.executors.workshop import Workshop
 from motionmind.formats import write_motion
 from motionmind.geometry import rotations as rot
-from motionmind.learned import carriage, pace, persistence
+from motionmind.learned import pace, persistence, posture_statistics
 from motionmind.learned.learning import Learned, learn, learn_changed, learn_in, outside
 from motionmind.tween.engine import Engine
 
@@ -89,7 +89,7 @@ def test_in_any_order_it_is_as_if_it_were_built_so(
     """Each turn removes a dance that is there, or adds it at the end; what was known is taken as it was."""
     there = [0, 1]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(carriage, "MAX_FULL_SEARCH", 40 if trees else carriage.MAX_FULL_SEARCH)
+        patch.setattr(posture_statistics, "MAX_FULL_SEARCH", 40 if trees else posture_statistics.MAX_FULL_SEARCH)
         learned = learn_in(built(way).corpus, built(way).space)
         for dance in turns:
             if dance not in there:
@@ -103,7 +103,7 @@ def test_in_any_order_it_is_as_if_it_were_built_so(
                 continue
             afresh = learn_in(gathered([dances[number] for number in there], way), learned.space)
             learned = changed(learned, corpus)
-            assert (learned.carriage.trees is not None) == trees
+            assert (learned.statistics.trees is not None) == trees
             assert_learned_alike(learned, afresh)
 
 
@@ -126,7 +126,7 @@ def test_what_is_kept_is_not_measured_again(
 ) -> None:
     shown: list[str] = []
     measured: list[str] = []
-    show, measure = pace._show, carriage._measure_moments
+    show, measure = pace._show, posture_statistics._measure_samples
 
     def showing(corpus: Corpus, clip: Clip) -> object:
         shown.append(clip.name)
@@ -137,7 +137,7 @@ def test_what_is_kept_is_not_measured_again(
         return measure(corpus, workshop)
 
     monkeypatch.setattr(pace, "_show", showing)
-    monkeypatch.setattr(carriage, "_measure_moments", measuring)
+    monkeypatch.setattr(posture_statistics, "_measure_samples", measuring)
     before = built("on stage")
     added = changed(before, add_recordings(before.corpus, dances[2:3], flips="keep"))
     assert shown == measured == ["fondus"]

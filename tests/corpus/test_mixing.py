@@ -89,8 +89,8 @@ def test_how_long_a_move_takes_and_where_it_leads_is_weighed_alike(home: Home) -
     assert edges(engine, engine.grammar.transitions.seconds) == pytest.approx({(0, 1): 0.26, (1, 0): 0.5})
     visits = dict(zip(steps(engine), engine.grammar.transitions.visits[:2].tolist(), strict=True))
     assert visits == {0: 1.5, 1: 1.25}
-    np.testing.assert_allclose(engine.carriage.travel[:, 0], 0.5 * np.array([3.0, 1.0, -1.0]))
-    np.testing.assert_allclose(engine.carriage.weights, [1.0, 1.0, 0.25, 0.25, 0.25, 1.0, 0.25, 0.25])
+    np.testing.assert_allclose(engine.statistics.travel[:, 0], 0.5 * np.array([3.0, 1.0, -1.0]))
+    np.testing.assert_allclose(engine.statistics.weights, [1.0, 1.0, 0.25, 0.25, 0.25, 1.0, 0.25, 0.25])
 
 
 def test_the_movement_of_a_mix_goes_the_way_of_the_corpus_that_weighs_more(home: Home) -> None:
@@ -178,7 +178,7 @@ def assert_same_grammar(one: Engine, other: Engine) -> None:
     for part in ("transitions", "bridges", "coordination"):
         for name, array in vars(getattr(one.grammar, part)).items():
             np.testing.assert_allclose(getattr(getattr(other.grammar, part), name), array, rtol=1e-12, err_msg=name)
-    np.testing.assert_allclose(other.carriage.travel, one.carriage.travel, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(other.statistics.travel, one.statistics.travel, rtol=1e-12, atol=1e-12)
 
 
 def test_a_mix_of_mixes_remembers_where_each_clip_is_from(home: Home) -> None:

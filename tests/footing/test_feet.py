@@ -15,12 +15,12 @@ from motionmind.body.contact import foot_slide, limb_heights, lowest_height, ska
 from motionmind.body.human import human23
 from motionmind.body.limbs import limbs_of
 from motionmind.body.limits import within_limits
-from motionmind.body.plausibility import GRAVITY
+from motionmind.body.plausibility import GRAVITY_MPS2
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, find_support
 from motionmind.footing.root import stand
 from motionmind.geometry import rotations as rot
-from motionmind.synth.plan import STEP_HEIGHT_M
+from motionmind.solver.plan import STEP_HEIGHT_M
 
 LEGS = list(range(1, 9))
 
@@ -329,8 +329,8 @@ def test_a_body_that_is_to_be_in_the_air_gets_there_in_time_and_falls_freely() -
     heights = lowest_height(human23(), found, went)
     flying = np.flatnonzero(heights > 0.03)
     assert len(flying) == frames - flying[0]
-    assert (frames - 1 - flying[0]) / 30.0 == pytest.approx(np.sqrt(2.0 * 0.25 / GRAVITY), abs=0.06)
-    np.testing.assert_allclose(fall(found, went, slice(flying[0] + 1, None)), -GRAVITY, rtol=0.15)
+    assert (frames - 1 - flying[0]) / 30.0 == pytest.approx(np.sqrt(2.0 * 0.25 / GRAVITY_MPS2), abs=0.06)
+    np.testing.assert_allclose(fall(found, went, slice(flying[0] + 1, None)), -GRAVITY_MPS2, rtol=0.15)
     assert abs(went[-1, 1] - went[-2, 1]) * 30.0 < 0.5
     left, there = grounded(q, root, aloft=aloft, leap=0.25, without=("flight",))
     assert root[0, 1] - there[:, 1].min() < 0.02
@@ -349,7 +349,7 @@ def test_a_jump_on_the_way_lasts_as_long_as_its_height_asks() -> None:
     assert heights.max() == pytest.approx(0.2, abs=0.05)
     assert np.all(np.diff(flying) == 1)
     assert flying.mean() == pytest.approx(30.0, abs=2.0)
-    np.testing.assert_allclose(fall(found, went, slice(flying[0], flying[-1] - 1)), -GRAVITY, rtol=0.15)
+    np.testing.assert_allclose(fall(found, went, slice(flying[0], flying[-1] - 1)), -GRAVITY_MPS2, rtol=0.15)
     assert lowest_height(human23(), *grounded(q, root, aloft=aloft, leap=0.2, without=("flight",))).max() < 0.01
 
 
@@ -369,7 +369,7 @@ def test_a_body_with_fine_detail_falls_freely() -> None:
     arms = [human23().index(f"{side}_shoulder") for side in ("left", "right")]
     found, went = grounded(rot.mul(q, detail(frames, 0.1, arms)), root, aloft=aloft, leap=0.25)
     flying = np.flatnonzero(lowest_height(human23(), found, went) > 0.03)
-    assert np.mean(np.abs(fall(found, went, slice(flying[0] + 2, None)) + GRAVITY) < 0.2 * GRAVITY) > 0.9
+    assert np.mean(np.abs(fall(found, went, slice(flying[0] + 2, None)) + GRAVITY_MPS2) < 0.2 * GRAVITY_MPS2) > 0.9
 
 
 def test_an_end_in_the_air_shows_nothing_of_its_floor() -> None:
@@ -389,7 +389,7 @@ def test_an_end_as_high_as_some_jump_is_in_the_air_though_most_stand_so(high: fl
     heights = lowest_height(human23(), found, went)
     flying = np.flatnonzero(heights > 0.03)
     assert heights[: frames // 2].max() < 0.01
-    np.testing.assert_allclose(fall(found, went, slice(flying[0] + 1, None)), -GRAVITY, rtol=0.15)
+    np.testing.assert_allclose(fall(found, went, slice(flying[0] + 1, None)), -GRAVITY_MPS2, rtol=0.15)
 
 
 def test_an_end_higher_than_any_step_is_in_the_air_though_no_walk_is() -> None:
@@ -400,13 +400,13 @@ def test_an_end_higher_than_any_step_is_in_the_air_though_no_walk_is() -> None:
     heights = lowest_height(human23(), found, went)
     flying = np.flatnonzero(heights > 0.03)
     assert heights[: frames // 2].max() < 0.01
-    np.testing.assert_allclose(fall(found, went, slice(flying[0] + 1, None)), -GRAVITY, rtol=0.15)
+    np.testing.assert_allclose(fall(found, went, slice(flying[0] + 1, None)), -GRAVITY_MPS2, rtol=0.15)
 
 
 def test_an_end_a_little_higher_than_most_stand_shows_a_higher_floor() -> None:
     """It is nearer to the height at which most stand than to that of the jumps."""
     q, root, aloft = into_the_air(61, 0.14)
-    assert fall(*grounded(q, root, aloft=0.3 * aloft, leap=0.3), slice(None)).min() > -0.5 * GRAVITY
+    assert fall(*grounded(q, root, aloft=0.3 * aloft, leap=0.3), slice(None)).min() > -0.5 * GRAVITY_MPS2
 
 
 @pytest.mark.parametrize("high", [0.09, 0.11])
@@ -414,9 +414,9 @@ def test_an_end_as_high_as_some_jump_low_is_in_the_air(high: float) -> None:
     """Most stand so, but none of them so high."""
     q, root, aloft = into_the_air(61, high)
     falling = fall(*grounded(q, root, aloft=0.3 * aloft, leap=0.1), slice(-2, None))
-    np.testing.assert_allclose(falling, -GRAVITY, rtol=0.15)
+    np.testing.assert_allclose(falling, -GRAVITY_MPS2, rtol=0.15)
     # Where walks of either kind are about as high, as many as stand stand.
-    assert fall(*grounded(q, root, aloft=0.3 * aloft, leap=high + 0.15), slice(None)).min() > -0.5 * GRAVITY
+    assert fall(*grounded(q, root, aloft=0.3 * aloft, leap=high + 0.15), slice(None)).min() > -0.5 * GRAVITY_MPS2
 
 
 def test_a_foot_stays_on_the_floor_until_it_takes_off_though_detail_stretches_it() -> None:

@@ -10,7 +10,7 @@ import pytest
 from motionmind._typing import Bools, Floats
 from motionmind.body.contact import pose
 from motionmind.body.human import human23
-from motionmind.body.plausibility import GRAVITY
+from motionmind.body.plausibility import GRAVITY_MPS2
 from motionmind.footing.flight import SHORTEST_PUSH_OFF_S, Flight, find_falls, find_flights, flying_frames
 from motionmind.footing.root import stand
 from motionmind.geometry import rotations as rot
@@ -25,7 +25,7 @@ def test_rounding_errors_do_not_decide_in_which_frame_a_flight_begins() -> None:
         flight.start
         for height in heights
         for flight in find_flights(
-            aloft, np.full(41, height), np.ones(41), np.ones(2), (False, False), (None, None), GRAVITY, 30.0
+            aloft, np.full(41, height), np.ones(41), np.ones(2), (False, False), (None, None), GRAVITY_MPS2, 30.0
         )
     }
     assert begins == {8}
@@ -33,7 +33,7 @@ def test_rounding_errors_do_not_decide_in_which_frame_a_flight_begins() -> None:
 
 def test_flights_that_do_not_fit_are_shorter_or_none() -> None:
     still, leaps = np.full(31, 1.0), np.full(31, 0.3)
-    on_floor = (np.array([1.0, 1.0]), (False, False), (None, None), GRAVITY, 30.0)
+    on_floor = (np.array([1.0, 1.0]), (False, False), (None, None), GRAVITY_MPS2, 30.0)
     middle = np.zeros(31)
     middle[9:22] = 1.0
     (flight,) = find_flights(middle, leaps, still, *on_floor)
@@ -42,19 +42,19 @@ def test_flights_that_do_not_fit_are_shorter_or_none() -> None:
     assert all(one.end - one.start < 6 for one in short)
     # Between two postures in the air, so near that there is no time to land, all of it is flight.
     (whole,) = find_flights(
-        np.ones(13), leaps[:13], still[:13], np.array([1.2, 1.2]), (True, True), (None, None), GRAVITY, 30.0
+        np.ones(13), leaps[:13], still[:13], np.array([1.2, 1.2]), (True, True), (None, None), GRAVITY_MPS2, 30.0
     )
     assert (whole.start, whole.end) == (0, 12)
     first, last = find_flights(
-        np.ones(61), np.zeros(61), np.ones(61), np.array([1.2, 1.2]), (True, True), (None, None), GRAVITY, 30.0
+        np.ones(61), np.zeros(61), np.ones(61), np.array([1.2, 1.2]), (True, True), (None, None), GRAVITY_MPS2, 30.0
     )
     assert (first.start, last.end) == (0, 60)
-    assert first.end / 30.0 == pytest.approx(np.sqrt(0.4 / GRAVITY), abs=0.5 / 30.0)
+    assert first.end / 30.0 == pytest.approx(np.sqrt(0.4 / GRAVITY_MPS2), abs=0.5 / 30.0)
     # It comes down to the floor in a whole frame, and is as near the top of its flight as that allows.
     seconds, (rate, _) = first.end / 30.0, first.rates
     assert rate is not None
-    assert 1.2 + rate * seconds - 0.5 * GRAVITY * seconds**2 == pytest.approx(1.0)
-    assert abs(rate) < 0.5 * GRAVITY / 30.0
+    assert 1.2 + rate * seconds - 0.5 * GRAVITY_MPS2 * seconds**2 == pytest.approx(1.0)
+    assert abs(rate) < 0.5 * GRAVITY_MPS2 / 30.0
     assert last.rates[1] == pytest.approx(-rate)
 
 
@@ -63,15 +63,15 @@ def test_a_body_that_rises_in_a_or_falls_in_b_is_longer_in_the_air() -> None:
     calm, masses = np.zeros(61), np.array([1.5, 1.5])
     for rate in (-2.0, 0.5, 2.0):
         for hovering, rates, falls in (((True, False), (rate, None), rate), ((False, True), (None, rate), -rate)):
-            (flight,) = find_flights(calm, calm, np.ones(61), masses, hovering, rates, GRAVITY, 30.0)
-            seconds = (falls + np.sqrt(falls**2 + 2.0 * GRAVITY * 0.5)) / GRAVITY
+            (flight,) = find_flights(calm, calm, np.ones(61), masses, hovering, rates, GRAVITY_MPS2, 30.0)
+            seconds = (falls + np.sqrt(falls**2 + 2.0 * GRAVITY_MPS2 * 0.5)) / GRAVITY_MPS2
             assert (flight.end - flight.start) / 30.0 == pytest.approx(seconds, abs=1.0 / 30.0)
             assert flight.rates == rates
 
 
 def test_jumps_one_after_another_leave_time_to_land_and_push() -> None:
     flights = find_flights(
-        np.ones(121), np.full(121, 0.05), np.ones(121), np.ones(2), (False, False), (None, None), GRAVITY, 30.0
+        np.ones(121), np.full(121, 0.05), np.ones(121), np.ones(2), (False, False), (None, None), GRAVITY_MPS2, 30.0
     )
     assert len(flights) > 3
     assert all(after.start - before.end >= SHORTEST_PUSH_OFF_S * 30.0 - 1.0 for before, after in pairwise(flights))
@@ -96,7 +96,7 @@ def leap(floats: float = 0.0, frames: int = 31, takes_off: int = 8, lands: int =
             rotations[:, BODY.index(f"{side}_{joint}")] = rot.from_axis_angle([1.0, 0.0, 0.0], share * bends)
     root = stand(BODY, rotations, np.zeros((frames, 3)), np.zeros(frames))
     here, seconds = slice(takes_off, lands + 1), np.arange(lands - takes_off + 1) / FPS
-    rise = 0.5 * GRAVITY * seconds * (seconds[-1] - seconds)
+    rise = 0.5 * GRAVITY_MPS2 * seconds * (seconds[-1] - seconds)
     root[here, 1] = np.linspace(root[takes_off, 1], root[lands, 1], len(seconds)) + rise
     root[here, 1] += floats * np.sin(np.linspace(0.0, np.pi, len(seconds)))
     given = np.zeros(frames, dtype=np.bool_)

@@ -24,7 +24,7 @@ from motionmind.gaps.gaps import find_gaps
 from motionmind.gaps.sample import draw_pairs, solve_pairs
 from motionmind.gaps.transition import Transition, with_transitions
 from motionmind.geometry import rotations as rot
-from motionmind.realise.timeline import usual
+from motionmind.synthesis.timeline import usual
 from motionmind.tween.engine import Engine
 
 PAIRS = 6

@@ -1,4 +1,4 @@
-"""Trees over a corpus's moments: what they promise of their balls, and what is found by them."""
+"""Trees over a corpus's samples: what they promise of their balls, and what is found by them."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ def engine() -> Engine:
 
 @pytest.fixture(scope="module")
 def trees(engine: Engine) -> Neighbours:
-    return build_neighbours(engine.corpus.skeleton, engine.carriage.orientations, engine.carriage.weights)
+    return build_neighbours(engine.corpus.skeleton, engine.statistics.orientations, engine.statistics.weights)
 
 
 def distances(engine: Engine, part: np.ndarray, posture: np.ndarray) -> np.ndarray:
-    """Squared distances of all moments from a posture of a part [m, 4]."""
-    cosines = np.einsum("njc,jc->nj", engine.carriage.orientations[:, part], posture)
+    """Squared distances of all samples from a posture of a part [m, 4]."""
+    cosines = np.einsum("njc,jc->nj", engine.statistics.orientations[:, part], posture)
     return np.asarray(4.0 * np.maximum(1.0 - cosines**2, 0.0).mean(axis=1))
 
 
-def test_each_ball_holds_its_moments_and_their_weights(engine: Engine, trees: Neighbours) -> None:
-    count = len(engine.carriage.weights)
+def test_each_ball_holds_its_samples_and_their_weights(engine: Engine, trees: Neighbours) -> None:
+    count = len(engine.statistics.weights)
     assert np.diff(trees.bounds[(len(trees.bounds) - 1) // 2 :]).max() <= MAX_LEAF_SAMPLES
     for number, part in enumerate(trees.parts):
         order = trees.order[number]
@@ -45,7 +45,7 @@ def test_each_ball_holds_its_moments_and_their_weights(engine: Engine, trees: Ne
         for node, (start, stop) in enumerate(trees.bounds):
             off = distances(engine, part, centres[node])[order[start:stop]]
             assert np.sqrt(off.max()) <= trees.radii[number, node] + 1e-3  # of single precision
-            assert trees.weights[number, node] == pytest.approx(engine.carriage.weights[order[start:stop]].sum())
+            assert trees.weights[number, node] == pytest.approx(engine.statistics.weights[order[start:stop]].sum())
 
 
 def test_children_halve_their_parents() -> None:
@@ -62,7 +62,7 @@ def test_children_halve_their_parents() -> None:
 def test_in_all_leaves_the_nearest_are_found_and_in_a_few_nearly(
     engine: Engine, trees: Neighbours, coded: bool
 ) -> None:
-    rng, shown = np.random.default_rng(0), engine.carriage.orientations
+    rng, shown = np.random.default_rng(0), engine.statistics.orientations
     if not coded:
         trees = replace(trees, codes=trees.codes[:0])
     leaves, nearly = len(trees.bounds) // 2 + 1, []
@@ -106,7 +106,7 @@ def test_leaves_are_searched_in_the_order_of_what_they_promise(trees: Neighbours
 def test_centres_are_copied_for_searches_unless_they_are_large(
     engine: Engine, trees: Neighbours, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    copied, large, shown = replace(trees), replace(trees), engine.carriage.orientations
+    copied, large, shown = replace(trees), replace(trees), engine.statistics.orientations
     assert len(copied.centres_apart) == len(trees.parts)
     monkeypatch.setattr(neighbours, "MAX_COPIED_BYTES", 0)
     for number in range(len(trees.parts)):
@@ -118,10 +118,10 @@ def test_centres_are_copied_for_searches_unless_they_are_large(
             assert found[0] == found[1]
 
 
-def test_codes_are_of_what_the_moments_of_each_leaf_show(engine: Engine, trees: Neighbours) -> None:
+def test_codes_are_of_what_the_samples_of_each_leaf_show(engine: Engine, trees: Neighbours) -> None:
     for number, part in enumerate(trees.parts):
         for start, stop in trees.bounds[len(trees.bounds) // 2 :]:
-            shown = engine.carriage.orientations[trees.order[number, start:stop]][:, part]
+            shown = engine.statistics.orientations[trees.order[number, start:stop]][:, part]
             codes = trees.codes_of(number)[4 * len(part) * start : 4 * len(part) * stop]
             np.testing.assert_allclose(
                 codes.reshape(-1, stop - start).T / 127.0, shown.reshape(len(shown), -1), atol=4e-3
@@ -129,7 +129,7 @@ def test_codes_are_of_what_the_moments_of_each_leaf_show(engine: Engine, trees: 
 
 
 def test_postures_near_one_are_no_middles_of_moves(engine: Engine, trees: Neighbours) -> None:
-    count, shown = len(engine.corpus), engine.carriage.orientations
+    count, shown = len(engine.corpus), engine.statistics.orientations
     found = postures_near(trees, shown, shown[7], 5, count)
     assert found[0] == 7
     assert len(found) == 5
@@ -139,7 +139,7 @@ def test_postures_near_one_are_no_middles_of_moves(engine: Engine, trees: Neighb
 def test_what_was_learned_just_now_is_searched_by_the_loop_for_what_was_loaded(
     engine: Engine, trees: Neighbours
 ) -> None:
-    shown, loop = engine.carriage.orientations.copy(), cast(Any, nearest._leaves)
+    shown, loop = engine.statistics.orientations.copy(), cast(Any, nearest._leaves)
     loaded = shown.view()
     loaded.setflags(write=False)
     find_near(trees, 0, loaded, shown[:1], 5)
@@ -150,8 +150,8 @@ def test_what_was_learned_just_now_is_searched_by_the_loop_for_what_was_loaded(
 
 
 def test_trees_are_kept_with_the_corpus(engine: Engine, trees: Neighbours, tmp_path: Path, empty_cache: Path) -> None:
-    persistence.save(replace(engine, carriage=replace(engine.carriage, trees=trees)), tmp_path / "large")
-    loaded = persistence.load(str(tmp_path / "large")).carriage.trees
+    persistence.save(replace(engine, statistics=replace(engine.statistics, trees=trees)), tmp_path / "large")
+    loaded = persistence.load(str(tmp_path / "large")).statistics.trees
     assert loaded is not None
     for name, array in trees.arrays.items():
         np.testing.assert_array_equal(loaded.arrays[name], array)

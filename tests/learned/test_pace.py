@@ -71,9 +71,9 @@ def way(skeleton: Skeleton, turn: float = 0.0, travel: float = 0.0, facing: floa
     return way_between(still, Posture(skeleton, rotations, root))
 
 
-def expected(pace: Pace, way: Way, lull: float = 0.2) -> float:
+def expected(pace: Pace, way: Way, resting_speed: float = 0.2) -> float:
     """The median duration of movement between two such lulls."""
-    return float(pace.expected(way, (np.array(lull), np.array(lull))))
+    return float(pace.expected(way, (np.array(resting_speed), np.array(resting_speed))))
 
 
 def test_a_way_is_what_a_body_does_between_two_postures() -> None:
@@ -84,7 +84,7 @@ def test_a_way_is_what_a_body_does_between_two_postures() -> None:
     assert (float(there.turn), float(there.travel)) == (pytest.approx(0.4), pytest.approx(2.0))
 
 
-def test_still_moments_are_found_where_moves_meet() -> None:
+def test_still_samples_are_found_where_moves_meet() -> None:
     clip = reaches(human23(), [0.8, 1.2, 0.6, 1.0], [1.0, 1.0, 2.0, 2.0])
     np.testing.assert_allclose(find_still(way_of(clip).joints.mean(axis=1)), np.cumsum([24, 36, 18]), atol=4)
 
@@ -96,13 +96,13 @@ def test_a_level_stretch_is_still_once_in_its_middle_and_only_where_it_is_slower
 
 
 @given(st.lists(st.sampled_from([0.0, 0.01, 0.02, 0.05]), max_size=60))
-def test_still_moments_are_the_peaks_that_scipy_finds(steps: list[float]) -> None:
+def test_still_samples_are_the_peaks_that_scipy_finds(steps: list[float]) -> None:
     expected = find_peaks(-np.round(_smooth(np.array(steps)), 9))[0]
     np.testing.assert_array_equal(find_still(np.array(steps)), expected)
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-def test_still_moments_do_not_hang_on_rounding(seed: int) -> None:
+def test_still_samples_do_not_hang_on_rounding(seed: int) -> None:
     """Joints of keyframed movement turn evenly from key to key: whether one step is less than the next is chance."""
     chance = np.random.default_rng(seed)
     lasts = chance.integers(20, 60, size=6)
@@ -166,23 +166,24 @@ def rests_and_runs() -> Motion:
     )
 
 
-def test_the_lulls_are_the_speeds_of_the_still_moments_around() -> None:
+def test_the_lulls_are_the_speeds_of_the_still_samples_around() -> None:
     clip = rests_and_runs()
     corpus = gather("lulls", [clip], rate=10.0)
-    lulls, speeds = learn_pace(corpus).lulls, SAMPLED_FPS * way_of(clip).joints.mean(axis=1)
+    resting_speeds, speeds = learn_pace(corpus).resting_speeds, SAMPLED_FPS * way_of(clip).joints.mean(axis=1)
     resting = corpus.times < 15.0
     running = corpus.times > 20.0
-    assert lulls[resting].max() < 0.2 * lulls[running].min()
-    assert lulls[resting].max() < 0.5  # also in the middle of a movement, where the body is fast
-    assert lulls[running].min() < speeds[600:].mean() / speeds.mean()
+    assert resting_speeds[resting].max() < 0.2 * resting_speeds[running].min()
+    assert resting_speeds[resting].max() < 0.5  # also in the middle of a movement, where the body is fast
+    assert resting_speeds[running].min() < speeds[600:].mean() / speeds.mean()
 
 
 def test_it_takes_no_longer_in_the_midst_of_quick_movement() -> None:
     pace, there = learned(reaches(human23(), [0.8, 1.2] * 9, [0.7, 1.4] * 9)), way(human23(), turn=1.0)
-    taken = [expected(pace, there, lull) for lull in np.linspace(0.0, 3.0, 9)]
+    taken = [expected(pace, there, resting_speed) for resting_speed in np.linspace(0.0, 3.0, 9)]
     assert np.all(np.diff(taken) < 0.0)
     one, other = (
-        pace.expected(there, lulls) for lulls in ((np.array(0.1), np.array(1.0)), (np.array(1.0), np.array(0.1)))
+        pace.expected(there, resting_speeds)
+        for resting_speeds in ((np.array(0.1), np.array(1.0)), (np.array(1.0), np.array(0.1)))
     )
     assert one == other
 
@@ -192,13 +193,13 @@ def test_a_posture_has_the_lull_of_those_that_are_like_it() -> None:
     pace, shown = learn_pace(corpus), corpus.to_chains(corpus.rotations)[:, : len(corpus.skeleton)]
     numbers = np.array([40, 90, len(corpus) - 50])
     signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(3, len(corpus.skeleton), 1))
-    found = pace.lulls_of(signs * shown[numbers], shown)  # q and -q are one orientation
-    for lull, number in zip(found, numbers, strict=True):
+    found = pace.resting_speeds_of(signs * shown[numbers], shown)  # q and -q are one orientation
+    for resting_speed, number in zip(found, numbers, strict=True):
         alike = np.argsort(np.sum(rot.angle(shown, shown[number]) ** 2, axis=1), kind="stable")[:5]
-        assert pace.lulls[alike].min() - 1e-9 <= lull <= pace.lulls[alike].max() + 1e-9
+        assert pace.resting_speeds[alike].min() - 1e-9 <= resting_speed <= pace.resting_speeds[alike].max() + 1e-9
     assert found[2] > 3.0 * found[0]
-    few = replace(pace, lulls=pace.lulls[:2])
-    assert np.isfinite(few.lulls_of(shown[:1], shown[:2])).all()
+    few = replace(pace, resting_speeds=pace.resting_speeds[:2])
+    assert np.isfinite(few.resting_speeds_of(shown[:1], shown[:2])).all()
 
 
 def test_nothing_is_learned_of_durations_from_what_was_reconstructed() -> None:

@@ -104,12 +104,12 @@ def test_one_family_and_families_that_disagree_tell_nothing() -> None:
 @pytest.fixture(scope="module")
 def engine() -> Engine:
     known = Engine.load("hands")
-    trust = replace(known.carriage.trust, table=np.linspace(0.9, 0.1, 5), lasts=np.array([0.3]))
-    return replace(known, carriage=replace(known.carriage, trust=trust))
+    trust = replace(known.statistics.trust, table=np.linspace(0.9, 0.1, 5), lasts=np.array([0.3]))
+    return replace(known, statistics=replace(known.statistics, trust=trust))
 
 
 def test_trust_is_kept_with_the_corpus(engine: Engine, tmp_path: Path, empty_cache: Path) -> None:
     persistence.save(engine, tmp_path / "kept")
-    loaded = persistence.load(str(tmp_path / "kept")).carriage.trust
+    loaded = persistence.load(str(tmp_path / "kept")).statistics.trust
     for name in ("table", "lasts", "spread"):
-        np.testing.assert_array_equal(getattr(loaded, name), getattr(engine.carriage.trust, name))
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(engine.statistics.trust, name))

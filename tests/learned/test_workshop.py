@@ -21,7 +21,7 @@ from motionmind.errors import SkeletonError
 from motionmind.executors import workshop as workshops
 from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot
-from motionmind.learned import carriage, validity
+from motionmind.learned import posture_statistics, validity
 from motionmind.learned.learning import learn
 from motionmind.learned.percentiles import Percentile
 
@@ -46,7 +46,7 @@ def test_what_is_learned_depends_neither_on_workers_nor_on_room(
     workers: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     kind = Codebook(20.0, {"hip": 10.0})
-    monkeypatch.setattr(carriage, "MAX_FULL_SEARCH", 100)  # so that there are trees
+    monkeypatch.setattr(posture_statistics, "MAX_FULL_SEARCH", 100)  # so that there are trees
     plain = learn(gather("dances", dances(), mirror=True), kind)
     monkeypatch.setattr(workshops, "MAPPED_BYTES", 0)
     workshop = Workshop.of(workers, tmp_path)

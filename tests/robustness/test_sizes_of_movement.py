@@ -14,7 +14,7 @@ from bounded_runs import run_bounded
 
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion
-from motionmind.body.rates import MOST_PLACES
+from motionmind.body.rates import MAX_POSITIONS
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.files import parse_toml
 from motionmind.formats import read_motion, write_motion
@@ -25,7 +25,7 @@ from motionmind.render.timing import MIN_FPS, film_rate, frame_times
 pytestmark = pytest.mark.long
 
 BODY = human23()
-MOST_FRAMES = MOST_PLACES // len(BODY)
+MOST_FRAMES = MAX_POSITIONS // len(BODY)
 
 
 def bvh(folder: Path, joints: int, frames: int, step: float) -> Path:

@@ -21,8 +21,8 @@ from motionmind.errors import MotionMindError, NoPathError
 from motionmind.formats import read_posture
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
-from motionmind.realise import reference
 from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS
+from motionmind.synthesis import reference
 from motionmind.tween.engine import Engine
 from motionmind.tween.modes import N_COMPARED, Modes, find_place
 from motionmind.tween.result import Tween

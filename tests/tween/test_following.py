@@ -14,9 +14,9 @@ from motionmind.body.limbs import parts_of
 from motionmind.body.motion import Posture
 from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
-from motionmind.realise.bending import FREE_PULL_RATIO
-from motionmind.realise.realise import realise
-from motionmind.realise.wishes import Style, Wishes
+from motionmind.synthesis.bending import FREE_PULL_RATIO
+from motionmind.synthesis.synthesise import synthesise
+from motionmind.synthesis.wishes import Style, Wishes
 from motionmind.tween.engine import FOLLOWED_SLACK_DEG, Engine
 from motionmind.tween.result import Tween
 
@@ -158,8 +158,10 @@ def test_other_states_on_the_way_are_another_motion(ballet: Engine) -> None:
             shuffled[1:-1, chain] = rng.integers(0, size, 5)
         tolerances = np.radians(ballet.space.tolerances)
         none = np.zeros(len(tolerances), dtype=np.bool_)
-        style = Style(ballet.corpus, ballet.grammar, ballet.carriage, tolerances)
-        motions = [realise(path, style, Wishes(a, b, none, none, 30.0, 2.4)).motion for path in (tween.path, shuffled)]
+        style = Style(ballet.corpus, ballet.grammar, ballet.statistics, tolerances)
+        motions = [
+            synthesise(path, style, Wishes(a, b, none, none, 30.0, 2.4)).motion for path in (tween.path, shuffled)
+        ]
         apart = np.degrees(rot.angle(*(motion.rotations for motion in motions)))
         assert apart[20:-20].max(axis=0).mean() > 10.0
         at = [ballet.corpus.to_chains(motion.at(motion.insertions[0].times).rotations) for motion in motions]

@@ -11,7 +11,7 @@ import pytest
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.geometry import rotations as rot
-from motionmind.realise.timeline import usual
+from motionmind.synthesis.timeline import usual
 from motionmind.tween.ends import bring_ends
 from motionmind.tween.engine import Engine
 from motionmind.tween.formulate import Formulation, formulate
@@ -88,7 +88,7 @@ def test_the_guide_is_about_what_walks_expect(engine: Engine) -> None:
     moves, (a, b) = 6, ends(engine)
     seconds = usual(engine.grammar.transitions)
     stops = {0: stop_at(engine.corpus, a), moves: stop_at(engine.corpus, b)}
-    expected = expect(engine.corpus, engine.carriage, stops, np.linspace(0.0, moves * seconds, 2 * moves + 1))
+    expected = expect(engine.corpus, engine.statistics, stops, np.linspace(0.0, moves * seconds, 2 * moves + 1))
     chains = expected.chains(engine.corpus, seconds * np.arange(1, moves))
     found, starts = guide_of(engine, moves, guide=0.7, liveliness=0.0), engine.space.starts
     assert found.shape == (moves - 1, starts[-1])

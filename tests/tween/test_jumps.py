@@ -11,11 +11,11 @@ from motionmind import Engine, Motion, Posture
 from motionmind._typing import Bools, Floats
 from motionmind.body.contact import lowest_height, pose
 from motionmind.body.human import human23
-from motionmind.body.plausibility import GRAVITY
+from motionmind.body.plausibility import GRAVITY_MPS2
 from motionmind.body.support import centre_of_mass
 from motionmind.footing.flight import SHORTEST_PUSH_OFF_S, find_falls
 from motionmind.geometry import rotations as rot
-from motionmind.realise.retime import LEAP_JOINT_SPEED_RATIO, jump_in_time, land_between, slower_steps
+from motionmind.synthesis.retime import LEAP_JOINT_SPEED_RATIO, jump_in_time, land_between, slower_steps
 
 BODY, FPS = human23(), 30.0
 CROUCH = 0.5  # metres: no leap begins or ends deeper, by the pelvis; in a split it is at 0.3
@@ -62,7 +62,7 @@ def check_leap(motion: Motion) -> None:
     fps = (len(motion) - 1) / motion.times[-1]
     falls = -(fps**2) * np.diff(mass[:, 1], 2)[off_floor(motion)]
     assert len(falls) > 1
-    assert np.abs(falls / GRAVITY - 1.0).max() < 0.2
+    assert np.abs(falls / GRAVITY_MPS2 - 1.0).max() < 0.2
     assert motion.root[:, 1].min() > CROUCH
 
 
@@ -97,7 +97,9 @@ def test_who_leaves_in_the_air_at_a_velocity_goes_on_with_it(ballet: Engine, num
     rates = FPS * np.diff(mass[:, 1])
     falling = np.flatnonzero(off_floor(motion))
     assert len(falling) > 2
-    assert np.mean(np.abs(FPS * np.diff(rates)[falling] / GRAVITY + 1.0) < 0.3) > 0.75  # legs whip down from a split
+    assert (
+        np.mean(np.abs(FPS * np.diff(rates)[falling] / GRAVITY_MPS2 + 1.0) < 0.3) > 0.75
+    )  # legs whip down from a split
     assert falling.max() < 0.6 * FPS  # it comes down, and does not hover
     gone = FPS * (recorded.root[frame, 1] - recorded.root[frame - 1, 1])
     assert FPS * (motion.root[1, 1] - motion.root[0, 1]) == pytest.approx(gone, abs=0.7)
@@ -119,7 +121,7 @@ def test_legs_that_come_down_fast_do_not_hide_a_fall(ballet: Engine) -> None:
 def test_who_is_in_the_air_twice_has_the_time_to_come_down(moving: tuple[bool, bool]) -> None:
     seconds = np.full(12, 0.05)
     longer = land_between(seconds, np.array([0.25, 0.5]), 1.0, moving)
-    falls = np.sqrt(2.0 * 0.25 / GRAVITY) + np.sqrt(2.0 * 0.5 / GRAVITY)
+    falls = np.sqrt(2.0 * 0.25 / GRAVITY_MPS2) + np.sqrt(2.0 * 0.5 / GRAVITY_MPS2)
     assert float(longer @ seconds) > falls + 2.0 * SHORTEST_PUSH_OFF_S
     assert longer.min() >= 1.0
     assert (longer[0] < 1.2 * longer.min()) == moving[0] or not any(moving)
@@ -213,7 +215,7 @@ def test_a_walk_into_the_air_takes_as_long_as_the_fall_from_there(fastest: float
     mass = centre_of_mass(BODY, poses, still)
     assert mass is not None
     high = mass[:, 1] - lowest_height(BODY, poses, still)
-    fall = np.sqrt(2.0 * (high[-1] + 1.0 - high[rises[0]]) / GRAVITY)
+    fall = np.sqrt(2.0 * (high[-1] + 1.0 - high[rises[0]]) / GRAVITY_MPS2)
     assert 0.2 * float(slow[jumps].sum()) == pytest.approx(fall)
     # Legs hurry, and no faster than they may.
     turn = np.abs(np.diff(np.linspace(0.0, 1.0, SPLIT)))[jumps].sum() * 0.45 * np.pi

@@ -18,8 +18,8 @@ from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
 from motionmind.formats import read_posture
 from motionmind.geometry import rotations as rot
 from motionmind.learned.pace import way_between, way_of
-from motionmind.realise.detour import detour
-from motionmind.realise.retime import JOINT_SPEED_RATIO
+from motionmind.synthesis.detour import detour
+from motionmind.synthesis.retime import JOINT_SPEED_RATIO
 from motionmind.tween.engine import Engine
 from motionmind.tween.pacing import usual_times
 from motionmind.tween.report import read_report
@@ -295,7 +295,7 @@ def test_a_detour_goes_on_from_its_beginning_and_comes_to_its_end_as_the_corpus_
     clip = max(corpus.clips, key=len)
     chains = corpus.to_chains(corpus.rotations)
     first, last = clip.start, clip.stop - 1
-    path = detour(corpus, engine.carriage, (chains[first], chains[last]), 12, 4)
+    path = detour(corpus, engine.statistics, (chains[first], chains[last]), 12, 4)
     assert path.shape == (13, joints, 4)
     shown = chains[:, :joints]
     off = [float(rot.angle(shown, pose).mean(axis=1).min()) for pose in path]

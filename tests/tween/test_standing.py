@@ -215,7 +215,7 @@ def test_a_body_with_nowhere_to_go_stays_where_it_is(name: str, row: int) -> Non
 
 def test_a_body_in_the_air_lands_and_jumps_where_there_is_time() -> None:
     engine = engine_of("ballet")
-    leaps = engine.carriage.aloft[: len(engine.corpus)] * engine.carriage.clearance[: len(engine.corpus)]
+    leaps = engine.statistics.aloft[: len(engine.corpus)] * engine.statistics.clearance[: len(engine.corpus)]
     here = posture(engine, int(np.abs(leaps - 0.25).argmin()))
     motion = engine.tween(here, here, duration=1.5).motion
     low = lowest_height(motion.skeleton, motion.rotations, motion.root)

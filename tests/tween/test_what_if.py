@@ -17,10 +17,10 @@ from motionmind.bundled import bundled
 from motionmind.cli.printing import format_what_if
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_posture
-from motionmind.realise.timeline import usual
 from motionmind.search.length import choose_length
 from motionmind.search.solve import solve
 from motionmind.search.tolerances import OPTIMAL_WITHIN_NATS
+from motionmind.synthesis.timeline import usual
 from motionmind.tween.engine import Engine
 from motionmind.tween.report import read_report
 from motionmind.tween.request import TweenRequest

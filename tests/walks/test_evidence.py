@@ -14,7 +14,7 @@ from motionmind.body.motion import Motion
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
 from motionmind.geometry import rotations as rot
-from motionmind.learned.carriage import learn_carriage
+from motionmind.learned.posture_statistics import learn_posture_statistics
 from motionmind.learned.trust import PRIOR_TRUST, Squares, fit_table
 from motionmind.walks import evidence
 from motionmind.walks.evidence import (
@@ -58,7 +58,7 @@ def repeated(seed: int = 1) -> Corpus:
 
 def test_a_corpus_whose_clips_go_the_short_way_trusts_no_walk() -> None:
     corpus = straight()
-    found = gather_evidence(corpus, learn_carriage(corpus), 24)
+    found = gather_evidence(corpus, learn_posture_statistics(corpus), 24)
     table = fit_table(found, PRIOR_TRUST.table)
     known = np.diag(Squares.summed(found).inner)
     told = known > 1e-2 * known.max()
@@ -68,15 +68,15 @@ def test_a_corpus_whose_clips_go_the_short_way_trusts_no_walk() -> None:
 
 def test_a_corpus_with_a_repeated_phrase_trusts_its_walks() -> None:
     corpus = repeated()
-    trust = learn_trust(corpus, learn_carriage(corpus))
+    trust = learn_trust(corpus, learn_posture_statistics(corpus))
     assert trust.table[0] > 0.9
-    found = gather_evidence(corpus, learn_carriage(corpus), 12)
+    found = gather_evidence(corpus, learn_posture_statistics(corpus), 12)
     assert fit_table(found, np.zeros(5))[0] > 0.9
 
 
 def test_what_is_learned_is_the_same_each_time() -> None:
     corpus = repeated()
-    one, other = (learn_trust(corpus, learn_carriage(corpus)) for _ in range(2))
+    one, other = (learn_trust(corpus, learn_posture_statistics(corpus)) for _ in range(2))
     for name in ("table", "lasts", "spread"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
@@ -84,11 +84,11 @@ def test_what_is_learned_is_the_same_each_time() -> None:
 @pytest.mark.parametrize("names", [["alone"], ["take.1", "take.2"], ["take", "take (2)"]])
 def test_a_single_take_tells_nothing_of_itself(names: list[str]) -> None:
     corpus = gather("one", [clip(postures(FRAMES, seed), name) for seed, name in enumerate(names)])
-    carriage = learn_carriage(corpus)
-    assert gather_evidence(corpus, carriage, 12) == []
-    trust = learn_trust(corpus, carriage)
+    statistics = learn_posture_statistics(corpus)
+    assert gather_evidence(corpus, statistics, 12) == []
+    trust = learn_trust(corpus, statistics)
     np.testing.assert_array_equal(trust.table, PRIOR_TRUST.table)
-    np.testing.assert_array_equal(trust.spread, spread_of(corpus, carriage))
+    np.testing.assert_array_equal(trust.spread, spread_of(corpus, statistics))
 
 
 def test_mirrored_copies_are_left_out_with_their_clip() -> None:
@@ -103,7 +103,7 @@ def test_the_rest_of_a_corpus_is_as_if_it_had_been_gathered_alone(reverse: float
     clips = [clip(postures(FRAMES, seed), name) for seed, name in enumerate("abc")]
     corpus, alone = gather("all", clips, reverse=reverse), gather("all", clips[::2], reverse=reverse)
     pieces = [piece for piece in evidence._pieces(corpus) if piece.family[1] != "b"]
-    found, same = restrict(corpus, learn_carriage(corpus), pieces), learn_carriage(alone)
+    found, same = restrict(corpus, learn_posture_statistics(corpus), pieces), learn_posture_statistics(alone)
     for name in ("orientations", "weights", "begins", "ends", "shares", "turn", "travel"):
         np.testing.assert_allclose(getattr(found, name), getattr(same, name), atol=1e-12, err_msg=name)
 
@@ -115,10 +115,10 @@ def test_large_corpora_are_sampled_in_pieces(monkeypatch: pytest.MonkeyPatch) ->
     pieces = evidence._pieces(corpus)
     assert 4 <= len(pieces) < len(corpus.clips)
     assert sum(piece.stop - piece.start for piece in pieces) <= 64
-    own = restrict(corpus, learn_carriage(corpus), pieces)
+    own = restrict(corpus, learn_posture_statistics(corpus), pieces)
     left = np.unique(own.begins)
     np.testing.assert_allclose(np.bincount(own.begins, own.shares)[left], 1.0)
-    assert len(gather_evidence(corpus, learn_carriage(corpus), 12)) > 1
+    assert len(gather_evidence(corpus, learn_posture_statistics(corpus), 12)) > 1
 
 
 @pytest.mark.parametrize("slows", [0.3, 0.7])
@@ -140,6 +140,6 @@ def test_velocities_last_as_long_as_in_the_clips(slows: float) -> None:
 
 def test_a_corpus_without_time_for_windows_takes_the_prior() -> None:
     corpus = gather("brief", [clip(postures(2, seed), name) for seed, name in enumerate("abc")])
-    trust = learn_trust(corpus, learn_carriage(corpus))
+    trust = learn_trust(corpus, learn_posture_statistics(corpus))
     np.testing.assert_array_equal(trust.table, PRIOR_TRUST.table)
     np.testing.assert_array_equal(trust.lasts, PRIOR_TRUST.lasts)

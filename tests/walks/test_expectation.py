@@ -16,7 +16,7 @@ from motionmind.walks.expectation import Expectation, expect
 from motionmind.walks.headings import turn_with_walks
 from motionmind.walks.mean_walk import _without_ends
 from motionmind.walks.minimal import END_VELOCITY_DECAY_S, minimal_movement
-from motionmind.walks.stops import Rates, Stop, moments_rates, stop_at
+from motionmind.walks.stops import Rates, Stop, sample_rates, stop_at
 
 CORPORA = ["ballet", "karate", "walk-hexapod"]  # stage and free, people and insects
 STEPS = 6
@@ -38,7 +38,7 @@ def clip_of(engine: Engine) -> Motion:
 
 def expected(engine: Engine, stops: dict[int, Stop], path: Floats | None = None) -> Expectation:
     half_steps = np.linspace(0.0, max(stops) * float(np.median(engine.corpus.seconds)), 2 * max(stops) + 1)
-    return expect(engine.corpus, engine.carriage, stops, half_steps, path)
+    return expect(engine.corpus, engine.statistics, stops, half_steps, path)
 
 
 def chains_at(engine: Engine, found: Expectation) -> Floats:
@@ -66,7 +66,7 @@ def test_stops_are_met_exactly(engine: Engine) -> None:
     for move, stop in stops.items():
         assert rot.angle(chains[2 * move], stop.chains).max() < 1e-6
     assert np.isfinite(chains).all()
-    np.testing.assert_allclose(found.moments.sum(axis=1), 1.0)
+    np.testing.assert_allclose(found.samples.sum(axis=1), 1.0)
     np.testing.assert_allclose(found.moves.sum(axis=1), 1.0)
 
 
@@ -142,7 +142,7 @@ def test_a_path_draws_the_walks_to_it(engine: Engine) -> None:
 def test_velocities_choose_among_walks(engine: Engine) -> None:
     """A posture with the velocity that it was recorded with, and against it: walks go on as it moved there."""
     corpus, clip = engine.corpus, clip_of(engine)
-    rates = moments_rates(corpus, engine.carriage)
+    rates = sample_rates(corpus, engine.statistics)
     last = stop_at(corpus, far_off(engine, 5))
 
     def likely(row: int, sign: float, which: str) -> float:
@@ -150,7 +150,7 @@ def test_velocities_choose_among_walks(engine: Engine) -> None:
         own = {"joints": rates.joints[row], "turn": rates.turn[row], "travel": rates.travel[row]}
         own[which] = sign * own[which]
         stop = stop_at(corpus, clip.posture(row))._replace(rates=Rates(**own))
-        return float(expected(engine, {0: stop, STEPS: last}).moments[0, row])
+        return float(expected(engine, {0: stop, STEPS: last}).samples[0, row])
 
     inner = slice(2, len(clip) - 2)
     speeds = {
@@ -175,11 +175,11 @@ def spinning(engine: Engine, posture: Posture, turn: float, seed: int) -> Stop:
 def test_headings_are_those_of_the_walks_or_of_the_body_where_it_has_its_own(engine: Engine) -> None:
     clip = clip_of(engine)
     stops = {0: spinning(engine, clip.posture(3), 0.7, 8), STEPS: spinning(engine, clip.posture(9), -1.3, 9)}
-    found, carriage = expected(engine, stops), engine.carriage
+    found, statistics = expected(engine, stops), engine.statistics
     if engine.corpus.facing == "stage":
         np.testing.assert_allclose(found.headings, rot.heading(found.poses[:, 0]), atol=1e-12)
         return
-    turn, spread = (found.moves @ moved for moved in (carriage.turn, carriage.turn**2))
+    turn, spread = (found.moves @ moved for moved in (statistics.turn, statistics.turn**2))
     facing = {move: stop.chains[-1] for move, stop in stops.items()}
     by_hand = turn_with_walks(turn, spread, found.trust[:, 0], found.half_steps, facing, (0.7, -1.3))
     np.testing.assert_allclose(found.headings, by_hand, atol=1e-12)
@@ -194,25 +194,25 @@ def test_far_from_the_corpus_joints_go_on_as_they_move_at_the_ends(engine: Engin
         ends = [stop if moves else stop._replace(rates=None) for stop, moves in zip(both, (first, last), strict=True)]
         found = expected(engine, {0: ends[0], STEPS: ends[1]})
         rates = [None if end.rates is None else end.rates.joints for end in ends]
-        decay = float(engine.carriage.trust.lasts[0])
+        decay = float(engine.statistics.trust.lasts[0])
         wanted = minimal_movement(np.stack([end.chains[:joints] for end in ends]), found.half_steps, *rates, decay)
         still = minimal_movement(np.stack([end.chains[:joints] for end in ends]), found.half_steps, None, None)
         assert rot.angle(found.poses, wanted).max() < 0.15 * rot.angle(still, wanted).max()
 
 
 def test_walks_use_both_end_velocities(engine: Engine) -> None:
-    """Each changes how likely moments are there, beside the other too."""
+    """Each changes how likely samples are there, beside the other too."""
     clip = clip_of(engine)
     a, b = spinning(engine, clip.posture(3), 0.7, 8), spinning(engine, clip.posture(9), -1.3, 9)
-    moments = expected(engine, {0: a, STEPS: b}).moments
+    samples = expected(engine, {0: a, STEPS: b}).samples
     for ends, at in (({0: a._replace(rates=None), STEPS: b}, 0), ({0: a, STEPS: b._replace(rates=None)}, -1)):
-        assert np.abs(expected(engine, ends).moments[at] - moments[at]).sum() > 0.01
+        assert np.abs(expected(engine, ends).samples[at] - samples[at]).sum() > 0.01
 
 
-def test_velocities_of_moments_are_those_of_the_chains(engine: Engine) -> None:
+def test_velocities_of_samples_are_those_of_the_chains(engine: Engine) -> None:
     """In the middle of a move, those of the move; and a stop's are those with which its chains turn."""
-    corpus, carriage = engine.corpus, engine.carriage
-    rates, seconds = moments_rates(corpus, carriage), corpus.moves.seconds
+    corpus, statistics = engine.corpus, engine.statistics
+    rates, seconds = sample_rates(corpus, statistics), corpus.moves.seconds
     begins, ends = corpus.moves.begins, corpus.moves.ends
     chains, middles = corpus.to_chains(corpus.rotations), len(corpus) + np.arange(len(seconds))
     joints = len(corpus.skeleton)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from motionmind._typing import Floats
-from motionmind.body.contact import RATE
+from motionmind.body.contact import CONTACT_FPS
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion
 from motionmind.corpus.corpus import Corpus
@@ -58,7 +58,7 @@ def check_order(corpus: Corpus, found: Frames) -> None:
     for stretch in range(int(found.stretches[-1]) + 1):
         own = found.stretches == stretch
         assert len(set(clips[own])) == 1
-        np.testing.assert_allclose(np.diff(found.times[own]), 1.0 / RATE, atol=1e-3 / RATE + 1e-9)
+        np.testing.assert_allclose(np.diff(found.times[own]), 1.0 / CONTACT_FPS, atol=1e-3 / CONTACT_FPS + 1e-9)
     assert set(np.diff(found.stretches)) <= {0, 1}
     after = np.minimum(found.postures + 1, corpus.columns.starts[clips + 1] - 1)
     assert np.all(corpus.times[found.postures] <= found.times + 2e-6)
@@ -68,7 +68,7 @@ def check_order(corpus: Corpus, found: Frames) -> None:
 def check_rates(found: Frames) -> None:
     """Check that rates lead from each frame to the next of its stretch."""
     goes_on = np.flatnonzero(np.diff(found.stretches) == 0)
-    reached = rot.mul(found.chains[goes_on], rot.exp(found.rates[goes_on] / RATE))
+    reached = rot.mul(found.chains[goes_on], rot.exp(found.rates[goes_on] / CONTACT_FPS))
     assert rot.angle(reached, found.chains[goes_on + 1]).max() < 1e-7
 
 
@@ -94,7 +94,7 @@ def test_keyframes_are_joined_by_splines(facing: str, ballet: Engine) -> None:
         shown = rotation_spline(corpus.times[knots], corpus.rotations[knots], found.times[own])
         assert rot.angle(found.chains[own], corpus.to_chains(shown)).max() < 1e-6
         assert found.times[own][0] == corpus.times[knots][0]
-        assert corpus.times[knots][-1] - found.times[own][-1] < 1.0 / RATE
+        assert corpus.times[knots][-1] - found.times[own][-1] < 1.0 / CONTACT_FPS
 
 
 def test_even_turning_has_constant_velocity() -> None:
@@ -128,7 +128,7 @@ def test_a_part_of_a_clip_is_as_in_the_whole(cmu05: Engine, ballet: Engine) -> N
             check_rates(found)
             assert corpus.times[found.postures[0]] == found.times[0]
             assert found.times[0] <= begin
-            assert found.times[-1] >= end - 1.0 / RATE
+            assert found.times[-1] >= end - 1.0 / CONTACT_FPS
             assert begin - found.times[0] < np.diff(times).max()
             if corpus.detail.shape[1]:
                 whole = all_frames(corpus)
@@ -152,17 +152,17 @@ def test_a_part_beyond_a_clip_ends_with_it() -> None:
 
 
 def test_frames_near_postures_are_whole_runs_with_these_in_them(ballet: Engine) -> None:
-    corpus, carriage = ballet.corpus, ballet.carriage
-    assert carriage.trees is None
-    assert frames_near(corpus, carriage, carriage.orientations[:1]) is all_frames(corpus)
-    trees = build_neighbours(corpus.skeleton, carriage.orientations, carriage.weights)
-    poses = carriage.orientations[[5, 812, 2104]]
-    found = frames_near(corpus, replace(carriage, trees=trees), poses)
+    corpus, statistics = ballet.corpus, ballet.statistics
+    assert statistics.trees is None
+    assert frames_near(corpus, statistics, statistics.orientations[:1]) is all_frames(corpus)
+    trees = build_neighbours(corpus.skeleton, statistics.orientations, statistics.weights)
+    poses = statistics.orientations[[5, 812, 2104]]
+    found = frames_near(corpus, replace(statistics, trees=trees), poses)
     check_order(corpus, found)
     check_rates(found)
     assert len(found.chains) < 0.7 * len(all_frames(corpus).chains)
     near = [
-        postures_near(trees, carriage.orientations, pose, N_FRAME_NEIGHBORS, len(corpus), N_LEAVES_SEARCHED)
+        postures_near(trees, statistics.orientations, pose, N_FRAME_NEIGHBORS, len(corpus), N_LEAVES_SEARCHED)
         for pose in poses
     ]
     for posture in np.unique(near).tolist():
@@ -179,7 +179,7 @@ def test_frames_near_postures_are_whole_runs_with_these_in_them(ballet: Engine) 
         shown = rotation_spline(corpus.times[knots], corpus.rotations[knots], found.times[own])
         assert rot.angle(shown, found.chains[own]).max() < 5e-3
     assert frame_distances(found, poses).min(axis=1).max() < 1e-3  # the last posture is that of many clips' ends
-    more = frames_near(corpus, replace(carriage, trees=trees), poses, 2 * N_POSTURES_BESIDE)
+    more = frames_near(corpus, replace(statistics, trees=trees), poses, 2 * N_POSTURES_BESIDE)
     inside = np.diff(found.stretches, append=-1) == 0
     assert set(found.postures[inside].tolist()) < set(more.postures.tolist())
 

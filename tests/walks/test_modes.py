@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from motionmind._typing import Floats
-from motionmind.body.contact import RATE
+from motionmind.body.contact import CONTACT_FPS
 from motionmind.body.motion import Posture
 from motionmind.geometry import rotations as rot
 from motionmind.tween.engine import Engine
@@ -62,7 +62,9 @@ def test_no_passage_from_start_to_end_costs_less(steps: int) -> None:
 def test_no_more_than_half_of_a_likely_passage_lies_in_another(seed: int) -> None:
     rng = np.random.default_rng(seed)
     chains = rot.exp(rng.normal(0.0, 1.0, (60, 1, 3)))
-    recorded = Frames(chains, np.repeat([0, 1], [40, 20]), np.arange(60), np.arange(60) / RATE, np.zeros((60, 1, 3)))
+    recorded = Frames(
+        chains, np.repeat([0, 1], [40, 20]), np.arange(60), np.arange(60) / CONTACT_FPS, np.zeros((60, 1, 3))
+    )
     poses, none = rot.exp(rng.normal(0.0, 1.0, (2, 1, 3))), np.zeros(3)
     stops = Stop(poses[0], none), Stop(poses[1], none)
     found = _likeliest(recorded, stops, poses, 5)
@@ -81,7 +83,9 @@ def test_no_more_than_half_of_a_likely_passage_lies_in_another(seed: int) -> Non
 def test_held_to_the_ends_a_passage_keeps_its_way_between() -> None:
     rng = np.random.default_rng(0)
     chains = rot.exp(np.cumsum(rng.normal(0.0, 0.1, (31, 2, 3)), axis=0))
-    recorded = Frames(chains, np.zeros(31, dtype=np.int64), np.arange(31), np.arange(31) / RATE, np.zeros((31, 2, 3)))
+    recorded = Frames(
+        chains, np.zeros(31, dtype=np.int64), np.arange(31), np.arange(31) / CONTACT_FPS, np.zeros((31, 2, 3))
+    )
     own = _held_to_ends(recorded, (0, 30), chains[[0, 30]], 11)
     np.testing.assert_allclose(rot.angle(own, chains[::3]), 0.0, atol=1e-7)
     poses = rot.exp(rng.normal(size=(2, 2, 3)))
@@ -95,7 +99,7 @@ def test_each_mode_is_the_farthest_from_what_is_known_by_then(name: str, request
     stops, joints = ends(engine, 40, 300), len(corpus.skeleton)
     known = [straight(stops, joints)]
     recorded, poses = all_frames(corpus), known[0][[0, -1]]
-    left = _likeliest(recorded, stops, poses, round(seconds * RATE / NODE_FRAMES))
+    left = _likeliest(recorded, stops, poses, round(seconds * CONTACT_FPS / NODE_FRAMES))
     shown = {passage: _held_to_ends(recorded, passage, poses, COUNT) for passage in left}
     found = []
 
@@ -103,7 +107,7 @@ def test_each_mode_is_the_farthest_from_what_is_known_by_then(name: str, request
         return Place(int(recorded.stretches[begin]), float(recorded.times[begin]))  # a stretch is a clip
 
     distance = []
-    for place in find_modes(corpus, engine.carriage, stops, seconds, known):
+    for place in find_modes(corpus, engine.statistics, stops, seconds, known):
         off = {one: min(float(rot.angle(shown[one], other).mean()) for other in known) for one in left}
         farthest = max(off, key=lambda one: off[one])
         assert place == place_of(farthest[0])
@@ -119,5 +123,5 @@ def test_each_mode_is_the_farthest_from_what_is_known_by_then(name: str, request
 def test_there_are_no_modes_where_no_recording_lasts_so_long(ballet: Engine) -> None:
     stops = ends(ballet, 3, 9)
     known = [straight(stops, 23)]
-    assert list(find_modes(ballet.corpus, ballet.carriage, stops, 100.0, known)) == []
-    assert len(list(find_modes(ballet.corpus, ballet.carriage, stops, 0.01, known))) == N_CANDIDATE_PASSAGES
+    assert list(find_modes(ballet.corpus, ballet.statistics, stops, 100.0, known)) == []
+    assert len(list(find_modes(ballet.corpus, ballet.statistics, stops, 0.01, known))) == N_CANDIDATE_PASSAGES

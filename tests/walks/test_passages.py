@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from motionmind._typing import Floats, Ints
-from motionmind.body.contact import RATE
+from motionmind.body.contact import CONTACT_FPS
 from motionmind.body.motion import Posture
 from motionmind.geometry import rotations as rot
 from motionmind.tween.engine import Engine
@@ -43,17 +43,21 @@ def frames(chains: Floats, counts: tuple[int, ...], rates: Floats | None = None)
     count = len(chains)
     if rates is None:
         rates = np.zeros((count, chains.shape[1], 3))
-    return Frames(chains, np.repeat(np.arange(len(counts)), counts), np.arange(count), np.arange(count) / RATE, rates)
+    return Frames(
+        chains, np.repeat(np.arange(len(counts)), counts), np.arange(count), np.arange(count) / CONTACT_FPS, rates
+    )
 
 
 def random_recording(counts: tuple[int, ...], seed: int = 0) -> Frames:
     """Stretches in which two joints turn to and fro at their own frequencies."""
     rng, parts = np.random.default_rng(seed), []
     for count in counts:
-        angles = rng.uniform(2.0, 6.0, (2, 3)) * np.arange(count)[:, None, None] / RATE + rng.uniform(0.0, 6.0, (2, 3))
+        angles = rng.uniform(2.0, 6.0, (2, 3)) * np.arange(count)[:, None, None] / CONTACT_FPS + rng.uniform(
+            0.0, 6.0, (2, 3)
+        )
         parts.append(rot.exp(0.5 * np.sin(angles)))
     chains = np.concatenate(parts)
-    rates = RATE * rot.log(rot.inv_mul(chains, np.roll(chains, -1, axis=0)))
+    rates = CONTACT_FPS * rot.log(rot.inv_mul(chains, np.roll(chains, -1, axis=0)))
     return frames(chains, counts, rates)
 
 
@@ -171,7 +175,7 @@ def test_another_stretch_is_taken_where_it_saves_more_than_a_change(share: float
 def test_a_passage_at_its_own_tempo_has_the_velocities_of_the_recording() -> None:
     recorded, nodes = random_recording((60,)), 5 + NODE_FRAMES * np.arange(11)
     passage = Passage(0.1 * np.arange(11.0), nodes, recorded, np.array([0]))
-    found = velocities(passage, np.arange(31) / RATE)
+    found = velocities(passage, np.arange(31) / CONTACT_FPS)
     np.testing.assert_allclose(found, recorded.rates[5:35], atol=1e-9)
 
 
@@ -188,8 +192,8 @@ def test_where_stretches_change_velocities_are_blended() -> None:
     recorded = random_recording((90, 90))
     nodes = np.concatenate([10 + NODE_FRAMES * np.arange(6), 110 + NODE_FRAMES * np.arange(5)])
     passage = Passage(0.1 * np.arange(11.0), nodes, recorded, np.array([0, 6]))
-    times = np.arange(31) / RATE
-    found, middles, change = velocities(passage, times), times[:-1] + 0.5 / RATE, 0.55
+    times = np.arange(31) / CONTACT_FPS
+    found, middles, change = velocities(passage, times), times[:-1] + 0.5 / CONTACT_FPS, 0.55
     before, after = recorded.rates[10:40], recorded.rates[110 - 18 : 110 + 12]
     share = np.clip(0.5 + (middles - change) / PASSAGE_BLEND_S, 0.0, 1.0)[:, None, None]
     np.testing.assert_allclose(found, (1.0 - share) * before + share * after, atol=1e-9)
@@ -201,7 +205,7 @@ def test_where_stretches_change_velocities_are_blended() -> None:
 def test_beyond_the_ends_of_a_recording_nothing_moves() -> None:
     recorded = random_recording((12,))
     passage = Passage(np.array([0.0, 0.1, 0.2]), np.array([5, 8, 11]), recorded, np.array([0]))
-    found = velocities(passage, np.arange(-10, 11) / RATE)
+    found = velocities(passage, np.arange(-10, 11) / CONTACT_FPS)
     np.testing.assert_allclose(found[:5], 0.0, atol=1e-9)
     np.testing.assert_allclose(found[5:16], recorded.rates[:11], atol=1e-9)
     np.testing.assert_allclose(found[16:], 0.0, atol=1e-9)
@@ -281,7 +285,7 @@ def posture(engine: Engine, row: int) -> Posture:
 def walk(engine: Engine, rows: dict[int, int]) -> tuple[Expectation, dict[float, Stop]]:
     """What walks expect that pass some of the corpus's postures, by the moves that lead there."""
     stops = {move: stop_at(engine.corpus, posture(engine, row)) for move, row in rows.items()}
-    expected = expect(engine.corpus, engine.carriage, stops, np.linspace(0.0, SECONDS, 2 * MOVES + 1))
+    expected = expect(engine.corpus, engine.statistics, stops, np.linspace(0.0, SECONDS, 2 * MOVES + 1))
     return expected, {SECONDS * move / MOVES: found for move, found in stops.items()}
 
 
@@ -294,7 +298,7 @@ def test_nothing_is_displaced_where_postures_are_given(
     cmu05: Engine, walked: tuple[Expectation, dict[float, Stop]]
 ) -> None:
     expected, stops = walked
-    found = [dance(cmu05.corpus, cmu05.carriage, expected, stops, liveliness) for liveliness in (0.0, 0.5, 1.0)]
+    found = [dance(cmu05.corpus, cmu05.statistics, expected, stops, liveliness) for liveliness in (0.0, 0.5, 1.0)]
     assert found[0] is None
     sizes = []
     for danced in found[1:]:
@@ -310,7 +314,7 @@ def test_nothing_is_displaced_where_postures_are_given(
 
 
 def test_the_same_is_danced_each_time(cmu05: Engine, walked: tuple[Expectation, dict[float, Stop]]) -> None:
-    one, other = (dance(cmu05.corpus, cmu05.carriage, *walked, 0.7) for _ in range(2))
+    one, other = (dance(cmu05.corpus, cmu05.statistics, *walked, 0.7) for _ in range(2))
     assert one is not None
     assert other is not None
     np.testing.assert_array_equal(one.off, other.off)
@@ -322,7 +326,7 @@ def test_the_liveliest_moves_nearly_as_the_passage_does(
 ) -> None:
     """They differ by what is constant from stop to stop, and by what turns do to each other's axes."""
     expected, stops = walked
-    danced = dance(cmu05.corpus, cmu05.carriage, expected, stops, 1.0)
+    danced = dance(cmu05.corpus, cmu05.statistics, expected, stops, 1.0)
     assert danced is not None
     chains, bounds = expected.chains(cmu05.corpus, danced.times), np.searchsorted(danced.times, [*stops])
     asked, joints = velocities(danced.passage, danced.times), danced.off.shape[1]
@@ -339,7 +343,7 @@ def test_the_liveliest_moves_nearly_as_the_passage_does(
 def test_equal_ends_without_velocities_hold_still() -> None:
     ballet = Engine.load("ballet")
     expected, stops = walk(ballet, {0: 40, 8: 40})
-    call = partial(dance, ballet.corpus, ballet.carriage, expected)
+    call = partial(dance, ballet.corpus, ballet.statistics, expected)
     assert call(stops, 1.0) is None
     assert call(stops, 1.0, Place(5, 1.0)) is not None
     middle = stop_at(ballet.corpus, posture(ballet, 300))
@@ -350,7 +354,7 @@ def test_equal_ends_without_velocities_hold_still() -> None:
 
 def test_a_place_is_where_the_passage_is(cmu05: Engine, walked: tuple[Expectation, dict[float, Stop]]) -> None:
     corpus = cmu05.corpus
-    danced = dance(corpus, cmu05.carriage, *walked, 0.5, Place(7, 2.0))
+    danced = dance(corpus, cmu05.statistics, *walked, 0.5, Place(7, 2.0))
     assert danced is not None
     passage = danced.passage
     clip = corpus.clips[7]

@@ -18,7 +18,7 @@ from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.body.support import masses_of
 from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
-from motionmind.synth.system import Normal
+from motionmind.solver.system import Normal
 
 MAX_SERIES_RAD2 = 1e-8  # squared angle up to which series replace sine and cosine
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats
 from motionmind.geometry import rotations as rot
-from motionmind.synth.kinematics import Body, Freedom, State
-from motionmind.synth.one_sided import OneSided
-from motionmind.synth.system import Normal
-from motionmind.synth.terms import Term
+from motionmind.solver.kinematics import Body, Freedom, State
+from motionmind.solver.one_sided import OneSided
+from motionmind.solver.system import Normal
+from motionmind.solver.terms import Term
 
 MAX_ITERATIONS_PER_PLAN = 4
 DAMPING_WEIGHT = 0.3  # on the diagonal, so that unknowns without rows stay

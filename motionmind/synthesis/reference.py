@@ -17,12 +17,12 @@ from motionmind.corpus.corpus import Corpus, subdivide_times
 from motionmind.footing.ground import Stance, ends_in_air
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
-from motionmind.learned.carriage import Carriage
-from motionmind.realise.bending import allowed_distances, bend_to_states
-from motionmind.realise.retime import jump_in_time, keep_pace, land_between
-from motionmind.realise.timeline import Timeline, stretch, timeline
-from motionmind.realise.wishes import Style, Wishes
-from motionmind.synth.synthesise import MOTIONLESS_RAD
+from motionmind.learned.posture_statistics import PostureStatistics
+from motionmind.solver.motion import MOTIONLESS_RAD
+from motionmind.synthesis.bending import allowed_distances, bend_to_states
+from motionmind.synthesis.retime import jump_in_time, keep_pace, land_between
+from motionmind.synthesis.timeline import Timeline, stretch, timeline
+from motionmind.synthesis.wishes import Style, Wishes
 from motionmind.walks.expectation import Expectation, expect
 from motionmind.walks.headings import travel_along
 from motionmind.walks.minimal import departure
@@ -52,7 +52,7 @@ class Reference(NamedTuple):
 
 def find_reference(path: Int32s, style: Style, wishes: Wishes) -> Reference:
     """Return the mean of the corpus walks near a path, moved like a passage, in the time that they take."""
-    a, b, corpus, carriage, grammar = wishes.a, wishes.b, style.corpus, style.carriage, style.grammar
+    a, b, corpus, statistics, grammar = wishes.a, wishes.b, style.corpus, style.statistics, style.grammar
     clock = timeline(path, grammar.transitions, wishes.fps, wishes.length)
     postures = {0: a, **wishes.through, len(path) - 1: b}
     stops = {move: stop_at(corpus, posture) for move, posture in postures.items()}
@@ -61,16 +61,16 @@ def find_reference(path: Int32s, style: Style, wishes: Wishes) -> Reference:
     stops[0] = stop_at(corpus, a, _scaled(slower, wishes.leaving))
     stops[len(path) - 1] = stop_at(corpus, b, _scaled(slower, wishes.arriving))
     states = grammar.centres[grammar.transitions.starts[: path.shape[1]] + path]
-    walk = _walk_near(states, clock, stops, corpus, carriage, wishes.length is None and not wishes.through)
+    walk = _walk_near(states, clock, stops, corpus, statistics, wishes.length is None and not wishes.through)
     chains = walk.chains(corpus, clock.moves)
     within = allowed_distances(chains, path, grammar, style.tolerances, wishes.wished)
     walk = bend_to_states(walk, chains, states, clock, stops, corpus, within)
     size = a.skeleton.height / corpus.skeleton.height if corpus.skeleton.height > 0.0 else 1.0
-    travel = travel_along(walk.trust[:, :1] * (walk.moves @ carriage.travel[walk.of_moves]), walk.headings)
+    travel = travel_along(walk.trust[:, :1] * (walk.moves @ statistics.travel[walk.of_moves]), walk.headings)
     given = [0, *(2 * move for move in wishes.through), -1]
     low = _given_heights(postures, walk)
     # Heights are those of the body of `a`, which moves; the body of `b` may have had shorter legs.
-    stance = _find_stance(walk, carriage, travel, size, given)
+    stance = _find_stance(walk, statistics, travel, size, given)
     if wishes.length is None:
         longer = np.full(len(travel), slower)
         if style.fastest is not None:
@@ -86,9 +86,9 @@ def find_reference(path: Int32s, style: Style, wishes: Wishes) -> Reference:
     danced = _follow_passage(walk, clock, stops, states, style, wishes)
     chains = walk.chains(corpus, clock.frames)
     rotations = corpus.from_chains(danced.move(chains, clock.frames) if danced else chains)
-    lasts = float(carriage.trust.lasts[0])
+    lasts = float(statistics.trust.lasts[0])
     rotations = _with_velocities(rotations, clock, [*stops], wishes.leaving, wishes.arriving, lasts)
-    return Reference(clock, _within_limits(rotations, postures, carriage.loose), stance, low, danced, walk.left_out)
+    return Reference(clock, _within_limits(rotations, postures, statistics.loose), stance, low, danced, walk.left_out)
 
 
 def _scaled(factor: float, velocity: Velocity | None) -> Velocity | None:
@@ -97,7 +97,12 @@ def _scaled(factor: float, velocity: Velocity | None) -> Velocity | None:
 
 
 def _walk_near(
-    states: Floats, clock: Timeline, stops: Mapping[int, Stop], corpus: Corpus, carriage: Carriage, near: bool
+    states: Floats,
+    clock: Timeline,
+    stops: Mapping[int, Stop],
+    corpus: Corpus,
+    statistics: PostureStatistics,
+    near: bool,
 ) -> Expectation:
     """Return the mean of the walks that pass the stops and are near a path's states [T + 1, L, 4].
 
@@ -110,33 +115,39 @@ def _walk_near(
         half_steps = np.linspace(0.0, clock.moves[-1], 2 * clock.usual_moves + 1)
         path = rotation_spline(clock.moves, path, half_steps[::2])
         stops = {0: stops[0], clock.usual_moves: stops[last]}
-    return expect(corpus, carriage, stops, half_steps, path, near)
+    return expect(corpus, statistics, stops, half_steps, path, near)
 
 
-def _find_stance(walk: Expectation, carriage: Carriage, travel: Floats, size: float, given: Sequence[int]) -> Stance:
+def _find_stance(
+    walk: Expectation, statistics: PostureStatistics, travel: Floats, size: float, given: Sequence[int]
+) -> Stance:
     """Return the stances of the corpus's bodies along a walk, on a body of another size.
 
     Args:
         walk: the movement at its half steps.
-        carriage: posture statistics of the corpus.
+        statistics: posture statistics of the corpus.
         travel: level displacement of the root in each half step [2 T, 3], metres, on the corpus's skeleton.
         size: height of the body, in heights of the corpus's skeleton.
         given: half steps at which postures are given.
     """
-    trust, in_air, clearance = walk.trust[:, 0], carriage.aloft[walk.of_moments], carriage.clearance[walk.of_moments]
-    aloft = walk.moments @ in_air
+    trust, in_air, clearance = (
+        walk.trust[:, 0],
+        statistics.aloft[walk.of_samples],
+        statistics.clearance[walk.of_samples],
+    )
+    aloft = walk.samples @ in_air
     trusted = np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust)
     flies = trusted * aloft
     flies[given] = aloft[given]  # whether a given posture is in the air does not depend on trust
     return Stance(
         walk.half_steps,
-        size * (walk.moments @ clearance),
+        size * (walk.samples @ clearance),
         trusted,
-        walk.moments @ carriage.stands[walk.of_moments],
+        walk.samples @ statistics.stands[walk.of_samples],
         flies,
-        size * (walk.moments @ (in_air * clearance)) / np.maximum(aloft, 1e-9),
+        size * (walk.samples @ (in_air * clearance)) / np.maximum(aloft, 1e-9),
         size * travel,
-        size * float(carriage.overhang[0]),
+        size * float(statistics.overhang[0]),
     )
 
 
@@ -197,7 +208,7 @@ def _follow_passage(
     """
     corpus, wished = style.corpus, wishes.wished
     passed = {float(clock.moves[move]): stop for move, stop in stops.items()}
-    danced = dance(corpus, style.carriage, walk, passed, wishes.liveliness, wishes.place)
+    danced = dance(corpus, style.statistics, walk, passed, wishes.liveliness, wishes.place)
     if danced is None:
         return None
     chains, joints = walk.chains(corpus, clock.moves), danced.off.shape[1]

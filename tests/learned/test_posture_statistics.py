@@ -10,8 +10,8 @@ from motionmind.body.motion import Motion
 from motionmind.corpus.gather import gather
 from motionmind.discretize.codebook import Codebook
 from motionmind.geometry import rotations as rot
-from motionmind.learned.carriage import learn_carriage
 from motionmind.learned.learning import learn
+from motionmind.learned.posture_statistics import learn_posture_statistics
 
 
 def turning(frames: int, turn: float, ahead: float) -> Motion:
@@ -26,20 +26,20 @@ def turning(frames: int, turn: float, ahead: float) -> Motion:
 
 @pytest.mark.parametrize("turn", [0.4, -0.3])
 def test_half_a_move_turns_and_travels_half_as_far_in_the_body_s_heading(turn: float) -> None:
-    carriage = learn_carriage(gather("turning", [turning(20, turn, 0.1)]))
-    np.testing.assert_allclose(carriage.turn, 0.5 * turn, atol=1e-9)
-    np.testing.assert_allclose(carriage.travel, np.tile([0.0, 0.0, 0.05], (19, 1)), atol=1e-9)
+    statistics = learn_posture_statistics(gather("turning", [turning(20, turn, 0.1)]))
+    np.testing.assert_allclose(statistics.turn, 0.5 * turn, atol=1e-9)
+    np.testing.assert_allclose(statistics.travel, np.tile([0.0, 0.0, 0.05], (19, 1)), atol=1e-9)
 
 
 def test_shares_of_the_steps_that_leave_a_moment_add_up_to_one_by_their_weights() -> None:
     """Also of a posture that more moves arrive in than leave, of other weights."""
     corpus = gather("back and forth", [turning(9, 0.3, 0.0)], reverse=1.0)
-    carriage = learn_carriage(corpus)
-    moments = len(corpus) + len(corpus.moves.begins)
-    sums = np.bincount(carriage.begins, carriage.shares, moments)
-    np.testing.assert_allclose(sums[np.unique(carriage.begins)], 1.0, atol=1e-12)
+    statistics = learn_posture_statistics(corpus)
+    samples = len(corpus) + len(corpus.moves.begins)
+    sums = np.bincount(statistics.begins, statistics.shares, samples)
+    np.testing.assert_allclose(sums[np.unique(statistics.begins)], 1.0, atol=1e-12)
     leaving = np.flatnonzero(corpus.moves.begins == 4)
-    ahead, back = sorted(carriage.shares[leaving])[::-1]
+    ahead, back = sorted(statistics.shares[leaving])[::-1]
     assert ahead / back == pytest.approx(np.e)
 
 
@@ -58,11 +58,11 @@ def test_carriage_is_the_same_in_blocks_of_any_size(monkeypatch: pytest.MonkeyPa
         root = np.array([0.0, 0.9, 0.0]) + np.cumsum(rng.normal(0.0, 0.03, (count, 3)), axis=0)
         clips.append(Motion(human23(), rotations, root, 0.2 * np.arange(count), name))
     corpus = gather("wandering", clips, reverse=1.0)
-    whole = learn_carriage(corpus)
+    whole = learn_posture_statistics(corpus)
     assert whole.loose.any()
     assert not whole.loose.all()
     for size in (1, 7):
-        monkeypatch.setattr("motionmind.learned.carriage.BLOCK_FRAMES", size)
+        monkeypatch.setattr("motionmind.learned.posture_statistics.BLOCK_FRAMES", size)
         monkeypatch.setattr("motionmind.body.limits._BLOCK", size)
-        for name, array in vars(learn_carriage(corpus)).items():
+        for name, array in vars(learn_posture_statistics(corpus)).items():
             np.testing.assert_array_equal(array, getattr(whole, name), err_msg=name)

@@ -12,14 +12,20 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import standing_rises
 from motionmind.footing.balance import falls_without, is_beyond, walks
-from motionmind.footing.bearing import HOLDS_UP_SHARE, LIMB_TOUCHES_M, Bearing, find_bearing, find_staying
 from motionmind.footing.feet import GRIP_HEIGHT_M, Foot
 from motionmind.footing.flight import FLIGHT_CERTAIN_SHARE, Flight, find_flights, flying_frames
 from motionmind.footing.ground import Stretch
 from motionmind.footing.shape import Shape, shape_of
 from motionmind.footing.smoothing import smoothstep
-from motionmind.learned.carriage import FIRMNESS_HALVED_MPS
-from motionmind.synth.terms import Contacts
+from motionmind.footing.support_phases import (
+    HOLDS_UP_SHARE,
+    LIMB_TOUCHES_M,
+    SupportPhases,
+    find_staying,
+    find_support_phases,
+)
+from motionmind.learned.posture_statistics import FIRMNESS_HALVED_MPS
+from motionmind.solver.terms import Contacts
 
 STEP_HEIGHT_M = 0.105  # of a step from 0.3 m on whose reference does not lift the foot; chosen on cmu-05 and cmu-16
 FULL_SWING_M = 0.08  # height of a swinging foot from which its standard deviations apply in full
@@ -87,7 +93,7 @@ class Plan:
         overhang: allowed distance of the centre of mass from the support, metres.
         fps: frames a second.
         falls: how far it would fall without each foot [N, feet], 0 to 1; None where unknown.
-        bearing: its support: stances of the feet, and other parts on the floor.
+        phases: its support: stances of the feet, and other parts on the floor.
     """
 
     stretch: Stretch
@@ -100,11 +106,11 @@ class Plan:
     overhang: float
     fps: float
     falls: Floats | None
-    bearing: Bearing = field(init=False)
+    phases: SupportPhases = field(init=False)
 
     def plan_steps(self) -> None:
         """Plan the steps."""
-        self.bearing = find_bearing(
+        self.phases = find_support_phases(
             self.shape, self.stretch, self.mass, self.flying, self.staying, self.feet, self.fps, self.falls
         )
 
@@ -119,11 +125,11 @@ class Plan:
             return False
         points = self.shape.places[..., [0, 2]] + root[:, None, [0, 2]]
         for foot, own in enumerate(self.shape.feet):
-            points[:, own] += (self.bearing.targets[:, foot] - root[:, [0, 2]])[:, None]
+            points[:, own] += (self.phases.targets[:, foot] - root[:, [0, 2]])[:, None]
         centre = np.ascontiguousarray(mass[:, [0, 2]])
-        if not is_beyond(points, self.bearing.touching(self.shape), centre, self.overhang)[1:-1].any():
+        if not is_beyond(points, self.phases.touching(self.shape), centre, self.overhang)[1:-1].any():
             return False
-        low = self.bearing.all_standing().touching(self.shape)
+        low = self.phases.all_standing().touching(self.shape)
         self.falls = falls_without(points, low, self.shape.feet, centre, self.overhang)
         self.plan_steps()
         return True
@@ -155,13 +161,13 @@ class Plan:
 
     def _of_feet(self, root: Floats, steps: bool) -> Iterator[_Point]:
         """Yield the targets of the feet's points."""
-        shape, bearing, ground, off = self.shape, self.bearing, self.stretch.ground, self._off(root)
+        shape, phases, ground, off = self.shape, self.phases, self.stretch.ground, self._off(root)
         if not steps:
             off[..., [0, 2]] = 0.0
         for k, foot in enumerate(self.feet):
-            stands = bearing.stands[:, k]
+            stands = phases.stands[:, k]
             own = np.zeros(len(root), dtype=np.bool_)  # in a stance that includes no given posture
-            for stance in bearing.stances[k]:
+            for stance in phases.stances[k]:
                 own[stance.start : stance.end + 1] = stance.start > 0 and stance.end < len(root) - 1
             firm = np.clip(ground.firm[:, foot.limb], 1e-2, 1.0)
             speed = np.hypot(FIRMNESS_HALVED_MPS * np.sqrt(1.0 / firm - 1.0), SDS.firm_speed)
@@ -186,7 +192,7 @@ class Plan:
     def _of_others(self, root: Floats) -> Iterator[_Point]:
         """Yield the targets of supporting hands, knees or the trunk: on the floor, level where they are."""
         shape = self.shape
-        rests = self.bearing.others > HOLDS_UP_SHARE
+        rests = self.phases.others > HOLDS_UP_SHARE
         for part in np.flatnonzero(rests.any(axis=0)):
             for point in np.flatnonzero(shape.others[part]):
                 at = shape.places[:, point] + root
@@ -202,16 +208,16 @@ class Plan:
         A foot in stance is in its place on the floor. Between stances the displacement changes smoothly from one to
         the other, and the foot is lifted, the higher the longer the step.
         """
-        shape, bearing, count = self.shape, self.bearing, len(root)
+        shape, phases, count = self.shape, self.phases, len(root)
         out = np.zeros((count, len(self.feet), 3))
-        level = bearing.targets - root[:, None, [0, 2]]
+        level = phases.targets - root[:, None, [0, 2]]
         height = shape.low + root[:, 1:2] - self.stretch.ground.floor[:, None]
         # Never lift a foot that alone supports the body.
-        support = bearing.stands.sum(axis=1) + (bearing.others > HOLDS_UP_SHARE).sum(axis=1) + self.flying
-        borne = support[:, None] > bearing.stands
+        support = phases.stands.sum(axis=1) + (phases.others > HOLDS_UP_SHARE).sum(axis=1) + self.flying
+        borne = support[:, None] > phases.stands
         for k in range(len(self.feet)):
             off = out[:, k]
-            for stance in bearing.stances[k]:
+            for stance in phases.stances[k]:
                 here = slice(stance.start, stance.end + 1)
                 off[here, 0], off[here, 2] = level[here, k].T
                 wanted = np.zeros(count)  # a foot given above the floor comes down in 0.3 s
@@ -219,14 +225,14 @@ class Plan:
                     near = np.clip(1.0 - np.abs(np.arange(count) - edge) / (0.3 * self.fps), 0.0, 1.0)
                     wanted += height[edge, k] * smoothstep(near)
                 off[here, 1] = (wanted - height[:, k])[here]
-            edges = [0, *(frame for stance in bearing.stances[k] for frame in (stance.start, stance.end)), count - 1]
+            edges = [0, *(frame for stance in phases.stances[k] for frame in (stance.start, stance.end)), count - 1]
             for begin, end in zip(edges[::2], edges[1::2], strict=True):
                 if end - begin < 2:
                     continue
                 part, share = slice(begin, end + 1), np.linspace(0.0, 1.0, end - begin + 1)
                 off[part] = off[begin] + smoothstep(share)[:, None] * (off[end] - off[begin])
                 on_its_way = (begin == 0 and self.stretch.moving[0]) or (end == count - 1 and self.stretch.moving[1])
-                if on_its_way or not bearing.stances[k]:
+                if on_its_way or not phases.stances[k]:
                     continue
                 places = shape.tracks[part, k] + root[part][:, [0, 2]] + off[part][:, [0, 2]]
                 step = places[-1] - places[0]

@@ -10,23 +10,23 @@ import numpy as np
 
 from motionmind._typing import Floats, Int32s
 from motionmind.body.motion import Insertion, Motion, Posture, Velocity
-from motionmind.body.plausibility import GRAVITY
+from motionmind.body.plausibility import GRAVITY_MPS2
 from motionmind.footing.ground import Given, Stance
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
-from motionmind.realise.reference import Reference, find_reference
-from motionmind.realise.retime import JOINT_SPEED_RATIO, SPEED_HEADROOM_RATIO, slower_steps
-from motionmind.realise.timeline import Timeline, stretch
-from motionmind.realise.wishes import Style, Wishes
-from motionmind.synth.residual import Residual
-from motionmind.synth.synthesise import Bounds, Synthesis, synthesise
+from motionmind.solver.motion import Bounds, Synthesis, solve_motion
+from motionmind.solver.residual import Residual
+from motionmind.synthesis.reference import Reference, find_reference
+from motionmind.synthesis.retime import JOINT_SPEED_RATIO, SPEED_HEADROOM_RATIO, slower_steps
+from motionmind.synthesis.timeline import Timeline, stretch
+from motionmind.synthesis.wishes import Style, Wishes
 from motionmind.walks.passages import Danced
 
 MAX_SOLVES = 3  # the first, then others on slower clocks
 
 
-class Realised(NamedTuple):
-    """A realised path.
+class Synthesised(NamedTuple):
+    """A synthesised path.
 
     Attributes:
         motion: the motion.
@@ -41,17 +41,17 @@ class Realised(NamedTuple):
     residuals: tuple[Residual, ...] = ()
 
 
-def realise(path: Int32s, style: Style, wishes: Wishes) -> Realised:
+def synthesise(path: Int32s, style: Style, wishes: Wishes) -> Synthesised:
     """Return the motion of a path, on the body of its first posture.
 
     Its first and last frames are exactly the given postures; at the moves in `through`, its joints and its facing are
-    those of the postures there. Its reference (`motionmind.realise.reference`) is the mean of the corpus walks from `a`
-    to `b` in that time, weighted by their nearness to the path (`motionmind.walks.likelihood`), with a C2 spline
+    those of the postures there. Its reference (`motionmind.synthesis.reference`) is the mean of the corpus walks from
+    `a` to `b` in that time, weighted by their nearness to the path (`motionmind.walks.likelihood`), with a C2 spline
     between the moves. The reference bends smoothly towards states that a chain would miss, and moves like a passage of
     the corpus (`motionmind.walks.passages`).
 
     The motion is the one nearest to its reference that satisfies contacts, gravity and joint limits
-    (`motionmind.synth.synthesise`). The floor is at 0, lower under an end below 0, and higher under an end that is
+    (`motionmind.solver.motion`). The floor is at 0, lower under an end below 0, and higher under an end that is
     higher than the corpus's bodies in such postures. Where the motion exceeds a bound on speed, its clock slows down
     for another solve.
 
@@ -63,7 +63,7 @@ def realise(path: Int32s, style: Style, wishes: Wishes) -> Realised:
     a, skeleton = wishes.a, wishes.a.skeleton
     if len(path) == 1:
         still = Motion(skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", (Insertion(np.zeros(1)),))
-        return Realised(still, None, 0.0)
+        return Synthesised(still, None, 0.0)
     reference, pace = find_reference(path, style, wishes), max(wishes.pace, 1.0)
     peaks = None
     if style.peaks is not None:  # of movement at most 1.1 times as long
@@ -93,8 +93,8 @@ def _bounds(style: Style, wishes: Wishes, final: Floats | None, strict: Floats |
     return Bounds(
         wishes.fixed[:joints],
         wished,
-        style.carriage.loose,
-        style.carriage.touches,
+        style.statistics.loose,
+        style.statistics.touches,
         None if kept is None else kept[:joints],
         np.inf if kept is None else float(kept[joints]),
         travels * height,
@@ -103,7 +103,9 @@ def _bounds(style: Style, wishes: Wishes, final: Floats | None, strict: Floats |
     )
 
 
-def _synthesise(reference: Reference, style: Style, wishes: Wishes, final: Floats | None, bounds: Bounds) -> Realised:
+def _synthesise(
+    reference: Reference, style: Style, wishes: Wishes, final: Floats | None, bounds: Bounds
+) -> Synthesised:
     """Synthesise a motion, and again on slower clocks while it exceeds the bounds of the finished movement [J + 4]."""
     a, b, pace, keeps_length = wishes.a, wishes.b, max(wishes.pace, 1.0), wishes.length is not None
     clock, rotations, stance = reference.clock, reference.rotations, reference.stance
@@ -111,7 +113,7 @@ def _synthesise(reference: Reference, style: Style, wishes: Wishes, final: Float
     ends = Given(reference.low, (a.root, b.root), velocities)
     before: Synthesis | None = None
     for number in range(MAX_SOLVES):
-        made = synthesise(a.skeleton, rotations, clock.frames, stance, ends, bounds, wishes.without, before)
+        made = solve_motion(a.skeleton, rotations, clock.frames, stance, ends, bounds, wishes.without, before)
         motion = _motion_between(a, b, made.rotations, made.root, clock)
         if final is None or not wishes.slows or number == MAX_SOLVES - 1:
             break
@@ -128,7 +130,7 @@ def _synthesise(reference: Reference, style: Style, wishes: Wishes, final: Float
         before = made.at(was, then)
         stance = stance._replace(half_steps=np.interp(stance.half_steps, was, at))
     motion = replace(motion, insertions=(Insertion(clock.moves),))
-    return Realised(motion, reference.danced, reference.left_out, made.residuals)
+    return Synthesised(motion, reference.danced, reference.left_out, made.residuals)
 
 
 def _motion_between(a: Posture, b: Posture, rotations: Floats, root: Floats, clock: Timeline) -> Motion:
@@ -145,7 +147,7 @@ def _root_velocity(velocity: Velocity | None) -> Floats | None:
 
 def _without_high_jumps(stance: Stance, fastest: float, given: Sequence[int]) -> Stance:
     """Return a stance without the jumps that take off faster than `fastest`, m/s; those at `given` half steps stay."""
-    high = np.sqrt(2.0 * GRAVITY * stance.leaps) > fastest
+    high = np.sqrt(2.0 * GRAVITY_MPS2 * stance.leaps) > fastest
     high[given] = False
     return stance._replace(aloft=np.where(high, 0.0, stance.aloft))
 

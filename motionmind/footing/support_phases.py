@@ -26,7 +26,7 @@ def _touching(places: Floats, parts: Bools, low: Floats, bears: Bools) -> Bools:
     return out
 
 
-class Bearing(NamedTuple):
+class SupportPhases(NamedTuple):
     """The support of a body in each frame.
 
     Attributes:
@@ -41,7 +41,7 @@ class Bearing(NamedTuple):
     targets: Floats
     others: Floats
 
-    def all_standing(self) -> Bearing:
+    def all_standing(self) -> SupportPhases:
         """Return the same with all feet on the floor throughout."""
         return self._replace(stands=np.ones_like(self.stands))
 
@@ -55,7 +55,7 @@ class Bearing(NamedTuple):
         return feet | _touching(shape.places, shape.others, shape.low_others, self.others > HOLDS_UP_SHARE)
 
 
-def find_bearing(
+def find_support_phases(
     shape: Shape,
     stretch: Stretch,
     mass: Floats,
@@ -64,7 +64,7 @@ def find_bearing(
     feet: list[Foot],
     fps: float,
     falls: Floats | None = None,
-) -> Bearing:
+) -> SupportPhases:
     """Find the support of a body, and the steps of its feet.
 
     Args:
@@ -111,7 +111,7 @@ def find_bearing(
     for k, own in enumerate(stances):
         for start, end, place, slip in own:
             places[start : end + 1, k] = place + np.linspace(0.0, 1.0, end - start + 1)[:, None] * slip
-    return Bearing(stances, stands, places - shape.tracks, others)
+    return SupportPhases(stances, stands, places - shape.tracks, others)
 
 
 def _support_of_others(shape: Shape, firm: Floats, flying: Bools) -> Floats:

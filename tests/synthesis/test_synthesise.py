@@ -23,12 +23,12 @@ from motionmind.footing.shape import lowest, points_of_feet
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.transitions import Transitions, count_transitions
-from motionmind.learned.carriage import FIRMNESS_HALVED_MPS, Carriage, learn_carriage
-from motionmind.realise.bending import FIRM_PULL_RATIO
-from motionmind.realise.realise import realise
-from motionmind.realise.retime import SPEED_HEADROOM_RATIO, keep_pace
-from motionmind.realise.timeline import durations
-from motionmind.realise.wishes import Style, Wishes
+from motionmind.learned.posture_statistics import FIRMNESS_HALVED_MPS, PostureStatistics, learn_posture_statistics
+from motionmind.synthesis.bending import FIRM_PULL_RATIO
+from motionmind.synthesis.retime import SPEED_HEADROOM_RATIO, keep_pace
+from motionmind.synthesis.synthesise import synthesise
+from motionmind.synthesis.timeline import durations
+from motionmind.synthesis.wishes import Style, Wishes
 from motionmind.walks.expectation import Expectation
 from motionmind.walks.likelihood import P_CONTINUE, P_TELEPORT, squared_distances
 from motionmind.walks.marginals import posterior_marginals
@@ -89,7 +89,7 @@ def test_limbs_stand_the_less_the_faster_their_lowest_points_move() -> None:
     drawn, t = human23(), np.arange(9) * 0.2
     q = np.tile(rot.IDENTITY, (9, 23, 1))
     root = np.stack([0.0 * t, 0.9 + 0.0 * t, 0.6 * t], axis=1)
-    stands = learn_carriage(gather("drawn", [Motion(drawn, q, root, t, "drawn")])).stands
+    stands = learn_posture_statistics(gather("drawn", [Motion(drawn, q, root, t, "drawn")])).stands
     np.testing.assert_allclose(stands, 1.0 / (1.0 + (0.6 / FIRMNESS_HALVED_MPS) ** 2), atol=1e-9)
     hip, toes = drawn.index("left_hip"), drawn.index("left_toes")
     offset = drawn.positions(q[0], np.zeros(3))[toes]
@@ -97,7 +97,7 @@ def test_limbs_stand_the_less_the_faster_their_lowest_points_move() -> None:
     reach = offset + drawn.tips[toes] - drawn.offsets[hip]
     angle = np.arcsin((reach[2] - root[:, 2] + root[4, 2]) / np.hypot(*reach[1:])) - np.arctan2(reach[2], -reach[1])
     q[:, hip] = rot.from_axis_angle([1.0, 0.0, 0.0], -angle)
-    stands = learn_carriage(gather("drawn", [Motion(drawn, q, root, t, "drawn")])).stands
+    stands = learn_posture_statistics(gather("drawn", [Motion(drawn, q, root, t, "drawn")])).stands
     assert stands[9 + 2 : 9 + 6, 0].min() > 0.95
     np.testing.assert_allclose(stands[:, 1:], 1.0 / (1.0 + (0.6 / FIRMNESS_HALVED_MPS) ** 2), atol=1e-9)
     np.testing.assert_allclose(stands[1:8], 0.5 * (stands[9:16] + stands[10:17]), atol=1e-12)
@@ -223,7 +223,7 @@ def test_the_mean_of_rotations_about_one_axis_whatever_their_signs(signs: tuple[
 
 def test_the_mean_of_rotations_takes_each_in_the_hemisphere_of_what_it_is_about() -> None:
     rng = np.random.default_rng(3)
-    q, weights = rot.normalise(rng.normal(size=(23, 2, 4))), rng.uniform(size=(6, 23))  # no multiple of four moments
+    q, weights = rot.normalise(rng.normal(size=(23, 2, 4))), rng.uniform(size=(6, 23))  # no multiple of four samples
     weights[weights < 0.2] = 1e-7  # too little to count
     for spread in (0.01, 0.5, 5.0):  # the wider, the more rotations have one sign here and the other there
         about = rot.normalise(np.array([0.1, 0.2, 0.3, 0.9]) + spread * rng.normal(size=(6, 2, 4)))
@@ -262,13 +262,13 @@ def recorded(seconds: float = 8.0, seed: int = 3) -> Motion:
 
 @dataclass(frozen=True)
 class Learned:
-    """As much of an engine's grammar as realisation reads; the only state of each chain is what a posture shows."""
+    """As much of an engine's grammar as the synthesis reads; the only state of each chain is what a posture shows."""
 
     corpus: Corpus
     states: Int32s
     transitions: Transitions
     centres: Floats
-    carriage: Carriage
+    statistics: PostureStatistics
 
 
 def walk(frames: int = 40, sink: float = 0.0, seed: int = 0) -> Motion:
@@ -293,10 +293,10 @@ def learned(motion: Motion, facing: Facing = "free", rate: float | None = None) 
         states, sizes, centres = np.concatenate([states, steps[:, None]], axis=1), [*sizes, 24], [*centres, ring]
     pooled = 23 if facing == "free" else None
     transitions = count_transitions(states, np.array(sizes), corpus.begins, corpus.seconds, pooled=pooled)
-    return Learned(corpus, states, transitions, np.concatenate(centres), learn_carriage(corpus))
+    return Learned(corpus, states, transitions, np.concatenate(centres), learn_posture_statistics(corpus))
 
 
-def realised(
+def synthesised(
     known: Learned,
     rows: list[int],
     a: Posture,
@@ -315,8 +315,8 @@ def realised_path(
 ) -> Motion:
     tolerances, none = np.full(path.shape[1], within), np.zeros(path.shape[1], dtype=np.bool_)
     peaks = options.pop("peaks", None)
-    style = Style(known.corpus, known, known.carriage, tolerances, peaks=peaks)  # type: ignore[arg-type]
-    return realise(path, style, Wishes(a, b, ~none, none, fps, **options)).motion
+    style = Style(known.corpus, known, known.statistics, tolerances, peaks=peaks)  # type: ignore[arg-type]
+    return synthesise(path, style, Wishes(a, b, ~none, none, fps, **options)).motion
 
 
 @pytest.fixture(scope="module", params=["free", "stage"])
@@ -330,7 +330,7 @@ def test_the_ends_are_a_and_b_bit_by_bit_and_frames_are_even(walking: Learned, r
     motion = walk()
     a, b = motion.posture(rows[0]), motion.posture(rows[-1])
     a = replace(a, rotations=-a.rotations, root=a.root + np.array([7.0, 0.0, 3.0]))
-    found = realised(walking, rows, a, b, fps)
+    found = synthesised(walking, rows, a, b, fps)
     np.testing.assert_array_equal(found.rotations[[0, -1]], [a.rotations, b.rotations])
     np.testing.assert_array_equal(found.root[[0, -1]], [a.root, b.root])
     np.testing.assert_allclose(np.diff(found.times), 1.0 / fps, rtol=1e-9)
@@ -347,7 +347,7 @@ def test_a_motion_is_within_what_is_asked_of_its_states_at_each_move(walking: Le
     carried = np.setdiff1d(np.arange(23), parts_of(human23())[1][1:])
     for within in np.radians([1.0, 5.0, 12.0]):
         # The moves of this path fall on frames.
-        found = realised(walking, rows, motion.posture(5), motion.posture(9), 60.0, within)
+        found = synthesised(walking, rows, motion.posture(5), motion.posture(9), 60.0, within)
         at = found.at(found.insertions[0].times)
         chains = [walking.corpus.to_chains(q)[:, carried] for q in (at.rotations, motion.rotations[rows])]
         off = rot.angle(*chains)
@@ -364,7 +364,7 @@ def test_given_postures_are_not_bent_to_their_states_nor_does_the_movement_leap_
         replace(motion.posture(row), rotations=rot.mul(motion.rotations[row], rot.exp(by)))
         for row, by in zip((5, 8, 11), off, strict=True)
     )
-    found = realised(walking, rows, a, b, 240.0, 0.02, through={3: via})
+    found = synthesised(walking, rows, a, b, 240.0, 0.02, through={3: via})
     passed = found.at(found.insertions[0].times[[3]])
     assert rot.angle(passed.rotations[0, 1:], via.rotations[1:]).max() < 0.005
     speed = rot.angle(found.rotations[1:], found.rotations[:-1])
@@ -376,7 +376,7 @@ def test_what_the_corpus_does_is_done_again(walking: Learned) -> None:
     for the legs, whose feet slid as it was recorded."""
     motion = walk()
     rows = list(range(5, 17))
-    found = realised(walking, rows, motion.posture(5), motion.posture(16), fps=5.0)
+    found = synthesised(walking, rows, motion.posture(5), motion.posture(16), fps=5.0)
     share = np.linspace(0.0, 1.0, len(rows))[:, None]
     straight = rot.slerp(motion.rotations[5], motion.rotations[16], share)
     rest = np.setdiff1d(np.arange(23), parts_of(human23())[1][1:])
@@ -390,7 +390,7 @@ def test_what_the_corpus_does_is_done_again(walking: Learned) -> None:
 def test_no_frame_is_below_the_floor_where_a_and_b_stand_on_it(walking: Learned) -> None:
     motion = walk()
     for rows in ([3, 4], [2, 3, 4, 5, 6, 7, 8], [0, 9, 30, 31, 32]):
-        found = realised(walking, rows, motion.posture(rows[0]), motion.posture(rows[-1]))
+        found = synthesised(walking, rows, motion.posture(rows[0]), motion.posture(rows[-1]))
         assert lowest_height(human23(), found.rotations, found.root).min() > -0.006
 
 
@@ -398,15 +398,15 @@ def test_a_body_that_stands_on_a_stage_stays_on_it(walking: Learned) -> None:
     """Both ends are 30 cm higher than the corpus knows bodies to be."""
     motion, rows, up = walk(), [2, 3, 4, 5, 6, 7, 8], np.array([0.0, 0.3, 0.0])
     a, b = (replace(motion.posture(row), root=motion.root[row] + up) for row in (2, 8))
-    found = realised(walking, rows, a, b)
+    found = synthesised(walking, rows, a, b)
     np.testing.assert_allclose(lowest_height(human23(), found.rotations, found.root), 0.3, atol=0.03)
 
 
 def test_a_body_whose_floor_is_below_zero_stays_on_it(walking: Learned) -> None:
     sunk = walk(sink=0.11)
-    found = realised(walking, [2, 3, 4, 5, 6, 7], sunk.posture(2), sunk.posture(7))
+    found = synthesised(walking, [2, 3, 4, 5, 6, 7], sunk.posture(2), sunk.posture(7))
     np.testing.assert_allclose(lowest_height(human23(), found.rotations, found.root), -0.11, atol=0.03)
-    up = realised(walking, [2, 3, 4, 5, 6, 7], sunk.posture(2), walk().posture(7))
+    up = synthesised(walking, [2, 3, 4, 5, 6, 7], sunk.posture(2), walk().posture(7))
     heights = lowest_height(human23(), up.rotations, up.root)
     np.testing.assert_allclose(heights, np.linspace(-0.11, 0.0, len(heights)), atol=0.03)
 
@@ -417,7 +417,7 @@ def test_a_jump_of_the_corpus_is_jumped_and_its_floor_is_not_its_zero() -> None:
     root[10:13, 1] += 0.25
     known = learned(replace(jumping, root=root))
     grounded, rows = walk(), list(range(5, 18))
-    found = realised(known, rows, grounded.posture(5), grounded.posture(17), 30.0, 1e-6)
+    found = synthesised(known, rows, grounded.posture(5), grounded.posture(17), 30.0, 1e-6)
     heights = lowest_height(human23(), found.rotations, found.root)
     assert 0.8 < heights.argmax() / 30.0 < 1.6
     assert 0.12 < heights.max() < 0.35
@@ -426,7 +426,7 @@ def test_a_jump_of_the_corpus_is_jumped_and_its_floor_is_not_its_zero() -> None:
     for rise, jumps in ((3.0, True), (0.8, False)):  # heights a second
         peaks = np.append(np.full(25, 50.0), [rise, 500.0])
         ends = grounded.posture(5), grounded.posture(17)
-        found = realised(known, rows, *ends, 30.0, 1e-6, peaks=lambda *_, peaks=peaks: peaks)
+        found = synthesised(known, rows, *ends, 30.0, 1e-6, peaks=lambda *_, peaks=peaks: peaks)
         heights = lowest_height(human23(), found.rotations, found.root)
         assert (heights.max() > 0.12) == jumps
 
@@ -434,7 +434,7 @@ def test_a_jump_of_the_corpus_is_jumped_and_its_floor_is_not_its_zero() -> None:
 def test_no_frame_jumps(walking: Learned) -> None:
     motion = walk()
     rows = [3, 4, 5, 6, 7, 8, 9, 10]
-    found = realised(walking, rows, motion.posture(3), motion.posture(10), fps=60.0)
+    found = synthesised(walking, rows, motion.posture(3), motion.posture(10), fps=60.0)
     keys = motion.rotations[rows]
     fastest = rot.angle(keys[1:], keys[:-1]).max(axis=0) / 0.2
     speed = rot.angle(found.rotations[1:], found.rotations[:-1]).max(axis=0) * 60.0
@@ -452,7 +452,7 @@ def test_the_motion_is_on_the_body_of_a_even_where_b_was_on_shorter_legs() -> No
     a, b = motion.posture(3), motion.posture(6)
     small = Skeleton("small", a.skeleton.names, a.skeleton.parents, 0.7 * a.skeleton.offsets, 0.7 * a.skeleton.tips)
     root = stand(small, b.rotations[None], b.root[None], np.zeros(1))[0]
-    found = realised(known, [3, 4, 5, 6], a, Posture(small, b.rotations, root))
+    found = synthesised(known, [3, 4, 5, 6], a, Posture(small, b.rotations, root))
     assert found.skeleton is a.skeleton
     np.testing.assert_array_equal(found.root[-1], root)
     assert np.abs(np.diff(found.root[:, 1])).max() < 0.1  # lower by 0.35 in the last of three moves
@@ -460,6 +460,6 @@ def test_the_motion_is_on_the_body_of_a_even_where_b_was_on_shorter_legs() -> No
 
 def test_no_moves_are_one_frame(walking: Learned) -> None:
     a = walk().posture(3)
-    found = realised(walking, [3], a, a)
+    found = synthesised(walking, [3], a, a)
     assert (len(found), found.name, found.insertions[0].times.tolist()) == (1, "tween", [0.0])
     np.testing.assert_array_equal(found.rotations[0], a.rotations)

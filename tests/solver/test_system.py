@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from motionmind._typing import Bools, Floats
-from motionmind.synth.system import Normal
+from motionmind.solver.system import Normal
 
 SHAPES = [(1, 1), (1, 5), (2, 3), (3, 4), (12, 1), (12, 7), (30, 18)]
 

@@ -19,8 +19,8 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.limits import within_limits
 from motionmind.footing.balance import nearest_in_support
 from motionmind.geometry import rotations as rot
-from motionmind.synth.kinematics import Rows, State, rows_at
-from motionmind.synth.system import Normal
+from motionmind.solver.kinematics import Rows, State, rows_at
+from motionmind.solver.system import Normal
 
 UP = np.array([0.0, 1.0, 0.0])
 BOUND_TOLERANCE = 1e-6  # in the unit of the term

@@ -11,13 +11,13 @@ import numpy as np
 from motionmind._typing import Floats, Ints
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
-from motionmind.learned.carriage import Carriage
 from motionmind.learned.nearest import postures_near
+from motionmind.learned.posture_statistics import PostureStatistics
 
 N_DETOUR_POSTURES = 8  # to try for each end
 
 
-def detour(corpus: Corpus, carriage: Carriage, ends: tuple[Floats, Floats], moves: int, own: int) -> Floats:
+def detour(corpus: Corpus, statistics: PostureStatistics, ends: tuple[Floats, Floats], moves: int, own: int) -> Floats:
     """Return orientations of the joints at each move [moves + 1, J, 4], exact at both ends.
 
     Choose the pair of recordings, one from near the first posture and one into the last, that costs least. The cost is
@@ -26,16 +26,16 @@ def detour(corpus: Corpus, carriage: Carriage, ends: tuple[Floats, Floats], move
 
     Args:
         corpus: the recorded movement.
-        carriage: its samples.
+        statistics: its samples.
         ends: orientations of the chains in both postures [L, 4].
         moves: number of moves of the detour, each as long as a move of the corpus.
         own: number of moves in which to join the two recordings.
     """
     joints = len(corpus.skeleton)
-    shown = carriage.orientations[: len(corpus), :joints]
+    shown = statistics.orientations[: len(corpus), :joints]
     first, last = (end[:joints] for end in ends)
     starts, stops = corpus.columns.starts[:-1], corpus.columns.starts[1:]
-    near = [_nearest(carriage, shown, end) for end in (first, last)]
+    near = [_nearest(statistics, shown, end) for end in (first, last)]
     spare = max(moves - own, 0)
     best, chosen = np.inf, (0, 0, 0, 0)
     for i, first_off in zip(*near[0], strict=True):
@@ -58,13 +58,13 @@ def detour(corpus: Corpus, carriage: Carriage, ends: tuple[Floats, Floats], move
     return out
 
 
-def _nearest(carriage: Carriage, shown: Floats, posture: Floats) -> tuple[Ints, Floats]:
+def _nearest(statistics: PostureStatistics, shown: Floats, posture: Floats) -> tuple[Ints, Floats]:
     """Return the indices of the postures [N, J, 4] nearest to one [J, 4], and their distances, radians per joint."""
     some = np.arange(len(shown))
-    if carriage.trees is not None:
+    if statistics.trees is not None:
         # Try four times as many, because the trees use another metric.
         count = 4 * N_DETOUR_POSTURES
-        some = np.sort(postures_near(carriage.trees, carriage.orientations, posture, count, len(shown)))
+        some = np.sort(postures_near(statistics.trees, statistics.orientations, posture, count, len(shown)))
     off = np.sqrt(np.mean(rot.angle(shown[some], posture) ** 2, axis=-1))
     order = np.argsort(off, kind="stable")[:N_DETOUR_POSTURES]
     return some[order], off[order]

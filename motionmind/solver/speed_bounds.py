@@ -9,9 +9,9 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices
 from motionmind.geometry import rotations as rot
-from motionmind.synth.kinematics import State, inverse_right_jacobian
-from motionmind.synth.one_sided import UP, VectorBound, beyond, once_per_state
-from motionmind.synth.system import Normal
+from motionmind.solver.kinematics import State, inverse_right_jacobian
+from motionmind.solver.one_sided import UP, VectorBound, beyond, once_per_state
+from motionmind.solver.system import Normal
 
 
 @dataclass

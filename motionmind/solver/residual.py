@@ -9,7 +9,7 @@ class Residual(msgspec.Struct, frozen=True):
     """The largest residual of a term of the solve.
 
     Attributes:
-        term: name of the term, a class of `motionmind.synth.terms`.
+        term: name of the term, a class of `motionmind.solver.terms`.
         most: the residual, in `unit`.
         unit: its unit.
         at: seconds from the start.

@@ -10,8 +10,8 @@ from moved import HUMAN, differences, freedom_of, moved, random_rotations, rando
 from motionmind.body.contact import contact_points
 from motionmind.body.support import centre_of_mass
 from motionmind.geometry import rotations as rot
-from motionmind.synth.kinematics import MAX_SERIES_RAD2, Rows, State, body_of, rows_at
-from motionmind.synth.system import Normal
+from motionmind.solver.kinematics import MAX_SERIES_RAD2, Rows, State, body_of, rows_at
+from motionmind.solver.system import Normal
 
 # Of unknowns: none; on both sides of where sines give way to their series; as a solve has them; past half a turn.
 SIZES = [0.0, 0.3 * MAX_SERIES_RAD2**0.5, MAX_SERIES_RAD2**0.5, 0.1, 2.0]

@@ -15,8 +15,8 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.learned.pace import moved_in, steps_of
 from motionmind.learned.peaks import accelerations
-from motionmind.realise.retime import MIN_CLOCK_CHANGE_RATIO, SLOWDOWN_AROUND_S, SLOWDOWN_FROM_END_S, slower_steps
-from motionmind.realise.timeline import Timeline, stretch
+from motionmind.synthesis.retime import MIN_CLOCK_CHANGE_RATIO, SLOWDOWN_AROUND_S, SLOWDOWN_FROM_END_S, slower_steps
+from motionmind.synthesis.timeline import Timeline, stretch
 
 FPS, BODY = 30.0, human23()
 ELBOW = BODY.index("left_elbow")

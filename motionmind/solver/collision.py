@@ -11,9 +11,9 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.capsules import LEG, capsules_of, pair_depths
 from motionmind.body.tempo import runs_of
 from motionmind.footing.smoothing import sliding_max
-from motionmind.synth.kinematics import Rows, State
-from motionmind.synth.one_sided import BOUND_TOLERANCE, OneSided, once_per_state
-from motionmind.synth.system import Normal
+from motionmind.solver.kinematics import Rows, State
+from motionmind.solver.one_sided import BOUND_TOLERANCE, OneSided, once_per_state
+from motionmind.solver.system import Normal
 
 LEGS_NEAR_M = 0.06  # legs this near may pass through each other within a frame
 MAX_SIDE_CHANGE_COSINE = 0.2  # between the directions from leg to leg before and after they change sides

@@ -12,16 +12,16 @@ from moved import FPS, HUMAN, freedom_of, linearised, random_rotations, random_s
 
 from motionmind._typing import Floats
 from motionmind.body.capsules import capsules_of, legs_depth
-from motionmind.body.plausibility import GRAVITY
+from motionmind.body.plausibility import GRAVITY_MPS2
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
-from motionmind.synth.collision import Collision
-from motionmind.synth.kinematics import Freedom, State, body_of
-from motionmind.synth.one_sided import Balance, Floor, Limits
-from motionmind.synth.solve import MAX_ITERATIONS_PER_PLAN, Problem, solve
-from motionmind.synth.speed_bounds import Speed, Travel
-from motionmind.synth.system import Normal
-from motionmind.synth.terms import Ballistic, Contacts, Smoothness, Term, Track
+from motionmind.solver.collision import Collision
+from motionmind.solver.kinematics import Freedom, State, body_of
+from motionmind.solver.one_sided import Balance, Floor, Limits
+from motionmind.solver.solve import MAX_ITERATIONS_PER_PLAN, Problem, solve
+from motionmind.solver.speed_bounds import Speed, Travel
+from motionmind.solver.system import Normal
+from motionmind.solver.terms import Ballistic, Contacts, Smoothness, Term, Track
 
 N, J = 11, len(HUMAN)
 POINTS = len(body_of(HUMAN).owners)
@@ -47,11 +47,11 @@ def test_a_body_in_the_air_falls_on_a_parabola() -> None:
     problem = problem_of(random_rotations(HUMAN, N, 0.3, 0), np.linspace([0.0, 1.0, 0.0], [0.5, 1.2, 0.3], N))
     given = problem.state(rest(problem)).mass[[0, -1]]
     sds = rng.uniform(0.5, 1.0, (N, problem.freedom.unknowns))
-    fall = Ballistic(FPS, np.ones(N - 2, np.bool_), GRAVITY, (np.inf, np.inf), 0.01)
+    fall = Ballistic(FPS, np.ones(N - 2, np.bool_), GRAVITY_MPS2, (np.inf, np.inf), 0.01)
     made = solve(problem, [Track(sds), fall], rest(problem))
     t = np.arange(N) / FPS
     wanted = given[0] + (t / t[-1])[:, None] * (given[1] - given[0])
-    wanted[:, 1] += 0.5 * GRAVITY * t * (t[-1] - t)
+    wanted[:, 1] += 0.5 * GRAVITY_MPS2 * t * (t[-1] - t)
     np.testing.assert_allclose(made.mass, wanted, atol=1e-4)
     np.testing.assert_allclose(fall.residuals(made), 0.0, atol=0.02)
 
@@ -59,7 +59,7 @@ def test_a_body_in_the_air_falls_on_a_parabola() -> None:
 def test_a_body_on_the_floor_is_accelerated_as_little_as_may_be() -> None:
     """With nothing else to keep to, its mass goes straight on from end to end."""
     problem = problem_of(random_rotations(HUMAN, N, 0.3, 0), np.random.default_rng(0).normal(0.0, 0.1, (N, 3)))
-    rests = Ballistic(FPS, np.zeros(N - 2, np.bool_), GRAVITY, (0.1, 0.1), 0.1)
+    rests = Ballistic(FPS, np.zeros(N - 2, np.bool_), GRAVITY_MPS2, (0.1, 0.1), 0.1)
     made = solve(problem, [rests], rest(problem))
     np.testing.assert_allclose(made.mass, np.linspace(made.mass[0], made.mass[-1], N), atol=1e-3)
 
@@ -197,7 +197,7 @@ INF = np.inf
 FREE: dict[str, Callable[[State], Term]] = {
     "track": lambda state: Track(np.full(state.x.shape, INF)),
     "run": lambda state: Smoothness(np.full(state.x.shape[1], INF)),
-    "ballistic": lambda _: Ballistic(FPS, np.arange(N - 2) % 2 == 0, GRAVITY, (INF, INF), INF),
+    "ballistic": lambda _: Ballistic(FPS, np.arange(N - 2) % 2 == 0, GRAVITY_MPS2, (INF, INF), INF),
     "contacts": lambda state: Contacts(
         np.array([3]),
         np.array([4]),
@@ -210,7 +210,7 @@ FREE: dict[str, Callable[[State], Term]] = {
     ),
     "floor": lambda _: Floor(np.ones(N), INF),
     "balance": lambda _: Balance(
-        np.tile(np.arange(POINTS) == 4, (N, 1)), np.full(N, -1.0), 0.0, 0.0, np.zeros((2, N)), GRAVITY, FPS, INF
+        np.tile(np.arange(POINTS) == 4, (N, 1)), np.full(N, -1.0), 0.0, 0.0, np.zeros((2, N)), GRAVITY_MPS2, FPS, INF
     ),
     "limits": lambda _: Limits(np.tile(rot.IDENTITY, (2, J, 1)), np.zeros(J, np.bool_), INF),
     "speed": lambda _: Speed(np.full(J, 0.1), 0.1, FPS, INF),

@@ -2,7 +2,7 @@
 
 A term states one property of the movement and its weight. `add(state, normal)` adds its rows, linearised at a state;
 `residuals(state)` returns its residual frame by frame, in the unit of reports. Terms that push only beyond a bound are
-in `motionmind.synth.one_sided`.
+in `motionmind.solver.one_sided`.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices
-from motionmind.synth.kinematics import Rows, State, rows_at
-from motionmind.synth.system import Normal
+from motionmind.solver.kinematics import Rows, State, rows_at
+from motionmind.solver.system import Normal
 
 
 class Term(Protocol):

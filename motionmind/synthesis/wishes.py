@@ -13,7 +13,7 @@ from motionmind.body.motion import Posture, Velocity
 from motionmind.corpus.corpus import Corpus
 from motionmind.footing.corrections import Correction
 from motionmind.grammar.grammar import Grammar
-from motionmind.learned.carriage import Carriage
+from motionmind.learned.posture_statistics import PostureStatistics
 from motionmind.walks.passages import Place
 
 
@@ -23,7 +23,7 @@ class Style(NamedTuple):
     Attributes:
         corpus: the corpus.
         grammar: its states and transitions.
-        carriage: its posture statistics: travel and stance.
+        statistics: its posture statistics: travel and stance.
         tolerances: angle within which a state of each chain stands for an orientation [L], radians.
         fastest: greatest speeds of the joints, of turning and of travel [J + 2], as in `motionmind.learned.pace`, at a
             pace of 1; None for no bound. With a given length they hold as far as slower parts have time to spare.
@@ -34,7 +34,7 @@ class Style(NamedTuple):
 
     corpus: Corpus
     grammar: Grammar
-    carriage: Carriage
+    statistics: PostureStatistics
     tolerances: Floats
     fastest: Floats | None = None
     peaks: Callable[[float, float], Floats] | None = None

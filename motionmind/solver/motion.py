@@ -1,7 +1,7 @@
 """Synthesis: from a reference movement to one that its feet carry, exact in the given postures.
 
-`motionmind.synth.plan` plans stances and flights. `motionmind.synth.solve` then solves one least-squares problem over
-the root and the joints of all frames. Its terms (`motionmind.synth.terms`) state properties of the movement, and
+`motionmind.solver.plan` plans stances and flights. `motionmind.solver.solve` then solves one least-squares problem over
+the root and the joints of all frames. Its terms (`motionmind.solver.terms`) state properties of the movement, and
 `WEIGHTS` their standard deviations, chosen for a body the size of a person: every body is scaled to that size.
 """
 
@@ -19,7 +19,7 @@ from motionmind.body.capsules import capsules_of
 from motionmind.body.contact import pose
 from motionmind.body.legs import find_hinge, find_legs
 from motionmind.body.limbs import limbs_of
-from motionmind.body.plausibility import GRAVITY
+from motionmind.body.plausibility import GRAVITY_MPS2
 from motionmind.body.skeleton import Skeleton, remembered
 from motionmind.body.support import size_of
 from motionmind.footing.corrections import Correction
@@ -28,15 +28,15 @@ from motionmind.footing.ground import Given, Stance, Stretch, find_ground
 from motionmind.footing.smoothing import smoothstep
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline
-from motionmind.synth.collision import Collision
-from motionmind.synth.kinematics import Freedom, State, body_of
-from motionmind.synth.one_sided import BOUND_TOLERANCE, UP, Balance, Floor, Limits
-from motionmind.synth.plan import Plan, plan_contacts
-from motionmind.synth.residual import Residual
-from motionmind.synth.solve import Problem, solve
-from motionmind.synth.speed_bounds import Speed, Travel
-from motionmind.synth.terms import Ballistic, Contacts, Smoothness, Term, Track
-from motionmind.synth.weights import WEIGHTS, Weights
+from motionmind.solver.collision import Collision
+from motionmind.solver.kinematics import Freedom, State, body_of
+from motionmind.solver.one_sided import BOUND_TOLERANCE, UP, Balance, Floor, Limits
+from motionmind.solver.plan import Plan, plan_contacts
+from motionmind.solver.residual import Residual
+from motionmind.solver.solve import Problem, solve
+from motionmind.solver.speed_bounds import Speed, Travel
+from motionmind.solver.terms import Ballistic, Contacts, Smoothness, Term, Track
+from motionmind.solver.weights import WEIGHTS, Weights
 
 MOTIONLESS_RAD = 2e-3  # a joint that leaves its first orientation by less does not move
 LEGS_PASS_S = 0.12  # before legs meet and after they part, in which the plane between them turns; chosen on cmu-05
@@ -102,7 +102,7 @@ class Synthesis(NamedTuple):
         return self._replace(x=natural_spline(times, self.x, then), falls=falls)
 
 
-def synthesise(
+def solve_motion(
     skeleton: Skeleton,
     reference: Floats,
     times: Floats,
@@ -129,7 +129,7 @@ def synthesise(
     size = size_of(skeleton)
     by, person = 1.0 / size, _as_large_as_a_person(skeleton)
     lengths = stance.scaled(by), given.scaled(by), bounds.scaled(by)
-    scene = _Scene(person, reference, times, *lengths, GRAVITY / size, without, weights, before)
+    scene = _Scene(person, reference, times, *lengths, GRAVITY_MPS2 / size, without, weights, before)
     x = scene.solve()
     state = scene.problem(slice(0, len(times))).state(x)
     root = size * state.root
@@ -314,7 +314,7 @@ class _Scene:
         """Return which points support the body in a slice of the frames [M, P]."""
         out = np.zeros((len(self.reference), len(self.body.owners)), dtype=np.bool_)
         for plan in self.plans:
-            out[plan.stretch.frames] = plan.bearing.touching(plan.shape)
+            out[plan.stretch.frames] = plan.phases.touching(plan.shape)
         return out[frames]
 
 

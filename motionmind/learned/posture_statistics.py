@@ -1,4 +1,4 @@
-"""Carriage: posture, travel and support in each sample of a corpus."""
+"""Posture statistics: orientations, travel and support in each sample of a corpus."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from motionmind.body.capsules import capsules_of, penetration
 from motionmind.body.contact import contact_points, floor_height, limb_heights, lowest_height
 from motionmind.body.limbs import limb_of_points, limbs_of
 from motionmind.body.limits import find_loose
-from motionmind.body.support import NEAR, STILL, centre_of_mass, overhang, size_of
+from motionmind.body.support import SUPPORT_HEIGHT_M, SUPPORT_SPEED_MPS, centre_of_mass, overhang, size_of
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.kept import Kept
 from motionmind.executors.workshop import Workshop
@@ -33,7 +33,7 @@ MAX_OVERHANG_M = 0.15  # dancers who lean farther are moving
 
 
 @dataclass(frozen=True, eq=False)
-class Carriage:
+class PostureStatistics:
     """Posture statistics of a corpus: orientations, travel and support in its N samples.
 
     The samples are the postures, then the midpoints of the M moves. A step is half a move.
@@ -78,34 +78,34 @@ class Carriage:
     trust: Trust = PRIOR_TRUST
 
 
-def learn_carriage(
-    corpus: Corpus, workshop: Workshop | None = None, kept: Kept | None = None, before: Carriage | None = None
-) -> Carriage:
+def learn_posture_statistics(
+    corpus: Corpus, workshop: Workshop | None = None, kept: Kept | None = None, before: PostureStatistics | None = None
+) -> PostureStatistics:
     """Learn the posture statistics of a corpus.
 
     Args:
         corpus: the movement.
         workshop: threads, and room for large arrays; None for the current thread and memory.
         kept: the clips shared with an earlier corpus; None for no such corpus.
-        before: the carriage of that corpus; its samples in these clips are reused.
+        before: the posture statistics of that corpus; its samples in these clips are reused.
     """
     workshop = workshop or Workshop()
-    moments = _join_moments(kept, before, workshop) if kept and before else _measure_moments(corpus, workshop)
+    samples = _join_samples(kept, before, workshop) if kept and before else _measure_samples(corpus, workshop)
     begins, ends, weights = corpus.moves.begins, corpus.moves.ends, corpus.moves.weights
     shares = weights / np.bincount(begins, weights, len(corpus))[begins]
     middles = len(corpus) + np.arange(len(begins))
     counts = np.concatenate([corpus.weights, weights])
-    orientations, stands, aloft = moments.orientations, moments.stands, moments.aloft
-    return Carriage(
+    orientations, stands, aloft = samples.orientations, samples.stands, samples.aloft
+    return PostureStatistics(
         orientations,
         counts,
         np.concatenate([begins, middles]),
         np.concatenate([middles, ends]),
         np.concatenate([shares, np.ones(len(begins))]),
         clusters_of(corpus.skeleton, orientations, workshop),
-        moments.turn,
-        moments.travel,
-        moments.clearance,
+        samples.turn,
+        samples.travel,
+        samples.clearance,
         stands,
         aloft,
         _overhang(corpus, stands[: len(corpus)], aloft[: len(corpus)], workshop),
@@ -118,8 +118,8 @@ def learn_carriage(
 _MOVE_FIELDS = "turn", "travel"  # fields with a row per move, and none per posture
 
 
-class _Moments(NamedTuple):
-    """Arrays of Carriage that depend on each clip alone."""
+class _Samples(NamedTuple):
+    """Arrays of PostureStatistics that depend on each clip alone."""
 
     orientations: Floats
     clearance: Floats
@@ -129,7 +129,7 @@ class _Moments(NamedTuple):
     travel: Floats
 
 
-def _measure_moments(corpus: Corpus, workshop: Workshop) -> _Moments:
+def _measure_samples(corpus: Corpus, workshop: Workshop) -> _Samples:
     """Measure the samples of all clips."""
 
     def low_in(here: slice) -> Floats:
@@ -143,7 +143,7 @@ def _measure_moments(corpus: Corpus, workshop: Workshop) -> _Moments:
     turned = np.angle(np.exp(1j * (heading[ends] - heading[begins])))
     moved = rot.mul_vec(rot.about_vertical(-heading[begins] - 0.5 * turned), corpus.root[ends] - corpus.root[begins])
     clear = np.concatenate([clearance, 0.5 * (clearance[begins] + clearance[ends])])
-    return _Moments(
+    return _Samples(
         _orientations(corpus, workshop),
         clear,
         _standing(corpus, workshop),
@@ -153,9 +153,9 @@ def _measure_moments(corpus: Corpus, workshop: Workshop) -> _Moments:
     )
 
 
-def _join_moments(kept: Kept, before: Carriage, workshop: Workshop) -> _Moments:
+def _join_samples(kept: Kept, before: PostureStatistics, workshop: Workshop) -> _Samples:
     """Join the samples of kept clips with those of new clips, which are measured."""
-    new = None if kept.new is None else _measure_moments(kept.new, workshop)
+    new = None if kept.new is None else _measure_samples(kept.new, workshop)
     moves = len(before.turn)
 
     def join(name: str) -> Floats:
@@ -168,7 +168,7 @@ def _join_moments(kept: Kept, before: Carriage, workshop: Workshop) -> _Moments:
         kept.join(old[len(old) - moves :], middles, kept.moves, out[whole:])
         return out
 
-    return _Moments(*map(join, _Moments._fields))
+    return _Samples(*map(join, _Samples._fields))
 
 
 def _blocks(count: int) -> Iterator[slice]:
@@ -193,7 +193,7 @@ def _orientations(corpus: Corpus, workshop: Workshop) -> Floats:
 
 
 def _touching(corpus: Corpus, workshop: Workshop) -> Floats:
-    """Return the greatest penetration depth of each pair of limbs [P], metres, as in Carriage."""
+    """Return the greatest penetration depth of each pair of limbs [P], metres, as in PostureStatistics."""
     if not len(capsules_of(corpus.skeleton).pairs()):
         return np.zeros(0)
 
@@ -207,7 +207,7 @@ def _touching(corpus: Corpus, workshop: Workshop) -> Floats:
 
 
 def _standing(corpus: Corpus, workshop: Workshop) -> Floats:
-    """Return the firmness of limbs and trunk [N, limbs + 1], as in Carriage.
+    """Return the firmness of limbs and trunk [N, limbs + 1], as in PostureStatistics.
 
     In a move it is 1 / (1 + (v / FIRMNESS_HALVED_MPS)^2), with v the horizontal speed of the limb's lowest point. In a
     posture it is the mean over the moves that begin or end there.
@@ -243,7 +243,7 @@ def _lowest_moved(before: Floats, after: Floats) -> Floats:
 
 
 def _aloft(corpus: Corpus, clearance: Floats, workshop: Workshop) -> Floats:
-    """Return whether the body is in the air in each sample [N], 0 or 1, as in Carriage.
+    """Return whether the body is in the air in each sample [N], 0 or 1, as in PostureStatistics.
 
     A body on half-pointe, or with a slightly misplaced floor, may be as high, but its lowest point hardly moves.
 
@@ -266,11 +266,11 @@ def _aloft(corpus: Corpus, clearance: Floats, workshop: Workshop) -> Floats:
     both, twice = np.concatenate([begins, ends]), np.concatenate([speed, speed])
     counts = np.maximum(np.bincount(both, minlength=len(corpus)), 1)
     speeds = np.concatenate([np.bincount(both, twice, len(corpus)) / counts, speed])
-    return np.asarray((clearance > AIRBORNE_CLEARANCE_M * size) & (speeds > STILL * size), dtype=np.float64)
+    return np.asarray((clearance > AIRBORNE_CLEARANCE_M * size) & (speeds > SUPPORT_SPEED_MPS * size), dtype=np.float64)
 
 
 def _overhang(corpus: Corpus, stands: Floats, aloft: Floats, workshop: Workshop) -> Floats:
-    """Return the overhang of the corpus's bodies, as in Carriage.
+    """Return the overhang of the corpus's bodies, as in PostureStatistics.
 
     Args:
         corpus: the movement.
@@ -296,7 +296,7 @@ def _overhangs(corpus: Corpus, here: slice, stands: Floats, aloft: Floats) -> Fl
         aloft: whether the body is in the air in each [T].
     """
     body, rotations, root = corpus.skeleton, corpus.rotations[here], corpus.root[here]
-    mass, near = centre_of_mass(body, rotations, root), NEAR * size_of(body)
+    mass, near = centre_of_mass(body, rotations, root), SUPPORT_HEIGHT_M * size_of(body)
     low = limb_heights(body, rotations, root)
     bears = (low <= low.min(axis=1, keepdims=True) + near) & (stands > MIN_FIRMNESS) & (aloft == 0.0)[:, None]
     alone = bears.sum(axis=1) == 1

@@ -11,7 +11,7 @@ from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline
 from motionmind.grammar.grammar import Grammar
-from motionmind.realise.timeline import Timeline
+from motionmind.synthesis.timeline import Timeline
 from motionmind.walks.expectation import Expectation
 from motionmind.walks.headings import correct_headings
 from motionmind.walks.stops import Stop

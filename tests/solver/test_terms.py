@@ -12,15 +12,15 @@ from moved import FPS, HUMAN, differences, freedom_of, linearised, moved, random
 from motionmind._typing import Floats, Indices
 from motionmind.body.capsules import capsules_of, legs_depth, pair_depths
 from motionmind.body.legs import find_hinge
-from motionmind.body.plausibility import GRAVITY
+from motionmind.body.plausibility import GRAVITY_MPS2
 from motionmind.geometry import rotations as rot
-from motionmind.synth import collision as module
-from motionmind.synth.collision import Collision
-from motionmind.synth.kinematics import Freedom, State, body_of
-from motionmind.synth.one_sided import Balance, Floor, Limits, OneSided
-from motionmind.synth.speed_bounds import Speed, Travel
-from motionmind.synth.system import Normal
-from motionmind.synth.terms import Ballistic, Contacts, Smoothness, Term, Track
+from motionmind.solver import collision as module
+from motionmind.solver.collision import Collision
+from motionmind.solver.kinematics import Freedom, State, body_of
+from motionmind.solver.one_sided import Balance, Floor, Limits, OneSided
+from motionmind.solver.speed_bounds import Speed, Travel
+from motionmind.solver.system import Normal
+from motionmind.solver.terms import Ballistic, Contacts, Smoothness, Term, Track
 
 N, J = 6, len(HUMAN)
 LEVEL = np.array([1.0, 0.0, 1.0])
@@ -66,8 +66,8 @@ FASTEST = np.where(np.arange(J) % 5 == 4, np.inf, 3.0)
 SMOOTH: dict[str, Callable[[State], Term]] = {
     "track": lambda _: Track(np.random.default_rng(0).uniform(0.1, 1.0, (N, UNKNOWNS))),
     "run": lambda _: Smoothness(np.random.default_rng(0).uniform(0.1, 1.0, UNKNOWNS)),
-    "ballistic": lambda _: Ballistic(FPS, SOME[1:-1], GRAVITY, (2.0, 3.0), 0.15),
-    "ballistic without bounce": lambda _: Ballistic(FPS, SOME[1:-1], GRAVITY, (2.0, np.inf), 0.15),
+    "ballistic": lambda _: Ballistic(FPS, SOME[1:-1], GRAVITY_MPS2, (2.0, 3.0), 0.15),
+    "ballistic without bounce": lambda _: Ballistic(FPS, SOME[1:-1], GRAVITY_MPS2, (2.0, np.inf), 0.15),
     "contacts near": lambda state: contacts(state, 0.01, ALIKE * [1.0, 0.1, 1.0]),
     "contacts far": lambda state: contacts(state, 0.2, ALIKE),
     "contacts far, height firmer": lambda state: contacts(state, 0.2, ALIKE * [1.0, 0.1, 1.0]),
@@ -100,7 +100,7 @@ def test_the_gradient_of_balance_is_exact_but_for_how_the_support_moves(seed: in
     touches = np.zeros((N, POINTS), dtype=np.bool_)
     touches[:, [HUMAN.index(name) for name in ("left_toes", "left_ankle", "right_toes")]] = True
     floor = np.full(N, state.places[0, :, 1].min())
-    term = Balance(touches, floor, 0.01, 0.04, np.zeros((2, N)), GRAVITY, FPS, 0.005)
+    term = Balance(touches, floor, 0.01, 0.04, np.zeros((2, N)), GRAVITY_MPS2, FPS, 0.005)
     trunk = [HUMAN.index(name) for name in ("lumbar", "left_shoulder", "right_shoulder", "left_elbow", "right_elbow")]
     assert_gradient(term, state, 3 + np.flatnonzero(np.isin(state.freedom.joints, trunk)))
     assert term.residuals(state).max() > 1.0
@@ -274,16 +274,16 @@ def satisfied() -> dict[str, tuple[Term, State]]:
     touches[:, feet] = True
     fell = at_rest(state.rotations)
     fell = State(fell.body, fell.freedom, fell.rotations, fell.root, fell.x.copy())
-    fell.x[:, 1] = -0.5 * GRAVITY * (np.arange(N) / FPS) ** 2
+    fell.x[:, 1] = -0.5 * GRAVITY_MPS2 * (np.arange(N) / FPS) ** 2
     fell = State(fell.body, fell.freedom, fell.rotations, fell.root, fell.x)
     return {
         "track": (Track(np.ones((N, UNKNOWNS))), state),
         "run": (Smoothness(np.ones(UNKNOWNS)), state),
-        "ballistic, on the floor": (Ballistic(FPS, np.zeros(N - 2, np.bool_), GRAVITY, (2.0, 2.0), 0.1), state),
-        "ballistic, in the air": (Ballistic(FPS, np.ones(N - 2, np.bool_), GRAVITY, (2.0, 2.0), 0.1), fell),
+        "ballistic, on the floor": (Ballistic(FPS, np.zeros(N - 2, np.bool_), GRAVITY_MPS2, (2.0, 2.0), 0.1), state),
+        "ballistic, in the air": (Ballistic(FPS, np.ones(N - 2, np.bool_), GRAVITY_MPS2, (2.0, 2.0), 0.1), fell),
         "contacts": (placed, state),
         "floor": (Floor(floor - 0.01, 0.003), state),
-        "balance": (Balance(touches, floor, 0.02, 0.04, np.zeros((2, N)), GRAVITY, FPS, 0.005), state),
+        "balance": (Balance(touches, floor, 0.02, 0.04, np.zeros((2, N)), GRAVITY_MPS2, FPS, 0.005), state),
         "limits": (Limits(posture()[:2], np.zeros(J, np.bool_), 0.03), state),
         "limits, loose": (Limits(posture()[:2], np.ones(J, np.bool_), 0.03), random_state(0, 1.0, N)),
         "limits, given": (Limits(random_state(0, 1.0, N).rotations, np.zeros(J, np.bool_), 0.03), random_state(0, 1.0)),
@@ -311,7 +311,7 @@ def test_terms_say_by_how_much_they_give() -> None:
     falling = np.array([True, False, False, False])
     assert Floor(np.full(N, lowest + 0.05), 0.01).residuals(state) == pytest.approx(5.0)
     np.testing.assert_allclose(
-        Ballistic(FPS, falling, GRAVITY, (2.0, 2.0), 0.1).residuals(state), GRAVITY * (np.arange(N) == 1)
+        Ballistic(FPS, falling, GRAVITY_MPS2, (2.0, 2.0), 0.1).residuals(state), GRAVITY_MPS2 * (np.arange(N) == 1)
     )
     turning = State(state.body, state.freedom, state.rotations, state.root, np.arange(N)[:, None] * np.eye(UNKNOWNS)[5])
     faster = Speed(np.full(J, 10.0), 10.0, FPS, 0.05).residuals(turning)

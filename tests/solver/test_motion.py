@@ -16,20 +16,20 @@ from motionmind._typing import Floats
 from motionmind.body.capsules import capsules_of, legs_depth, penetration
 from motionmind.body.contact import lowest_height
 from motionmind.body.limbs import limbs_of
-from motionmind.body.plausibility import GRAVITY
+from motionmind.body.plausibility import GRAVITY_MPS2
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass
 from motionmind.footing.corrections import Correction
 from motionmind.footing.ground import Given, Stance
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
-from motionmind.synth import synthesise as module
-from motionmind.synth.kinematics import State
-from motionmind.synth.one_sided import Limits
-from motionmind.synth.solve import Problem, solve
-from motionmind.synth.synthesise import Bounds, Synthesis, synthesise
-from motionmind.synth.terms import Ballistic, Contacts, Term
-from motionmind.synth.weights import WEIGHTS, Weights
+from motionmind.solver import motion as module
+from motionmind.solver.kinematics import State
+from motionmind.solver.motion import Bounds, Synthesis, solve_motion
+from motionmind.solver.one_sided import Limits
+from motionmind.solver.solve import Problem, solve
+from motionmind.solver.terms import Ballistic, Contacts, Term
+from motionmind.solver.weights import WEIGHTS, Weights
 
 MOVES = 8
 T = TypeVar("T")
@@ -86,7 +86,7 @@ class Toy(NamedTuple):
         self, without: Collection[Correction] = (), before: Synthesis | None = None, weights: Weights = WEIGHTS
     ) -> Synthesis:
         known = self.stance, self.given, self.bounds
-        return synthesise(self.skeleton, self.rotations, self.times, *known, without, before, weights)
+        return solve_motion(self.skeleton, self.rotations, self.times, *known, without, before, weights)
 
 
 def crouching(count: int = 31, depth: float = 0.4) -> Floats:
@@ -176,7 +176,7 @@ def test_a_body_that_jumps_falls() -> None:
     mass = centre_of_mass(HUMAN, made.rotations, made.root)
     assert mass is not None
     accelerated = FPS**2 * np.diff(mass, 2, axis=0)
-    np.testing.assert_allclose(accelerated[high[1:-1]], np.tile([0.0, -GRAVITY, 0.0], (high.sum(), 1)), atol=0.5)
+    np.testing.assert_allclose(accelerated[high[1:-1]], np.tile([0.0, -GRAVITY_MPS2, 0.0], (high.sum(), 1)), atol=0.5)
     assert lowest_height(HUMAN, *toy.made(["flight"])[:2]).max() < 0.05
 
 
@@ -214,7 +214,7 @@ def test_a_body_in_the_air_for_a_second_falls_freely(far: float, solved: list[So
     mass = centre_of_mass(HUMAN, made.rotations, made.root)
     assert mass is not None
     accelerated = FPS**2 * np.diff(mass, 2, axis=0)[falls]
-    np.testing.assert_allclose(accelerated, np.tile([0.0, -GRAVITY, 0.0], (len(accelerated), 1)), atol=0.5)
+    np.testing.assert_allclose(accelerated, np.tile([0.0, -GRAVITY_MPS2, 0.0], (len(accelerated), 1)), atol=0.5)
     assert most_of(made, "Ballistic") < 0.5
 
 
@@ -272,7 +272,7 @@ def test_a_body_twice_as_large_moves_twice_as_far(name: str) -> None:
     skeleton = replace(toy.skeleton, offsets=2.0 * toy.skeleton.offsets, tips=2.0 * toy.skeleton.tips)
     one = toy.made(["balance", "flight"])
     known = toy.stance.scaled(2.0), toy.given.scaled(2.0), toy.bounds.scaled(2.0)
-    other = synthesise(skeleton, toy.rotations, toy.times, *known, ["balance", "flight"])
+    other = solve_motion(skeleton, toy.rotations, toy.times, *known, ["balance", "flight"])
     np.testing.assert_allclose(other.rotations, one.rotations, atol=1e-9)
     np.testing.assert_allclose(other.root, 2.0 * one.root, atol=1e-9)
 
@@ -311,7 +311,7 @@ def test_joints_that_must_not_change_are_the_references() -> None:
     toy = TOYS["walks"]()
     fixed = np.zeros(len(HUMAN), dtype=np.bool_)
     fixed[[HUMAN.index(name) for name in ("left_knee", "lumbar")]] = True
-    made = synthesise(HUMAN, toy.rotations, toy.times, toy.stance, toy.given, toy.bounds._replace(fixed=fixed))
+    made = solve_motion(HUMAN, toy.rotations, toy.times, toy.stance, toy.given, toy.bounds._replace(fixed=fixed))
     np.testing.assert_allclose(made.rotations[:, fixed], toy.rotations[:, fixed], atol=1e-15)
     assert rot.angle(made.rotations[:, ~fixed], toy.rotations[:, ~fixed]).max() > 0.05
 
@@ -323,7 +323,7 @@ def test_joints_of_which_something_is_asked_stay_nearer_the_reference() -> None:
         np.isin(HUMAN.names, names) for names in (["pelvis", "lumbar"], ["left_hip", "right_hip", "left_knee"])
     )
     made = [
-        synthesise(HUMAN, toy.rotations, toy.times, toy.stance, toy.given, toy.bounds._replace(wished=wished))
+        solve_motion(HUMAN, toy.rotations, toy.times, toy.stance, toy.given, toy.bounds._replace(wished=wished))
         for wished in (trunk & legs, trunk, legs)
     ]
     off = [rot.angle(one.rotations[:, trunk], toy.rotations[:, trunk]).max() for one in made]
@@ -334,7 +334,7 @@ def test_joints_of_which_something_is_asked_stay_nearer_the_reference() -> None:
 def test_joints_turn_no_faster_than_may_be() -> None:
     toy = Toy(crouching(21, depth=1.0))
     most = np.full(len(HUMAN), 4.0)
-    made = synthesise(HUMAN, toy.rotations, toy.times, toy.stance, toy.given, toy.bounds._replace(fastest=most))
+    made = solve_motion(HUMAN, toy.rotations, toy.times, toy.stance, toy.given, toy.bounds._replace(fastest=most))
 
     def fastest(rotations: Floats) -> float:
         return float(FPS * rot.angle(rotations[1:], rotations[:-1]).max())
@@ -374,7 +374,7 @@ def test_a_solve_goes_on_at_other_times_though_a_joint_hardly_moves() -> None:
     then = np.linspace(0.0, toy.times[-1], 36)
     slower = rot.normalise(rotation_spline(toy.times, q, then))
     made = toy.made().at(toy.times, then)
-    synthesise(HUMAN, slower, then, toy.stance, toy.given, toy.bounds, (), made)
+    solve_motion(HUMAN, slower, then, toy.stance, toy.given, toy.bounds, (), made)
 
 
 def test_limits_are_widened_to_postures_that_are_passed() -> None:

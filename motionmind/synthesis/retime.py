@@ -17,9 +17,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.body.contact import TALL, Posed, lowest_height, pose, slides_between
+from motionmind.body.contact import TALL_BODY_M, Posed, lowest_height, pose, slides_between
 from motionmind.body.motion import Motion
-from motionmind.body.plausibility import GRAVITY
+from motionmind.body.plausibility import GRAVITY_MPS2
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, size_of
 from motionmind.corpus.corpus import Corpus
@@ -120,7 +120,7 @@ def jump_in_time(
             takes += seconds[onward][step - 1]
             highest = max(highest, high[step])
             rise = high[0] + low[end] - high[step]
-            share = np.sqrt(2.0 * rise / GRAVITY) / takes if rise > 0.0 else np.inf
+            share = np.sqrt(2.0 * rise / GRAVITY_MPS2) / takes if rise > 0.0 else np.inf
             if share >= 1.0:
                 continue
             if np.isinf(best):  # before this step it would leave the floor
@@ -143,9 +143,9 @@ def land_between(seconds: Floats, heights: Floats, size: float, moving: tuple[bo
         moving: whether the velocity at the first and at the last posture is given.
     """
     takes = float(seconds.sum())
-    rate = (heights[1] - heights[0]) / takes + 0.5 * GRAVITY * takes
-    top = heights[0] + 0.5 * rate**2 / GRAVITY if 0.0 < rate < GRAVITY * takes else heights.max()
-    needs = np.sqrt(2.0 * heights / GRAVITY).sum() + 3.0 * SHORTEST_PUSH_OFF_S
+    rate = (heights[1] - heights[0]) / takes + 0.5 * GRAVITY_MPS2 * takes
+    top = heights[0] + 0.5 * rate**2 / GRAVITY_MPS2 if 0.0 < rate < GRAVITY_MPS2 * takes else heights.max()
+    needs = np.sqrt(2.0 * heights / GRAVITY_MPS2).sum() + 3.0 * SHORTEST_PUSH_OFF_S
     if top <= heights.max() + LEFT_FLOOR_M * size or takes >= needs:
         return np.ones(len(seconds))
     middles = np.cumsum(seconds) - 0.5 * seconds
@@ -196,7 +196,7 @@ def _factors(
     changes = np.sqrt(accelerations(moved, fps) / most[-1])
     changes[_braking(moved, moving, fps)] = 1.0  # a slower clock would brake harder from a given velocity
     shown[1:], shown[:-1] = np.maximum(shown[1:], changes), np.maximum(shown[:-1], changes)
-    if np.isfinite(slides) and body.height >= TALL:
+    if np.isfinite(slides) and body.height >= TALL_BODY_M:
         slid = slides_between(body, posed.places, _floor(times, posed.lowest, times))
         shown = np.maximum(shown, fps * slid.max(axis=1, initial=0.0) / (slides * body.height))
     shown[free < MIN_CLOCK_CHANGE_RATIO] = 1.0

@@ -6,9 +6,9 @@ import numpy as np
 
 from motionmind.body.contact import pose
 from motionmind.body.human import human23
-from motionmind.footing.bearing import HOLDS_UP_SHARE, LIMB_TOUCHES_M, Bearing
 from motionmind.footing.feet import find_free_feet
 from motionmind.footing.shape import lowest, shape_of
+from motionmind.footing.support_phases import HOLDS_UP_SHARE, LIMB_TOUCHES_M, SupportPhases
 from motionmind.geometry import rotations as rot
 
 BODY = human23()
@@ -33,7 +33,7 @@ def test_points_touch_the_floor_with_what_bears() -> None:
     stands = np.ones((FRAMES, 2), dtype=np.bool_)
     stands[10:20, 0] = False
     others = np.where(np.arange(len(shape.others)) == 0, HOLDS_UP_SHARE + 0.1, 0.0) * np.ones((FRAMES, 1))
-    touches = Bearing([[], []], stands, np.zeros((FRAMES, 2, 2)), others).touching(shape)
+    touches = SupportPhases([[], []], stands, np.zeros((FRAMES, 2, 2)), others).touching(shape)
     heights = shape.places[..., 1]
     near = [heights < low[:, None] + LIMB_TOUCHES_M for low in (*shape.low.T, shape.low_others[:, 0])]
     bears = stands[:, 0].copy()
