@@ -29,7 +29,7 @@ from motionmind.cli.words import parse_mixture, parse_tolerances
 from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
 
-_LINE = 300  # characters of a title, an author, a source: sentences rather than names
+_MAX_TEXT_CHARS = 300  # characters of a title, an author, a source: sentences rather than names
 
 
 @group("motionmind corpus check ballet", "corpus")
@@ -151,9 +151,9 @@ def build(
 ) -> None:
     """Learn a corpus from movement.
 
-    It is learned from files, from other corpora (--mix), or from both. The files may be of any formats, scores
-    included. Those that cannot be read are left out, and those on other joints than most. An earlier corpus of yours of
-    the same name is replaced.
+    Learn it from files, from other corpora (--mix), or from both. The files may have any formats, scores included.
+    Files that cannot be read are left out, as are files on other joints than most. An earlier corpus of yours with the
+    same name is replaced.
     """
     if not (files or mix):
         raise click.UsageError("Missing argument 'FILES...', or --mix.", click.get_current_context())
@@ -201,7 +201,7 @@ def build(
 @INDEX
 @HOME
 def list_corpora(as_json: bool, remote: bool, index: str | None, home: Path | None) -> None:
-    """List all corpora, bundled and your own; or, with --remote, those that others publish."""
+    """List all corpora, bundled and your own; or, with --remote, published corpora."""
     from motionmind.corpus.store import list_corpora, read_manifest
 
     if remote:
@@ -221,7 +221,7 @@ def list_corpora(as_json: bool, remote: bool, index: str | None, home: Path | No
     width = max((len(displayed(entry["name"])) for entry in found), default=0)
     for entry in found:
         click.echo(
-            f"{displayed(entry['name']):{width}}  {displayed(entry['title'], _LINE) or '-'}  "
+            f"{displayed(entry['name']):{width}}  {displayed(entry['title'], _MAX_TEXT_CHARS) or '-'}  "
             f"({displayed_path(entry['folder'])})"
         )
 
@@ -239,22 +239,21 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
         click.echo(json.dumps(found))
         return
     for key in ("name", "title", "author", "source", "licence", "citation", "skeleton", "facing", "rate"):
-        click.echo(f"{key:10} {displayed(str(found[key]), _LINE) if found[key] not in (None, '') else '-'}")
+        click.echo(f"{key:10} {displayed(str(found[key]), _MAX_TEXT_CHARS) if found[key] not in (None, '') else '-'}")
     click.echo(
         f"{'clips':10} {len(found['clips'])}, {count(found['postures'], 'posture')}, {count(found['moves'], 'move')}"
     )
     if performers := {
         clip["performer"]: None for clip in found["clips"] if clip["performer"] not in ("", found["author"])
     }:
-        click.echo(f"{'performers':10} {displayed(', '.join(performers), _LINE)}")
+        click.echo(f"{'performers':10} {displayed(', '.join(performers), _MAX_TEXT_CHARS)}")
     if found["repairs"]:
         click.echo(f"{'repaired':10} {format_repairs(found)}")
     print_origins(found)
     width = max([16, *(len(displayed(clip["name"])) for clip in found["clips"])])
     for clip in found["clips"]:
-        click.echo(
-            f"  {displayed(clip['name']):{width}} {clip['postures']:5}  {displayed(clip['about'], _LINE)}".rstrip()
-        )
+        about = displayed(clip["about"], _MAX_TEXT_CHARS)
+        click.echo(f"  {displayed(clip['name']):{width}} {clip['postures']:5}  {about}".rstrip())
 
 
 @command("motionmind corpus check ballet --pairs 500 --seed 1")

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _MANIFEST = "manifest.json"
-_UNFINISHED_S, _UNUSED_S = 86_400.0, 60 * 86_400.0  # a folder without change for this long is removed
+_UNFINISHED_S, _EXPIRY_S = 86_400.0, 60 * 86_400.0  # a folder without change for this long is removed
 
 
 def cache_folder(room: str) -> Path:
@@ -129,6 +129,6 @@ def _remove_unused(parent: Path) -> None:
     """Remove folders of killed writers, and folders unused for two months."""
     for entry in parent.iterdir():
         with suppress(OSError):
-            limit = _UNFINISHED_S if entry.name.startswith(".") else _UNUSED_S
+            limit = _UNFINISHED_S if entry.name.startswith(".") else _EXPIRY_S
             if time.time() - entry.stat().st_mtime > limit:
                 _remove(entry)

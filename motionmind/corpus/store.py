@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 FORMAT, BUILT = "motionmind-corpus", "motionmind-built-corpus"
 VERSIONS = {FORMAT: 1, BUILT: 11}
 MANIFEST = "manifest.json"
-_RETRIES, _PAUSE_S = 20, 0.005  # until a missing version appears
+_MAX_RETRIES, _PAUSE_S = 20, 0.005  # until a missing version appears
 
 
 def home(folder: str | os.PathLike[str] | None = None) -> Path:
@@ -328,7 +328,7 @@ def load(folder: Path) -> Stored:
                 continue
             if not there:
                 missing += 1
-                if missing == _RETRIES:
+                if missing == _MAX_RETRIES:
                     raise FormatError(f"there is no folder {place.name} beside it; {remedy(folder)}", path=path)
                 time.sleep(_PAUSE_S)  # writers may make and remove versions of a number that is free again
                 continue

@@ -27,7 +27,7 @@ from motionmind.files import TEMPORARY, sync_folder
 if sys.platform != "win32":
     import fcntl
 
-_UNUSED_S = 3600.0  # a folder without locks that has not changed for this long counts as unused
+_ABANDONED_S = 3600.0  # a folder without locks that has not changed for this long counts as unused
 
 
 @contextmanager
@@ -142,7 +142,7 @@ def locked(folder: Path, *, alone: bool, is_new: bool = False) -> Iterator[bool]
     Yields:
         Whether it is locked and still in its place; False if another lock prevents that.
     """
-    unused = time.time() - folder.stat().st_mtime > _UNUSED_S
+    unused = time.time() - folder.stat().st_mtime > _ABANDONED_S
     if sys.platform == "win32":
         yield unused or is_new or not alone
         return

@@ -12,7 +12,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from motionmind.errors import MotionMindError
-from motionmind.executors.team import JOBS_PER_WORKER, Team
+from motionmind.executors.team import N_JOBS_PER_WORKER, Team
 
 _PORT = 8786  # default port of a Dask scheduler
 _ANSWER_TIMEOUT_S = 10.0  # for a scheduler
@@ -53,7 +53,7 @@ def cluster(address: str) -> Iterator[Team]:
         yield Team(
             # Not pure: Dask needs no names derived from jobs. It retries a job on another worker by itself.
             lambda: client.get_executor(pure=False),
-            lambda: JOBS_PER_WORKER * max(watch.threads, 1),
+            lambda: N_JOBS_PER_WORKER * max(watch.threads, 1),
             (KilledWorker, BrokenExecutor),
             watch.missing,
         )

@@ -12,7 +12,7 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any, ParamSpec, TypeVar
 
-from motionmind.executors.team import JOBS_PER_WORKER, Team
+from motionmind.executors.team import N_JOBS_PER_WORKER, Team
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -43,7 +43,7 @@ def threads(number: int) -> Team:
     """Return a team of `number` threads of this process, for jobs that run mostly in compiled code."""
     if number == 1:
         return this_process()
-    return Team(lambda: ThreadPoolExecutor(number), lambda: JOBS_PER_WORKER * number)
+    return Team(lambda: ThreadPoolExecutor(number), lambda: N_JOBS_PER_WORKER * number)
 
 
 @contextmanager
@@ -62,7 +62,7 @@ def processes(number: int) -> Iterator[Team]:
         return pool
 
     try:
-        yield Team(make, lambda: JOBS_PER_WORKER * number)
+        yield Team(make, lambda: N_JOBS_PER_WORKER * number)
     finally:
         for pool in pools:
             pool.shutdown(cancel_futures=True)

@@ -20,7 +20,7 @@ _Job = TypeVar("_Job")
 _Result = TypeVar("_Result")
 
 MAX_ATTEMPTS = 3  # to run, alone, a job that kills its worker
-JOBS_PER_WORKER = 3  # submitted ahead, which keeps all workers busy
+N_JOBS_PER_WORKER = 3  # submitted ahead, which keeps all workers busy
 
 
 class UnfinishedError(MotionMindError):

@@ -37,7 +37,7 @@ from motionmind.formats._gltf import COMPONENT_DTYPES, N_COMPONENTS
 from motionmind.formats._json import MARKS_KEY, MarksSchema, insertion_schema, rounded
 from motionmind.geometry import rotations as rot
 
-_VERTICES, _INDICES = 34962, 34963  # targets of a buffer view (5.11.5)
+_VERTEX_TARGET_CODE, _INDEX_TARGET_CODE = 34962, 34963  # targets of a buffer view (5.11.5)
 
 
 def write_glb(path: FilePath, motion: Motion, *, has_root: bool = False) -> None:
@@ -216,13 +216,17 @@ def _primitives(buffer: GlbBuffer, mesh: Mesh) -> list[dict[str, Any]]:
     joints, weights = np.zeros((len(mesh.joints), 4), "<u2"), np.zeros((len(mesh.joints), 4), "<f4")
     joints[:, 0], weights[:, 0] = mesh.joints, 1.0
     attributes = {
-        "POSITION": buffer.add(mesh.positions.astype("<f4"), target=_VERTICES, bounds=True),
-        "NORMAL": buffer.add(mesh.normals.astype("<f4"), target=_VERTICES),
-        "JOINTS_0": buffer.add(joints, target=_VERTICES),
-        "WEIGHTS_0": buffer.add(weights, target=_VERTICES),
+        "POSITION": buffer.add(mesh.positions.astype("<f4"), target=_VERTEX_TARGET_CODE, bounds=True),
+        "NORMAL": buffer.add(mesh.normals.astype("<f4"), target=_VERTEX_TARGET_CODE),
+        "JOINTS_0": buffer.add(joints, target=_VERTEX_TARGET_CODE),
+        "WEIGHTS_0": buffer.add(weights, target=_VERTEX_TARGET_CODE),
     }
     return [
-        {"attributes": attributes, "indices": buffer.add(chosen.astype("<u4"), target=_INDICES), "material": number}
+        {
+            "attributes": attributes,
+            "indices": buffer.add(chosen.astype("<u4"), target=_INDEX_TARGET_CODE),
+            "material": number,
+        }
         for number, chosen in enumerate(mesh.paints.values())
     ]
 

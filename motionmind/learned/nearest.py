@@ -13,7 +13,7 @@ import numpy as np
 from motionmind._typing import Floats, Int8s, Int32s, Ints, Singles
 from motionmind.geometry.distances import squared_distance, squared_turn
 from motionmind.jit import jit, read_only
-from motionmind.learned.neighbours import CODE_OF_ONE, MAX_LEAF_SAMPLES, Neighbours
+from motionmind.learned.neighbours import CODE_SCALE, MAX_LEAF_SAMPLES, Neighbours
 
 N_LEAVES_VISITED = 48  # per search
 NEARER_THAN_CENTRE_RATIO = 0.6  # radii by which a ball's nearest sample is likely to be nearer than its centre
@@ -164,7 +164,7 @@ def _leaves(orientations: Floats, tree: _Tree, posture: Floats, leaves: int) -> 
         np.empty(len(best) * MAX_LEAF_SAMPLES, np.int32),
         np.empty(len(best) * MAX_LEAF_SAMPLES, np.float32),
     )
-    sought, width = (CODE_OF_ONE * posture).astype(np.float32), 4 * len(tree.part)
+    sought, width = (CODE_SCALE * posture).astype(np.float32), 4 * len(tree.part)
     for node in best:
         start, stop = tree.bounds[node]
         off = squared[many : many + stop - start]
@@ -182,7 +182,7 @@ def _measure(codes: Int8s, posture: Singles, out: Singles) -> None:
     """Write squared differences between a leaf's codes [4 m, n] and a posture of the part [m, 4], both in 127ths:
     sums over joints [n], each with the nearer sign of the quaternion."""
     out[:] = 0.0
-    whole = np.float32(CODE_OF_ONE * CODE_OF_ONE)
+    whole = np.float32(CODE_SCALE * CODE_SCALE)
     for j in range(len(posture)):
         a, b, c, d = posture[j]
         for k in range(len(out)):  # contiguous, for vector instructions

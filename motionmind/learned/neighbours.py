@@ -30,12 +30,12 @@ from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit, read_only
 
 MAX_FULL_SEARCH = 8000  # samples of a corpus without trees
-BLOCK_SAMPLES = 2048  # copied at a time
+N_BLOCK_SAMPLES = 2048  # copied at a time
 MAX_LEAF_SAMPLES = 32
 N_SAMPLES_FOR_CENTRE = 64  # of a node, also used to halve it
 MAX_COPIED_BYTES = 1 << 26  # larger arrays of centres are not copied
 _CENTRE_SLACK_RAD = 1e-6  # for the rounding of centres
-CODE_OF_ONE = 127.0
+CODE_SCALE = 127.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +122,8 @@ def build_neighbours(
 
     def grow(number: int) -> None:
         shown = workshop.empty((len(orientations), len(parts[number]), 4), np.float32)
-        for start in range(0, len(orientations), BLOCK_SAMPLES):
-            shown[start : start + BLOCK_SAMPLES] = orientations[start : start + BLOCK_SAMPLES, parts[number]]
+        for start in range(0, len(orientations), N_BLOCK_SAMPLES):
+            shown[start : start + N_BLOCK_SAMPLES] = orientations[start : start + N_BLOCK_SAMPLES, parts[number]]
         _grow(shown, bounds, order[number], trees.centres_of(number), radii[number])
         _encode(shown, bounds, trees.codes_of(number))
         ranks[number, order[number]] = np.arange(len(orientations), dtype=np.int32)
@@ -212,4 +212,4 @@ def _encode(shown: Singles, bounds: Int32s, codes: Int8s) -> None:
     width = 4 * shown.shape[1]
     for start, stop in bounds[len(bounds) // 2 :]:
         own = shown[start:stop].reshape(-1, width).astype(np.float64)
-        codes[width * start : width * stop] = np.round(CODE_OF_ONE * own.T).ravel()
+        codes[width * start : width * stop] = np.round(CODE_SCALE * own.T).ravel()

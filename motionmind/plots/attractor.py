@@ -30,7 +30,7 @@ from motionmind.variation.variation import Variation
 
 ATTRACTORS = (".png", ".svg", ".html")  # suffixes that `draw_attractor` writes
 
-_MARGIN_PX = 44.0
+_PAGE_MARGIN_PX = 44.0
 _ITINERARIES_PX = 330.0  # their height
 
 
@@ -73,7 +73,7 @@ def attractor(portrait: Portrait) -> Plate:
     field = Field(portrait)
     top = PAGE_PX.top + PAGE_PX.height + 80.0  # of the itineraries
     marks = [*_heading(portrait), *field.marks(), *_itineraries(portrait, top)]
-    height = ceil(top + _ITINERARIES_PX + 2 * _MARGIN_PX)
+    height = ceil(top + _ITINERARIES_PX + 2 * _PAGE_MARGIN_PX)
     return Plate(PAGE_PX.width, height, _title(portrait), tuple(marks))
 
 
@@ -85,7 +85,7 @@ def _title(portrait: Portrait) -> str:
 def _heading(portrait: Portrait) -> Iterator[Mark]:
     """Yield the title, a summary and the legend."""
     course, count = portrait.course, len(portrait.sites)
-    yield Words((_MARGIN_PX, _MARGIN_PX), _title(portrait), 24, INK)
+    yield Words((_PAGE_MARGIN_PX, _PAGE_MARGIN_PX), _title(portrait), 24, INK)
     nudge = ", ".join(f"{value:.4g}" for value in course.nudge)
     summary = f"{_count(count, 'posture')}, a site each, {portrait.every} steps of {course.step:g} apart. "
     if portrait.parting is None:
@@ -107,10 +107,10 @@ def _heading(portrait: Portrait) -> Iterator[Mark]:
     if portrait.variation.kept:
         summary += f" Its stretches have {_count(portrait.variation.kept.limits.stretch, 'posture')} at least."
         about += " A point may lie in a cell nearby."
-    yield Words((_MARGIN_PX, _MARGIN_PX + 30), summary, TEXT_PX, INK)
-    yield from _legend(_MARGIN_PX, _MARGIN_PX + 60)
+    yield Words((_PAGE_MARGIN_PX, _PAGE_MARGIN_PX + 30), summary, TEXT_PX, INK)
+    yield from _legend(_PAGE_MARGIN_PX, _PAGE_MARGIN_PX + 60)
     yield Words(
-        (_MARGIN_PX, _MARGIN_PX + 84),
+        (_PAGE_MARGIN_PX, _PAGE_MARGIN_PX + 84),
         about,
         TEXT_PX,
         PLOT.pale,
@@ -152,7 +152,7 @@ def _itineraries(portrait: Portrait, top: float) -> Iterator[Mark]:
     """Yield the posture at each time: of the piece, one straight line; of the variation, a line for each run."""
     order, count = portrait.order, len(portrait.sites)
     long = max(len(order), count)
-    left, right, bottom = _MARGIN_PX + 40.0, PAGE_PX.width - _MARGIN_PX, top + _ITINERARIES_PX
+    left, right, bottom = _PAGE_MARGIN_PX + 40.0, PAGE_PX.width - _PAGE_MARGIN_PX, top + _ITINERARIES_PX
     x_step, y_step = (right - left) / max(long - 1, 1), _ITINERARIES_PX / max(count - 1, 1)
 
     def at(n: float, posture: float) -> Point:

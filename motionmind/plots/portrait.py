@@ -19,7 +19,7 @@ from motionmind.chaos.flows import Flow, find_flow
 from motionmind.chaos.trajectories import trajectory
 from motionmind.errors import MotionMindError
 from motionmind.jit import jit
-from motionmind.render.solids import EMPTY
+from motionmind.render.solids import EMPTY_CODE
 from motionmind.variation.controls import map_points
 from motionmind.variation.course import Course
 from motionmind.variation.review import Cut, Seam
@@ -129,7 +129,7 @@ class Portrait:
         at = np.empty((len(rows), along.shape[1]))
         at[:, across], at[:, up] = (corner + (np.stack([columns, rows], axis=1) + 0.5) / [scale, -scale]).T
         at[:, left_out] = hidden[rows, columns]
-        postures = np.full((height, width), EMPTY, dtype=np.int16)
+        postures = np.full((height, width), EMPTY_CODE, dtype=np.int16)
         postures[rows, columns] = self.postures_at(at)
         return postures
 

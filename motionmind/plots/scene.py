@@ -10,7 +10,7 @@ import numpy as np
 
 from motionmind._typing import Floats, Int16s, Ints
 from motionmind.plots.brush import Point
-from motionmind.render.solids import EMPTY
+from motionmind.render.solids import EMPTY_CODE
 
 _SQUARE_PX = 4  # side of the squares in which room is counted
 
@@ -29,7 +29,7 @@ class Room:
 
     def __init__(self, width: int, height: int) -> None:
         self.taken = np.zeros((height // _SQUARE_PX, width // _SQUARE_PX), dtype=np.bool_)
-        self.cells = np.full(self.taken.shape, EMPTY, dtype=np.int16)
+        self.cells = np.full(self.taken.shape, EMPTY_CODE, dtype=np.int16)
         self.figures = np.zeros_like(self.taken)
         self.leaders: list[Floats] = []
 
@@ -39,7 +39,7 @@ class Room:
 
     def cover(self, corner: Point, cells: Int16s) -> None:
         """Take the attractor's cells [h, w], one posture a pixel, from a corner on; each stays free for its posture."""
-        rows, columns = np.nonzero(cells != EMPTY)
+        rows, columns = np.nonzero(cells != EMPTY_CODE)
         squares = (rows + int(corner[1])) // _SQUARE_PX, (columns + int(corner[0])) // _SQUARE_PX
         self.taken[squares] = True
         self.cells[squares] = cells[rows, columns]
@@ -48,12 +48,12 @@ class Room:
         """Take the squares along a trajectory [N, 2], pixels."""
         for a, b in pairwise(points):
             squares = self._along(a, b)
-            self.taken[squares], self.cells[squares] = True, EMPTY
+            self.taken[squares], self.cells[squares] = True, EMPTY_CODE
 
     def join(self, corner: Point, width: float, height: float, leader: Floats) -> None:
         """Take a box for a figure, and a leader [2, 2] from it to its site, pixels."""
         for squares in (self._box(*corner, corner[0] + width, corner[1] + height), self._along(*leader)):
-            self.taken[squares], self.cells[squares] = True, EMPTY
+            self.taken[squares], self.cells[squares] = True, EMPTY_CODE
         self.figures[self._box(*corner, corner[0] + width, corner[1] + height)] = True
         self.leaders.append(leader)
 

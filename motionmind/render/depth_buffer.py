@@ -10,7 +10,7 @@ import numpy as np
 
 from motionmind._typing import Int16s, Singles
 from motionmind.render import raster
-from motionmind.render.solids import EMPTY, Cones, Ellipsoids
+from motionmind.render.solids import EMPTY_CODE, Cones, Ellipsoids
 
 
 class DepthBuffer:
@@ -32,14 +32,14 @@ class DepthBuffer:
             width, height: its size, pixels.
             scale: pixels to a metre.
         """
-        self.solid: Int16s = np.full((height, width), EMPTY, dtype=np.int16)
+        self.solid: Int16s = np.full((height, width), EMPTY_CODE, dtype=np.int16)
         self.depth: Singles = np.full((height, width), -np.inf, dtype=np.float32)
         self.shade: Singles = np.ones((height, width), dtype=np.float32)
         self._place = float(left), float(top), float(scale)
 
     def clear(self) -> None:
         """Empty the buffer for the next picture; faster than a new one."""
-        self.solid.fill(EMPTY)
+        self.solid.fill(EMPTY_CODE)
         self.depth.fill(-np.inf)
 
     def draw(self, cones: Cones, balls: Ellipsoids, numbers: Int16s) -> None:

@@ -11,7 +11,7 @@ from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.render import PICTURES
 
-ON_A_SHEET = 48  # postures on a sheet, at most
+N_SHEET_POSTURES = 48  # postures on a sheet, at most
 _FILMED = (".gif", ".mp4", ".svg")
 
 
@@ -73,7 +73,7 @@ def draw_picture(
     elif suffix == ".png" and len(motion) > 1:
         from motionmind.render.sheet import draw_sheet, evenly, png
 
-        write_atomically(path, png(draw_sheet(motion, evenly(range(len(motion)), ON_A_SHEET), first=first)))
+        write_atomically(path, png(draw_sheet(motion, evenly(range(len(motion)), N_SHEET_POSTURES), first=first)))
     elif suffix == ".png":
         from motionmind.render.film import write_still
 

@@ -10,7 +10,7 @@ from math import ceil, hypot, sqrt
 
 from motionmind._typing import Floats, Indices, Int16s, Pixels, Singles
 from motionmind.jit import jit
-from motionmind.render.solids import EMPTY
+from motionmind.render.solids import EMPTY_CODE
 
 Place = tuple[float, float, float]  # x and y of a buffer's upper left corner, metres, and pixels to a metre
 Buffers = tuple[Int16s, Singles, Singles, Place]
@@ -180,16 +180,16 @@ def colour(
     for row in range(height):
         for column in range(width):
             number = solid[row, column]
-            if number == EMPTY:
+            if number == EMPTY_CODE:
                 continue
             z, behind = depth[row, column], False
             for i in range(max(row - line, 0), min(row + line + 1, height)):
-                if solid[i, column] == EMPTY:
+                if solid[i, column] == EMPTY_CODE:
                     picture[i, column] = ink
                 elif solid[i, column] != number and parts[solid[i, column]] != parts[number]:
                     behind |= depth[i, column] > z + step
             for j in range(max(column - line, 0), min(column + line + 1, width)):
-                if solid[row, j] == EMPTY:
+                if solid[row, j] == EMPTY_CODE:
                     picture[row, j] = ink
                 elif solid[row, j] != number and parts[solid[row, j]] != parts[number]:
                     behind |= depth[row, j] > z + step

@@ -25,12 +25,12 @@ from motionmind.render.figure import bridge_balls, colour, draw, given_colours, 
 from motionmind.render.lettering import font
 from motionmind.render.palette import BRIDGED, COLOURS, SHEET, VIOLET
 from motionmind.render.sheet_window import Window, window_around
-from motionmind.render.solids import EMPTY, Cones, Ellipsoids, posture_solids
+from motionmind.render.solids import EMPTY_CODE, Cones, Ellipsoids, posture_solids
 from motionmind.render.view import ABOVE, FRONT, STAGE_LEFT, STAGE_RIGHT, View, to_view
 
 Side = Literal["right", "left"]
 
-MAX_POSTURES = 400  # on a sheet
+MAX_SHEET_POSTURES = 400  # on a sheet
 _MAX_PIXELS = 60e6  # of a sheet: viewers refuse larger pictures
 _CAPTION_PX, _LINE_PX = 24, 17  # heights of a caption and of a line of the legend
 _Phrase = tuple[float, str, Colour]  # x in pixels, text, colour
@@ -142,10 +142,11 @@ def check_frames(motion: Motion, frames: Sequence[int]) -> None:
     name = motion.name or "the motion"
     if not frames:
         raise MotionMindError(f"{name}: no frame to draw")
-    if len(frames) > MAX_POSTURES:
-        every = ceil(len(frames) / MAX_POSTURES)
+    if len(frames) > MAX_SHEET_POSTURES:
+        every = ceil(len(frames) / MAX_SHEET_POSTURES)
         raise MotionMindError(
-            f"{name}: a sheet holds {MAX_POSTURES} postures, not {len(frames)}; take fewer, as with --every {every}"
+            f"{name}: a sheet holds {MAX_SHEET_POSTURES} postures, not {len(frames)}; "
+            f"take fewer, as with --every {every}"
         )
     for frame in frames:
         if not 0 <= frame < len(motion):
@@ -263,7 +264,7 @@ class _Sheet:
         floor = window.floor
         sunk = floor + ceil(0.006 * self.body.height * window.scale * SAMPLES_PER_PX)  # less than 1 cm is not marked
         under = buffer.solid[sunk:]
-        picture[sunk:][(under != EMPTY) & (under < len(self.body.parts))] = SHEET.sunk  # but no bridge balls
+        picture[sunk:][(under != EMPTY_CODE) & (under < len(self.body.parts))] = SHEET.sunk  # but no bridge balls
         image = Image.fromarray(picture)
         self._plumb(ImageDraw.Draw(image), at, window, floor)
         return _smooth(image)

@@ -8,7 +8,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 
-EMPTY = -1  # the number in a pixel without a solid
+EMPTY_CODE = -1  # the number in a pixel without a solid
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,13 +25,13 @@ from motionmind.render.figure import bridge_balls, colour, draw, given_colours, 
 from motionmind.render.ground import Ground, Shadow, darken
 from motionmind.render.lettering import font
 from motionmind.render.palette import BRIDGED, PAPER, STAGE, VIOLET
-from motionmind.render.solids import EMPTY, Cones, Ellipsoids, bounding_box, posture_solids
+from motionmind.render.solids import EMPTY_CODE, Cones, Ellipsoids, bounding_box, posture_solids
 from motionmind.render.timing import SAME_TIME_S
 from motionmind.render.view import VIEWS, to_view
 
 MIN_HEIGHT_PX, MAX_HEIGHT_PX = 120, 2160  # of a picture
-GHOST_OPACITY = 0.22
-_BLOCK_FRAMES = 64  # whose solids are placed at once
+GHOST_OPACITY_SHARE = 0.22
+_FILM_BLOCK_FRAMES = 64  # whose solids are placed at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,8 +205,8 @@ class Stage:
             boxes.append(bounding_box(*to_view(cones, balls, VIEWS[view], origin)).reshape(-1, 2, 3)[..., :2])
 
         for motion in motions:
-            for start in range(0, len(motion), _BLOCK_FRAMES):
-                block = slice(start, start + _BLOCK_FRAMES)
+            for start in range(0, len(motion), _FILM_BLOCK_FRAMES):
+                block = slice(start, start + _FILM_BLOCK_FRAMES)
                 include(*self.body.solids(motion.rotations[block], motion.root[block]))
         for number in np.flatnonzero(self._bridged.any(axis=1)).tolist():
             include(*self._solids(number))
@@ -220,11 +220,11 @@ class Stage:
 
     def _solids(self, number: int) -> tuple[Cones, Ellipsoids]:
         """Place the solids of a frame in the world, balls at bridged joints after the body's own."""
-        block = number // _BLOCK_FRAMES
+        block = number // _FILM_BLOCK_FRAMES
         if self._block is None or self._block[0] != block:
-            part = slice(block * _BLOCK_FRAMES, (block + 1) * _BLOCK_FRAMES)
+            part = slice(block * _FILM_BLOCK_FRAMES, (block + 1) * _FILM_BLOCK_FRAMES)
             self._block = block, self.body.solids(self.motion.rotations[part], self.motion.root[part])
-        cones, balls = posture_solids(*self._block[1], number % _BLOCK_FRAMES)
+        cones, balls = posture_solids(*self._block[1], number % _FILM_BLOCK_FRAMES)
         if self._bridged[number].any():
             joints = self.body.skeleton.positions(self.motion.rotations[number], self.motion.root[number])
             balls = balls.joined(bridge_balls(self.body, joints, self._bridged[number]))
@@ -264,8 +264,8 @@ class Stage:
             solids = self.body.solids(ends.rotations, ends.root)
             for end, root in enumerate(ends.root):
                 ghosts.append(ghost := self._draw(*posture_solids(*solids, end), root, self._paints[0]))
-                self._paint(backdrop, ghost, GHOST_OPACITY)
-                bare[ghost.box][ghost.buffer.solid[::SAMPLES_PER_PX, ::SAMPLES_PER_PX] != EMPTY] = 0.0
+                self._paint(backdrop, ghost, GHOST_OPACITY_SHARE)
+                bare[ghost.box][ghost.buffer.solid[::SAMPLES_PER_PX, ::SAMPLES_PER_PX] != EMPTY_CODE] = 0.0
             self._last_scene = _Scene(insertion, backdrop, bare, ghosts)
         return self._last_scene
 

@@ -24,8 +24,8 @@ from motionmind.render.ground import Ground
 from motionmind.render.lettering import FONT_FAMILY
 from motionmind.render.markup import hexadecimal, xml_text
 from motionmind.render.palette import BRIDGED, INK, PAPER, STAGE, VIOLET
-from motionmind.render.solids import EMPTY
-from motionmind.render.stage import GHOST_OPACITY, FigurePlate, Stage
+from motionmind.render.solids import EMPTY_CODE
+from motionmind.render.stage import GHOST_OPACITY_SHARE, FigurePlate, Stage
 from motionmind.render.timing import HOLD_S, MIN_FPS, film_rate, frame_times
 from motionmind.render.trace import Lines, outlines, ridges, smooth
 
@@ -164,7 +164,7 @@ class _Artist:
             if number is not None and number not in drawn:
                 drawn.add(number)
                 ghosts = "".join(
-                    f'<g opacity="{GHOST_OPACITY}">{self._body(ghost)}</g>' for ghost in self.stage.ghosts(frame)
+                    f'<g opacity="{GHOST_OPACITY_SHARE}">{self._body(ghost)}</g>' for ghost in self.stage.ghosts(frame)
                 )
                 yield f'<g id="g{number}">{ghosts}</g>'
 
@@ -185,7 +185,7 @@ class _Artist:
     def _body(self, drawing: FigurePlate) -> str:
         """Draw a body: its colours, shades on them, and lines where one body part stands before another."""
         solid, depth, shade = drawing.buffer.solid, drawing.buffer.depth, drawing.buffer.shade
-        surfaces, filled = self.surface_of[solid], solid != EMPTY
+        surfaces, filled = self.surface_of[solid], solid != EMPTY_CODE
         seen, depths = surfaces[filled], depth[filled]
         regions, text = outlines(surfaces), ""
         for surface in np.unique(regions.labels):
@@ -198,7 +198,7 @@ class _Artist:
             text += f'<path fill="{ink}" stroke="{ink}" d="{data}"/>'
         few, shade = filled[::SAMPLES_PER_PX, ::SAMPLES_PER_PX], shade[::SAMPLES_PER_PX, ::SAMPLES_PER_PX]
         for limit in (0.89, 0.78):  # of brightness
-            shaded = outlines(np.where(few & (shade < limit), 0, EMPTY).astype(np.int16))
+            shaded = outlines(np.where(few & (shade < limit), 0, EMPTY_CODE).astype(np.int16))
             shaded = shaded.only(np.abs(shaded.areas()) > 12.0)  # square pixels
             text += f'<path stroke="none" opacity="0.12" d="{self._path(shaded, drawing.corner, 1)}"/>'
         lines = ridges(self.part_of[solid], depth, DEPTH_STEP_M * self.stage.body.size)
@@ -214,7 +214,7 @@ class _Artist:
         opacity = 0.08  # of a layer
         layers = (1.0 - (1.0 - opacity) ** (level + 0.5) for level in count())
         paths = [
-            self._path(outlines(np.where(dark > layer, 0, EMPTY).astype(np.int16)), corner, samples=1)
+            self._path(outlines(np.where(dark > layer, 0, EMPTY_CODE).astype(np.int16)), corner, samples=1)
             for layer in takewhile(lambda layer: layer < dark.max(initial=0.0), layers)
         ]
         text = "".join(f'<path opacity="{opacity}" d="{data}"/>' for data in paths)
@@ -244,7 +244,7 @@ class _Artist:
 
 def _numbers(numbers: list[int]) -> Int16s:
     """Return a table [N + 1] indexed by the numbers of solids; EMPTY (-1, the last entry) stays EMPTY."""
-    return np.array([*numbers, EMPTY], dtype=np.int16)
+    return np.array([*numbers, EMPTY_CODE], dtype=np.int16)
 
 
 def _text(text: str) -> str:

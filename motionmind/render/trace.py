@@ -15,10 +15,10 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices, Int16s, Singles
 from motionmind.jit import jit
-from motionmind.render.solids import EMPTY
+from motionmind.render.solids import EMPTY_CODE
 
 _FAINT_RATIO = 0.5  # of the step at which a ridge begins: it ends where it stands out by less
-_SLACK_SAMPLES = 0.5  # greatest distance of a smooth line from the middle of an edge
+_N_SLACK_SAMPLES = 0.5  # greatest distance of a smooth line from the middle of an edge
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class Lines:
 
 def outlines(labels: Int16s) -> Lines:
     """Trace the regions of equal labels [H, W], except EMPTY, along the edges of samples."""
-    return Lines(*_outlines(np.pad(labels, 1, constant_values=EMPTY)))
+    return Lines(*_outlines(np.pad(labels, 1, constant_values=EMPTY_CODE)))
 
 
 def ridges(parts: Int16s, depth: Singles, step: float) -> Lines:
@@ -78,7 +78,7 @@ def ridges(parts: Int16s, depth: Singles, step: float) -> Lines:
         depth: how near each sample is [H, W].
         step: a difference of `depth`.
     """
-    parts, depth = np.pad(parts, 1, constant_values=EMPTY), np.pad(depth, 1, constant_values=-np.inf)
+    parts, depth = np.pad(parts, 1, constant_values=EMPTY_CODE), np.pad(depth, 1, constant_values=-np.inf)
     return Lines(*_ridges(parts, depth, step))
 
 
@@ -94,7 +94,7 @@ def smooth(lines: Lines) -> Lines:
     _relax(points, lines.starts, lines.closed)
     shrinkage = middles - points  # the stairs, and the shrinkage of round shapes; smoothing leaves the latter
     _relax(shrinkage, lines.starts, lines.closed)
-    return replace(lines, points=np.clip(points + shrinkage, middles - _SLACK_SAMPLES, middles + _SLACK_SAMPLES))
+    return replace(lines, points=np.clip(points + shrinkage, middles - _N_SLACK_SAMPLES, middles + _N_SLACK_SAMPLES))
 
 
 # Directions are 0 right, 1 down, 2 left, 3 up. Side `to` of a sample is the edge that runs in that direction with the
@@ -217,5 +217,5 @@ def _relax(points: Floats, starts: Indices, closed: Bools) -> None:
                 for axis in range(2):
                     target = 0.25 * (points[before, axis] + points[after, axis]) + 0.5 * points[at, axis]
                     points[at, axis] = min(
-                        max(target, anchors[at, axis] - _SLACK_SAMPLES), anchors[at, axis] + _SLACK_SAMPLES
+                        max(target, anchors[at, axis] - _N_SLACK_SAMPLES), anchors[at, axis] + _N_SLACK_SAMPLES
                     )

@@ -32,9 +32,9 @@ from motionmind.tween.headline import beyond, headline
 CERTIFICATE = "certificate"  # code of the notes that `guard.with_extras` moves to the animations
 
 _FPS = 30.0
-_MAX_FPS = 120.0
+_MAX_REQUEST_FPS = 120.0
 _MAX_CLIP_S = 30.0
-_MAX_JOINTS = 512
+_MAX_REQUEST_JOINTS = 512
 _MAX_WAITING = 4  # requests that wait for the running one
 _SEARCH_TIMEOUT_S = 60.0  # then a search returns its best path; after twice as long, the request fails
 
@@ -141,8 +141,8 @@ def order_of(request: GenerateRequest, own: Skeleton) -> Order:
         ProtocolError: a number is not finite or out of range, there is no pose, or the skeleton is unsupported.
     """
     fps = request.fps(_FPS)
-    if not 1.0 <= fps <= _MAX_FPS:
-        raise ProtocolError("invalid_options", f"timing.fps must be from 1 to {_MAX_FPS:g}, not {fps:g}")
+    if not 1.0 <= fps <= _MAX_REQUEST_FPS:
+        raise ProtocolError("invalid_options", f"timing.fps must be from 1 to {_MAX_REQUEST_FPS:g}, not {fps:g}")
     skeleton, stands = _from_wire(request.skeleton, own)
     number = {name: joint for joint, name in enumerate(skeleton.names)}
     poses, waypoints, pins = [], [], []
@@ -255,8 +255,8 @@ def _from_wire(wire: WireSkeleton, own: Skeleton) -> tuple[Skeleton, Floats]:
     A skeleton with the corpus's joints also gets the corpus's tips, scaled, because the protocol has no tips.
     """
     joints = wire.joints
-    if len(joints) > _MAX_JOINTS:
-        raise ProtocolError("invalid_skeleton", f"a skeleton may have {_MAX_JOINTS} joints, not {len(joints)}")
+    if len(joints) > _MAX_REQUEST_JOINTS:
+        raise ProtocolError("invalid_skeleton", f"a skeleton may have {_MAX_REQUEST_JOINTS} joints, not {len(joints)}")
     if joints[0].parent is not None:
         raise ProtocolError("invalid_skeleton", f"the first joint must be the root, not {joints[0].name!r}")
     for joint in joints:

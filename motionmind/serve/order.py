@@ -12,7 +12,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 
-MAX_ROTATIONS = 2_000_000  # in all samples together; each takes 16 bytes in the answer
+MAX_ANSWER_ROTATIONS = 2_000_000  # in all samples together; each takes 16 bytes in the answer
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +104,8 @@ class Order:
         for frame in [one.frame for some in (self.poses, self.waypoints, self.pins) for one in some]:
             if not 0 <= frame < self.frames:
                 raise MotionMindError(f"frame {frame} is outside 0 to {self.frames - 1}")
-        if (count := self.samples * self.frames * len(self.skeleton)) > MAX_ROTATIONS:
-            raise MotionMindError(f"{count} rotations requested; an answer holds at most {MAX_ROTATIONS}")
+        if (count := self.samples * self.frames * len(self.skeleton)) > MAX_ANSWER_ROTATIONS:
+            raise MotionMindError(f"{count} rotations requested; an answer holds at most {MAX_ANSWER_ROTATIONS}")
         _check_once("waypoints", [one.frame for one in self.waypoints])
         for joint in {one.joint for one in self.pins}:
             name = f"pins of {self.skeleton.names[joint]}"

@@ -20,7 +20,7 @@ from motionmind.studio.questions import question_of
 from motionmind.studio.records import Corpora, EditLine, Head, RedoLine, UndoLine, decode_line
 from motionmind.studio.view import chosen_at
 
-_EVERY = 16  # edits between remembered states, so that an undo need not replay all edits
+_N_CHANGES_PER_STATE = 16  # edits between remembered states, so that an undo need not replay all edits
 
 
 class RefusedError(MotionMindError):
@@ -69,7 +69,7 @@ class Project:
         self._stood: dict[Pair, tuple[tuple[End, End], Found]] = {}  # insertions from before a new request
         self._subscribers: list[Callable[[], None]] = []
         self._windows: set[str] = set()  # windows seen since the project was opened
-        self._states: list[State] = []  # before the first change, and after every `_EVERY` changes
+        self._states: list[State] = []  # before the first change, and after every `_N_CHANGES_PER_STATE` changes
         self.state = State()
         if journal.dropped:
             self.words.append("the last edit was lost: the studio ended while writing it")
@@ -273,9 +273,9 @@ class Project:
         for one in later:
             if places & touched(one.edit):
                 raise RefusedError(f"cannot {verb} “{words}”: a later edit, “{words_of(one.edit)}”, depends on it")
-        number = place // _EVERY
+        number = place // _N_CHANGES_PER_STATE
         state = self._states[number]
-        for one in self._changes[number * _EVERY :]:
+        for one in self._changes[number * _N_CHANGES_PER_STATE :]:
             if undone if one is change else one.undone:
                 continue
             try:
@@ -287,7 +287,7 @@ class Project:
 
     def _switch(self, change: Change, undone: bool, state: State) -> None:
         change.undone = undone
-        del self._states[self._changes.index(change) // _EVERY + 1 :]
+        del self._states[self._changes.index(change) // _N_CHANGES_PER_STATE + 1 :]
         self._remember(state)
 
     def _add(self, change: Change, state: State) -> None:
@@ -295,11 +295,11 @@ class Project:
         self._remember(state)
 
     def _remember(self, state: State) -> None:
-        """Set the state, and remember the states due after every `_EVERY` changes."""
+        """Set the state, and remember the states due after every `_N_CHANGES_PER_STATE` changes."""
         self.state = state
-        while len(self._states) * _EVERY <= len(self._changes):
-            place, reached = len(self._states) * _EVERY, self._states[-1]
-            for one in self._changes[place - _EVERY : place]:
+        while len(self._states) * _N_CHANGES_PER_STATE <= len(self._changes):
+            place, reached = len(self._states) * _N_CHANGES_PER_STATE, self._states[-1]
+            for one in self._changes[place - _N_CHANGES_PER_STATE : place]:
                 reached = reached if one.undone else piece.apply(reached, one.edit)
             self._states.append(reached)
 
@@ -353,7 +353,7 @@ class Project:
                 state = state if one.undone else piece.apply(state, one.edit)
             except MotionMindError as error:
                 raise FormatError(f"is damaged: {error}", path=self.path, line=one.number + 1) from error
-            if place % _EVERY == 0:
+            if place % _N_CHANGES_PER_STATE == 0:
                 self._states.append(state)
         self.state = state
 

@@ -26,10 +26,10 @@ from motionmind.studio.edits import Block
 from motionmind.variation.departure import departure, find_nudge
 from motionmind.variation.limits import Limits, check_departure, check_limits, keep_within
 from motionmind.variation.stretches import cheapest_order
-from motionmind.variation.variation import SKIP
+from motionmind.variation.variation import N_SKIPPED_POINTS
 
 MAX_UNITS = 4_000  # of a piece: with a minimum stretch above 1, memory grows with their square
-STEPS_PER_PLACE = SKIP + 1  # of a trajectory
+STEPS_PER_PLACE = N_SKIPPED_POINTS + 1  # of a trajectory
 
 
 class Clock(NamedTuple):

@@ -20,7 +20,7 @@ from motionmind.errors import MotionMindError
 from motionmind.jit import jit
 
 _N_LANDINGS = 32  # nearest sites at a point to which a seam may lead
-_ON, _STAY = -1, -2  # steps without a seam; other values number a landing
+_CONTINUE_CODE, _STAY_CODE = -1, -2  # steps without a seam; other values number a landing
 
 
 def cheapest_order(course: Itinerary, seconds: Singles, charge: float, stretch: int) -> Ints:
@@ -73,7 +73,7 @@ def _follow(away: Singles, landings: Ints, stays: Bools, seconds: Singles, charg
     after = np.full(count, np.inf)
     landed = np.full((length, tried), np.inf)  # of orders whose last stretch begins at a point with a landing
     left = np.full((length, tried), -1, dtype=np.int32)  # the posture that it leaps from
-    steps = np.full((length, count), _ON, dtype=np.int8)
+    steps = np.full((length, count), _CONTINUE_CODE, dtype=np.int8)
     for n in range(length):
         for j in range(tried):
             k = landings[n, j]
@@ -90,7 +90,7 @@ def _follow(away: Singles, landings: Ints, stays: Bools, seconds: Singles, charg
             if i > 0:
                 after[i] = best[i - 1] + away[n, i]
             if stays[n] and best[i] + away[n, i] < after[i]:
-                after[i], steps[n, i] = best[i] + away[n, i], _STAY
+                after[i], steps[n, i] = best[i] + away[n, i], _STAY_CODE
         begin = n - stretch + 1
         if begin >= 0:
             for j in range(tried):
@@ -112,7 +112,7 @@ def _follow(away: Singles, landings: Ints, stays: Bools, seconds: Singles, charg
         if step < 0:
             order[n] = k
             n -= 1
-            k -= step == _ON
+            k -= step == _CONTINUE_CODE
         else:
             for m in range(stretch):
                 order[n - m] = k - m

@@ -53,7 +53,7 @@ from motionmind.variation.seams import (
 )
 from motionmind.variation.stretches import cheapest_order
 
-SKIP = 10  # default number of points between two postures
+N_SKIPPED_POINTS = 10  # default number of points between two postures
 MAX_LENGTH = 1_000_000  # postures of a variation
 
 
@@ -442,7 +442,7 @@ def _order_postures(
     """Check the arguments of `vary` for a trajectory; return its course, and the reordering of `count` postures."""
     flow = FLOWS["lorenz"] if flow is None else flow
     check_type("flow", flow, Flow, wanted="a Flow, such as find_flow('lorenz') gives")
-    skip = check_whole("skip", SKIP if skip is None else skip, 0, MAX_LENGTH)
+    skip = check_whole("skip", N_SKIPPED_POINTS if skip is None else skip, 0, MAX_LENGTH)
     step = check_number("step", flow.step if step is None else step)
     transient = check_whole("transient", flow.transient if transient is None else transient, 0, 1_000_000_000)
     if nudge is not None and depart is not None:

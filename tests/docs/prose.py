@@ -72,7 +72,23 @@ UNITS = (
         "PX",
     ),
     *("KG", "N", "BYTES", "MB", "NATS", "FRAMES", "WORDS", "LINES", "CHARS", "COLUMNS", "ROWS", "DAYS", "MINUTES"),
-    *("RATIO", "SHARE", "COUNT", "VERSION", "PORT", "SEED", "FACTOR", "WEIGHT", "EXPONENT", "QUANTILE", "LEVEL"),
+    *(
+        "RATIO",
+        "SHARE",
+        "COUNT",
+        "VERSION",
+        "PORT",
+        "SEED",
+        "FACTOR",
+        "WEIGHT",
+        "EXPONENT",
+        "QUANTILE",
+        "PERCENTILE",
+        "LEVEL",
+        "CODE",
+        "SCALE",
+        "M2",
+    ),
 )
 FREE = re.compile(
     r"^(N|MAX|MIN|P)_|TOLERANCE|EPSILON|\bEPS$|BITS$"

@@ -7,11 +7,11 @@ import pytest
 
 # Known faults, which may only fall: lower a number when you remove some; 0 is the goal.
 KNOWN = {
-    "verbs": 50,
-    "phrases": 150,
-    "sentences": 65,
-    "constants": 790,
-    "ambiguous": 125,
+    "verbs": 0,
+    "phrases": 0,
+    "sentences": 0,
+    "constants": 3,
+    "ambiguous": 0,
     "changelog": 0,
     "pages": 0,
 }

@@ -36,7 +36,7 @@ from motionmind.plots.portrait import Portrait, portrait_of
 from motionmind.plots.scene import Room
 from motionmind.plots.symbols import round_numbers
 from motionmind.render.palette import PLOT
-from motionmind.render.solids import EMPTY
+from motionmind.render.solids import EMPTY_CODE
 from motionmind.variation.piece import Piece
 from motionmind.variation.variation import Variation, vary
 from motionmind.variation.variation_json import write_variation
@@ -123,7 +123,7 @@ def test_cells_are_those_of_the_map_where_the_attractor_is_seen(portrait: Portra
     corner = np.array([seen[:, 0].min() - 1.0, seen[:, 1].max() + 1.0])
     width, height = np.ceil((np.ptp(seen, axis=0) + 2.0) * scale).astype(int)
     cells = portrait.cells(corner, scale, int(width), int(height))
-    assert set(np.unique(cells)) <= {EMPTY, *range(131)}
+    assert set(np.unique(cells)) <= {EMPTY_CODE, *range(131)}
 
     sheets = cKDTree((seen - corner) * [scale, -scale])
     (left_out,) = portrait.axes[2]
@@ -280,7 +280,7 @@ def test_png_shows_what_svg_does(plate: Plate) -> None:
 def test_a_figure_has_room_of_its_own() -> None:
     rng = np.random.default_rng(3)
     room, taken = Room(600, 400), list[Floats]()
-    cells = np.where(np.hypot(*np.mgrid[-100:100, -150:150]) < 90.0, 5, EMPTY).astype(np.int16)
+    cells = np.where(np.hypot(*np.mgrid[-100:100, -150:150]) < 90.0, 5, EMPTY_CODE).astype(np.int16)
     room.cover((150.0, 100.0), cells)
     for posture in range(12):
         site = np.array([300.0, 200.0]) + rng.uniform(-70.0, 70.0, 2)
@@ -289,7 +289,7 @@ def test_a_figure_has_room_of_its_own() -> None:
             continue
         box = np.array([*corner, corner[0] + 60.0, corner[1] + 90.0])
         inside = cells[int(box[1]) - 100 : int(box[3]) - 100, max(int(box[0]) - 150, 0) : max(int(box[2]) - 150, 0)]
-        assert set(np.unique(inside)) <= {EMPTY, posture}
+        assert set(np.unique(inside)) <= {EMPTY_CODE, posture}
         assert all(disjoint(box, other) for other in taken)
         taken.append(box)
         room.join(corner, 60.0, 90.0, np.stack([0.5 * (box[:2] + box[2:]), site]))
@@ -336,7 +336,7 @@ def test_what_cannot_be_drawn_is_refused_in_a_line(run: Run) -> None:
         ("notes.json", "a.png", "notes.json"),
         ("changed.json", "a.png", "give another order here"),
         ("flat.json", "a.png", "not 2 numbers and 10"),
-        ("still.json", "a.png", "not 3 numbers and -1 points"),
+        ("still.json", "a.png", "not 3 numbers and -1"),
         ("strange.json", "a.png", "no flow 'strange'"),
     ):
         ran = run("attractor", "--of", source, "-o", output)

@@ -29,7 +29,7 @@ from motionmind.render import film
 from motionmind.render.camera import SAMPLES_PER_PX
 from motionmind.render.film import write_film, write_still
 from motionmind.render.palette import BRIDGED, COLOURS, INSERTED
-from motionmind.render.solids import EMPTY
+from motionmind.render.solids import EMPTY_CODE
 from motionmind.render.stage import MAX_HEIGHT_PX, MIN_HEIGHT_PX, FigurePlate, Stage
 from motionmind.render.timing import HOLD_S, frame_times
 from motionmind.render.view import VIEWS
@@ -118,7 +118,7 @@ ODD = {
 
 def touched(drawing: FigurePlate, stage: Stage) -> tuple[Floats, Floats]:
     """The rows and columns of the picture, pixels, that a body covers."""
-    rows, columns = np.nonzero(drawing.buffer.solid != EMPTY)
+    rows, columns = np.nonzero(drawing.buffer.solid != EMPTY_CODE)
     x, y = drawing.corner
     return rows / SAMPLES_PER_PX + y, columns / SAMPLES_PER_PX + x
 
@@ -150,8 +150,8 @@ def test_all_of_the_body_is_in_the_picture(name: str, view: str) -> None:
             assert free <= columns.min() <= columns.max() <= camera.width - free
             largest = max(largest, np.ptp(rows), np.ptp(columns))
             edge = drawing.buffer.solid.copy()
-            edge[1:-1, 1:-1] = EMPTY
-            assert (edge == EMPTY).all()  # nothing is cut off by its own box
+            edge[1:-1, 1:-1] = EMPTY_CODE
+            assert (edge == EMPTY_CODE).all()  # nothing is cut off by its own box
         assert stage.picture(number).shape == (camera.height, camera.width, 3)
     path = np.ptp(stage.motion.root, axis=0).max() / stage.body.height
     if name != "one joint" and path < 0.5:
@@ -212,7 +212,7 @@ def test_shadows_darken_the_floor_and_no_ghost() -> None:
         dark[stage.drawing(number).box] = 0.0
         haunted = np.zeros(dark.shape, dtype=bool)
         for ghost in stage.ghosts(number):
-            haunted[ghost.box] = ghost.buffer.solid[::SAMPLES_PER_PX, ::SAMPLES_PER_PX] != EMPTY
+            haunted[ghost.box] = ghost.buffer.solid[::SAMPLES_PER_PX, ::SAMPLES_PER_PX] != EMPTY_CODE
         fallen = behind.astype(float).sum(axis=-1) - picture.sum(axis=-1)
         clear = dark > 0.05
         assert (fallen[clear & ~haunted] > 10.0).all()
@@ -232,7 +232,7 @@ def test_a_mirrored_motion_has_a_mirrored_picture() -> None:
             rows, columns = (
                 slice(SAMPLES_PER_PX * box.start, SAMPLES_PER_PX * box.stop) for box in stage.drawing(number).box
             )
-            picture[rows, columns] = stage.drawing(number).buffer.solid != EMPTY
+            picture[rows, columns] = stage.drawing(number).buffer.solid != EMPTY_CODE
             bodies.append(picture)
         assert (bodies[0] != bodies[1][:, ::-1]).sum() < 0.01 * bodies[0].sum()
         pictures = [stage.picture(number)[: -stage.strip].astype(int).sum(axis=-1) for stage in stages]
@@ -256,7 +256,7 @@ def test_ghosts_are_the_ends_of_the_insertion_that_goes_on() -> None:
             own = stage.drawing(end)
             assert ghost.corner == own.corner
             assert (ghost.buffer.solid == own.buffer.solid).all()
-            filled = own.buffer.solid.reshape(own.buffer.solid.shape[0] // 2, 2, -1, 2) != EMPTY
+            filled = own.buffer.solid.reshape(own.buffer.solid.shape[0] // 2, 2, -1, 2) != EMPTY_CODE
             covered[own.box] |= filled.any(axis=(1, 3))
             assert changed[own.box][filled.all(axis=(1, 3))].mean() > 0.95
             assert np.abs(stage.backdrop(number) - alone)[own.box].max() < 100  # pale

@@ -33,8 +33,8 @@ from motionmind.render.camera import SAMPLES_PER_PX
 from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.figure import bridge_balls, colour, draw, given_colours, halved, inserted_colours
 from motionmind.render.palette import COLOURS, FACE, INK, INSERTED, SHEET
-from motionmind.render.sheet import MAX_POSTURES, draw_sheet
-from motionmind.render.solids import EMPTY, Cones, Ellipsoids
+from motionmind.render.sheet import MAX_SHEET_POSTURES, draw_sheet
+from motionmind.render.solids import EMPTY_CODE, Cones, Ellipsoids
 from motionmind.render.view import ABOVE, FRONT, STAGE_LEFT, STAGE_RIGHT, View, to_view
 
 BALLET = Path(__file__).parents[2] / "corpora" / "ballet"
@@ -142,7 +142,7 @@ def test_a_cone_is_the_union_of_its_balls(seed: int) -> None:
         assert np.abs(buffer.depth[both] - balls.depth[both]).max() < 0.02
         assert np.abs(buffer.depth[both] - balls.depth[both]).mean() < 1e-3
     else:
-        assert not ((buffer.solid == 7) & (balls.solid == EMPTY)).any()
+        assert not ((buffer.solid == 7) & (balls.solid == EMPTY_CODE)).any()
 
 
 @given(seeds)
@@ -172,7 +172,7 @@ def test_solids_drawn_together_hide_one_another_as_if_drawn_one_by_one() -> None
     assert np.array_equal(together.depth, alone.depth)
     assert np.isclose(together.shade, alone.shade, atol=0.01).mean() > 0.999  # two that touch are as near
     alone.clear()
-    assert (alone.solid == EMPTY).all()
+    assert (alone.solid == EMPTY_CODE).all()
 
 
 def test_a_canvas_shows_its_part_of_what_a_larger_one_shows() -> None:
@@ -182,7 +182,7 @@ def test_a_canvas_shows_its_part_of_what_a_larger_one_shows() -> None:
     rows, columns = slice(135, 165), slice(130, 170)  # the trunk and what is about it, cut on all sides
     part = DepthBuffer(columns.start / SCALE - HALF, HALF - rows.start / SCALE, 40, 30, SCALE)
     draw(part, *solids)
-    assert all((whole.solid[rows, columns][edge] != EMPTY).any() for edge in np.s_[0, -1, (..., 0), (..., -1)])
+    assert all((whole.solid[rows, columns][edge] != EMPTY_CODE).any() for edge in np.s_[0, -1, (..., 0), (..., -1)])
     assert (part.solid != whole.solid[rows, columns]).mean() < 0.002
     same = part.solid == whole.solid[rows, columns]
     assert np.allclose(part.depth[same], whole.depth[rows, columns][same], atol=1e-4)
@@ -284,7 +284,7 @@ def test_a_body_with_more_joints_than_human23_looks_the_same() -> None:
     for view in VIEWS:
         _, one = drawn(standing(), view)
         body, other = drawn(Posture(more, rotations, np.zeros(3)), view)
-        assert ((one.solid == EMPTY) != (other.solid == EMPTY)).mean() < 1e-3
+        assert ((one.solid == EMPTY_CODE) != (other.solid == EMPTY_CODE)).mean() < 1e-3
     assert {"left_little", "right_index"} <= set(body.parts)
 
 
@@ -372,7 +372,7 @@ def test_the_nearer_leg_covers_the_farther(front: str) -> None:
         alone = DepthBuffer(-HALF, HALF, 300, 300, SCALE)
         only = frozenset(i for i, part in enumerate(body.parts) if part == f"{side}_shank")
         draw(alone, *to_view(*body.solids(posture.rotations, posture.root), FRONT, posture.root), only)
-        both &= alone.solid != EMPTY
+        both &= alone.solid != EMPTY_CODE
     assert both.sum() > 100
     other = "right" if front == "left" else "left"
     assert not shown(body, buffer, part=f"{other}_shank")[both].any()
@@ -432,7 +432,7 @@ def test_a_limb_before_another_has_a_line_round_it_and_one_that_goes_on_has_none
 
 def lines(buffer: DepthBuffer, parts: Floats, step: float, width: int) -> Bools:
     """Pixels with one of another part that is nearer by a step within `width` above, below or beside them."""
-    part = np.where(buffer.solid == EMPTY, -1, parts[buffer.solid])
+    part = np.where(buffer.solid == EMPTY_CODE, -1, parts[buffer.solid])
     here, found = np.s_[width:-width, width:-width], np.zeros(part.shape, dtype=bool)
     for by in range(1, width + 1):
         for shift, axis in ((by, 0), (-by, 0), (by, 1), (-by, 1)):
@@ -509,8 +509,8 @@ def test_nothing_is_cut_off(seed: int, kind: str) -> None:
             buffer = window.buffer()
             draw(buffer, *sheet._solids(at, window.view))
             edge = np.concatenate([buffer.solid[0], buffer.solid[-1], buffer.solid[:, 0], buffer.solid[:, -1]])
-            assert (edge == EMPTY).all()
-            assert (buffer.solid != EMPTY).sum() > 200
+            assert (edge == EMPTY_CODE).all()
+            assert (buffer.solid != EMPTY_CODE).sum() > 200
 
 
 def test_one_floor_and_one_scale_for_the_whole_sheet() -> None:
@@ -560,7 +560,7 @@ def test_turned_out_feet_are_wider_from_above() -> None:
         feet = DepthBuffer(-HALF, HALF, 300, 300, SCALE)
         only = frozenset(i for i, part in enumerate(body.parts) if part.endswith("_foot"))
         draw(feet, *to_view(*body.solids(posture.rotations, posture.root), ABOVE, posture.root), only)
-        return np.ptp(np.argwhere(feet.solid != EMPTY), axis=0) / SCALE
+        return np.ptp(np.argwhere(feet.solid != EMPTY_CODE), axis=0) / SCALE
 
     ahead = plan()
     out = plan(left_hip=np.array([0.0, 1.4, 0.0]), right_hip=np.array([0.0, -1.4, 0.0]))
@@ -592,11 +592,11 @@ def test_an_insect_has_six_legs_in_two_colours() -> None:
 
 def test_a_sheet_has_bounds() -> None:
     many = clip(1, ant())
-    times = np.arange(MAX_POSTURES + 1.0)
+    times = np.arange(MAX_SHEET_POSTURES + 1.0)
     many = Motion(
         many.skeleton,
-        many.rotations[np.zeros(MAX_POSTURES + 1, dtype=int)],
-        np.zeros((MAX_POSTURES + 1, 3)),
+        many.rotations[np.zeros(MAX_SHEET_POSTURES + 1, dtype=int)],
+        np.zeros((MAX_SHEET_POSTURES + 1, 3)),
         times,
         "long",
     )
@@ -606,7 +606,7 @@ def test_a_sheet_has_bounds() -> None:
         draw_sheet(many, [])
     with pytest.raises(MotionMindError, match="frames 0 to 400, no frame 401"):
         draw_sheet(many, [401])
-    full = draw_sheet(many, range(MAX_POSTURES))
+    full = draw_sheet(many, range(MAX_SHEET_POSTURES))
     assert full.width * full.height < 1.3 * sheets._MAX_PIXELS
     leaps = replace(clip(2), root=np.array([[0.0, 1.0, 0.0], [0.0, 1e6, 0.0]]))
     picture = draw_sheet(leaps)
@@ -687,7 +687,7 @@ def test_the_balls_of_bridges_have_room() -> None:
         draw(buffer, *sheet._solids(0, window.view))
         assert (buffer.solid >= len(sheet.body.parts)).any()
         for edge in np.s_[0, -1, (..., 0), (..., -1)]:
-            assert (buffer.solid[edge] == EMPTY).all()
+            assert (buffer.solid[edge] == EMPTY_CODE).all()
 
 
 # --- the command ----------------------------------------------------------------------------------------------------

@@ -25,7 +25,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 from motionmind.render.bspline import path
-from motionmind.render.solids import EMPTY
+from motionmind.render.solids import EMPTY_CODE
 from motionmind.render.stage import Stage
 from motionmind.render.svg import svg, write_svg
 from motionmind.render.timing import frame_times
@@ -40,19 +40,19 @@ def blots(seed: int, labels: int = 3, size: int = 40) -> Int16s:
     """Regions of some labels on nothing: discs one over another, and specks."""
     rng = np.random.default_rng(seed)
     y, x = np.mgrid[:size, :size]
-    picture = np.full((size, size), EMPTY, dtype=np.int16)
+    picture = np.full((size, size), EMPTY_CODE, dtype=np.int16)
     for _ in range(8):
         middle, radius = rng.uniform(0, size, 2), rng.uniform(1, size / 3)
-        picture[np.hypot(x - middle[0], y - middle[1]) < radius] = rng.integers(EMPTY, labels)
+        picture[np.hypot(x - middle[0], y - middle[1]) < radius] = rng.integers(EMPTY_CODE, labels)
     specks = rng.random((size, size)) < 0.05
-    picture[specks] = rng.integers(EMPTY, labels, (size, size))[specks]
+    picture[specks] = rng.integers(EMPTY_CODE, labels, (size, size))[specks]
     return picture
 
 
 def disc(radius: float, size: int = 100) -> Int16s:
     """A disc about the middle of a picture."""
     y, x = np.mgrid[:size, :size] + 0.5
-    return np.where(np.hypot(x - size / 2, y - size / 2) < radius, 0, EMPTY).astype(np.int16)
+    return np.where(np.hypot(x - size / 2, y - size / 2) < radius, 0, EMPTY_CODE).astype(np.int16)
 
 
 def split(lines: Lines) -> list[Floats]:
@@ -104,7 +104,7 @@ def test_the_area_in_outlines_is_that_of_their_samples(seed: int) -> None:
     lines = outlines(picture)
     for label in range(3):
         assert lines.areas()[lines.labels == label].sum() == (picture == label).sum()
-    assert set(np.unique(lines.labels)) == set(np.unique(picture)) - {EMPTY}
+    assert set(np.unique(lines.labels)) == set(np.unique(picture)) - {EMPTY_CODE}
 
 
 @given(seeds)
@@ -112,7 +112,7 @@ def test_the_area_in_outlines_is_that_of_their_samples(seed: int) -> None:
 def test_outlines_filled_are_the_picture_they_were_traced_from(seed: int) -> None:
     picture = blots(seed)
     lines = outlines(picture)
-    again = np.full(picture.shape, EMPTY)
+    again = np.full(picture.shape, EMPTY_CODE)
     for label in range(3):
         image = Image.new("1", (4 * picture.shape[1], 4 * picture.shape[0]))
         own = lines.only(lines.labels == label)
@@ -144,7 +144,7 @@ def test_a_disc_becomes_rounder(radius: float) -> None:
 @pytest.mark.parametrize("slope", [0.02, 0.11, 0.37, 0.5, 0.93])
 def test_a_slanted_edge_becomes_straight(slope: float) -> None:
     y, x = np.mgrid[:120, :300] + 0.5
-    lines = outlines(np.where(y > 60.3 + slope * (x - 150.0), 0, EMPTY).astype(np.int16))
+    lines = outlines(np.where(y > 60.3 + slope * (x - 150.0), 0, EMPTY_CODE).astype(np.int16))
     points = curve(path(smooth(lines), 10.0), 10.0)[0]
     points = points[(np.abs(points[:, 0] - 150.0) < 50.0) & (np.abs(points[:, 1] - 60.0) < 50.0)]
     off = (points[:, 1] - 60.3 - slope * (points[:, 0] - 150.0)) / np.hypot(1.0, slope)
@@ -159,7 +159,7 @@ def test_a_path_follows_its_lines_and_closes(seed: int) -> None:
     y, x = np.mgrid[:120, :120] - 59.7
     leaves, turn = rng.integers(1, 5), rng.uniform(0.0, 2.0 * np.pi)
     blob = np.hypot(x, y) < rng.uniform(20.0, 40.0) * (1.0 + 0.3 * np.cos(leaves * np.arctan2(y, x) + turn))
-    lines = smooth(outlines(np.where(blob, 0, EMPTY).astype(np.int16)))
+    lines = smooth(outlines(np.where(blob, 0, EMPTY_CODE).astype(np.int16)))
     (drawn,) = curve(path(lines, 10.0), 10.0)
     assert (drawn[0] == drawn[-1]).all()
     off = np.concatenate([distance(drawn, lines.points), distance(lines.points, drawn)])
@@ -177,10 +177,10 @@ def test_a_path_starts_where_it_is_told_to() -> None:
 @settings(max_examples=30)
 def test_ridges_are_where_a_part_stands_before_another(seed: int) -> None:
     parts = blots(seed)
-    depth = np.where(parts == EMPTY, -np.inf, np.random.default_rng(seed).uniform(0.0, 1.0, parts.shape))
-    parts, depth = np.pad(parts, 1, constant_values=EMPTY), np.pad(depth, 1, constant_values=-np.inf)
+    depth = np.where(parts == EMPTY_CODE, -np.inf, np.random.default_rng(seed).uniform(0.0, 1.0, parts.shape))
+    parts, depth = np.pad(parts, 1, constant_values=EMPTY_CODE), np.pad(depth, 1, constant_values=-np.inf)
     least, most = set(), set()
-    for y, x in np.argwhere(parts != EMPTY).tolist():
+    for y, x in np.argwhere(parts != EMPTY_CODE).tolist():
         around = [(y - 1, x, (x, y, x + 1, y)), (y, x + 1, (x + 1, y, x + 1, y + 1))]
         around += [(y + 1, x, (x + 1, y + 1, x, y + 1)), (y, x - 1, (x, y + 1, x, y))]
         for other_y, other_x, side in around:
@@ -194,14 +194,14 @@ def test_ridges_are_where_a_part_stands_before_another(seed: int) -> None:
 
 def test_the_ridge_of_a_disc_is_its_outline() -> None:
     parts = disc(20.0)
-    lines = ridges(parts, np.where(parts == EMPTY, -np.inf, 0.0).astype(np.float32), 0.1)
+    lines = ridges(parts, np.where(parts == EMPTY_CODE, -np.inf, 0.0).astype(np.float32), 0.1)
     assert lines.closed.tolist() == [True]
     assert sides(lines) == sides(outlines(parts))
 
 
 def test_a_ridge_goes_on_across_a_joint_and_ends_at_what_hides_it() -> None:
     """A bar of two parts before nothing, and a second bar half behind it."""
-    parts, depth = np.full((40, 60), EMPTY, dtype=np.int16), np.full((40, 60), -np.inf, dtype=np.float32)
+    parts, depth = np.full((40, 60), EMPTY_CODE, dtype=np.int16), np.full((40, 60), -np.inf, dtype=np.float32)
     parts[2:38, 25:35], depth[2:38, 25:35] = 2, 0.0
     parts[15:25, 5:30], depth[15:25, 5:30] = 0, 1.0
     parts[15:25, 30:55], depth[15:25, 30:55] = 1, 1.0
