@@ -116,7 +116,7 @@ def test_names_are_words_and_never_markup(opened: Callable[..., Any]) -> None:
 
 def test_a_tween_s_words_stand_above_it() -> None:
     html = KINDS["tween"]()._repr_html_()
-    assert re.search(r"^<p>\d moves in \d\.\d s, [^<]+</p>.*<iframe ", html, re.S)
+    assert re.search(r"^<p>\d moves, \d\.\d s\. [^<]+</p>.*<iframe ", html, re.S)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -114,7 +114,8 @@ def test_a_kernel_shows_it_and_hears_the_page(tmp_path: Path) -> None:
     cells = [
         "from motionmind import Engine\n"
         "from motionmind.notebook import Player\n"
-        "tween = Engine.load('ballet').tween('ballet/arabesque', 'ballet/fifth')\n"
+        "engine = Engine.load('ballet')\n"
+        "tween = engine.tween(engine.posture('ballet/arabesque'), engine.posture('ballet/fifth'))\n"
         "player = Player(tween)\n"
         "player",
         "player.time = 0.5; player.selection = (0.25, 0.75)",
