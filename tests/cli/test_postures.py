@@ -88,7 +88,7 @@ def test_a_frame_of_every_format_is_the_frame_with_the_movement_around_it(name: 
     write_motion(name, clip())
     whole = read_motion(name)
     for frame in (0, 7, -2):
-        found = find_posture(parse_posture(f"{name}@{frame}")).posture
+        found = find_posture(parse_posture(f"{name}@{frame}"), read=read_motion).posture
         np.testing.assert_array_equal(found.rotations, whole.posture(frame).rotations)
         np.testing.assert_array_equal(found.root, whole.posture(frame).root)
     a, before = read_end(parse_posture(f"{name}@9~"), None, "before")

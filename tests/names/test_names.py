@@ -302,9 +302,9 @@ def test_a_score_that_is_saved_while_it_is_read_is_read_again(tmp_path: Path, mo
 
 def test_scores_of_few_files_are_kept(tmp_path: Path) -> None:
     text = (BALLET / "vocabulary.score").read_text("utf-8")
-    for number in range(finding._SCORES + 5):
+    for number in range(21):
         path = tmp_path / f"{number}.score"
         path.write_text(text, "utf-8")
         finding._read_once((path,))
         path.unlink()
-    assert len(finding._kept) <= finding._SCORES
+    assert len(finding._kept) == 16

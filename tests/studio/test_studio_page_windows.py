@@ -140,7 +140,7 @@ def test_a_browser_without_the_token_is_told_where_to_look(
     page.goto(studio_server.url + end)
     expect(page.get_by_test_id("toast").get_by_text("shown in the terminal")).to_be_visible()
     if not end:  # as a page that is still open when the studio is started again
-        expect(page.get_by_test_id("offline")).to_contain_text("nothing is saved; open the studio at the address")
+        expect(page.get_by_test_id("offline")).to_contain_text("edits are not saved; open the studio at the address")
     page.goto(studio_server.entry)  # in the same tab: nothing but the end of the address is another
     expect(page.get_by_test_id("posture-arabesque")).to_be_visible()
     assert studio_server.keys.token not in page.url
