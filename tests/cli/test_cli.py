@@ -132,7 +132,7 @@ def test_what_must_be_even_in_time_is_made_so_and_said(run: Run) -> None:
                 ran.err,
             )
             again = run(*(word.format(file) for word in words), "--fps", 10)
-            assert "must be even" not in again.err
+            assert "needs evenly spaced" not in again.err
     ran = run("convert", "uneven.json", "kept.json")
     assert "even" not in ran.err
     assert len(read_motion("kept.json")) == len(uneven)

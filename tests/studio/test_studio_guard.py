@@ -324,7 +324,7 @@ def test_other_computers_are_let_in_only_where_that_is_asked_for(tmp_path: Path)
         process.terminate()
         _, err = process.communicate(timeout=20)
     assert "anyone with the URL" in err
-    assert "nothing is encrypted" in err
+    assert "is not encrypted" in err
 
 
 def writing(served: Served, path: str, *more: str) -> bytes:

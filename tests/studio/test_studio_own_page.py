@@ -152,7 +152,7 @@ def test_a_piece_is_varied_by_keyboard(served: Served, open_page: Open) -> None:
     until(page, "document.querySelector('[data-testid=map]').getAttribute('aria-valuetext') === 'default'")
     tab_to(page, "depart")
     page.keyboard.press("Home")
-    until(page, "document.querySelector('[data-testid=departs]').textContent === 'as it is'")
+    until(page, "document.querySelector('[data-testid=departs]').textContent === 'unchanged'")
     for _ in range(20):
         page.keyboard.press("ArrowRight")
     page.get_by_test_id("tile-4").wait_for()
@@ -170,8 +170,8 @@ def test_the_dial_answers_while_it_is_turned(served: Served, open_page: Open) ->
     page.get_by_test_id("open-vary").click()
     page.get_by_test_id("tile-3").wait_for()
     page.get_by_test_id("depart").fill("0")
-    until(page, "document.querySelector('[data-testid=departs]').textContent === 'as it is'")
-    seen = {"as it is"}
+    until(page, "document.querySelector('[data-testid=departs]').textContent === 'unchanged'")
+    seen = {"unchanged"}
     for share in (5, 10, 15, 20, 25, 30, 35, 40, 10):
         page.get_by_test_id("depart").fill(str(share))
         until(page, "!document.querySelector('[data-testid=vary-error]')")
@@ -226,7 +226,7 @@ def test_own_movement_by_mouse(served: Served, open_page: Open, tmp_path: Path) 
     errors = sorted(page.get_by_test_id("file-error").all_inner_texts())
     assert errors[0].startswith("broken.bvh:")
     assert errors[1].startswith("dance.fbx: FBX is not supported")
-    assert "a person of 23 joints" in page.get_by_test_id("understood").inner_text()
+    assert "a person with 23 joints" in page.get_by_test_id("understood").inner_text()
     page.emulate_media(reduced_motion="no-preference")  # what is looked at plays then
     page.get_by_test_id("look").click()
     until(page, "studio.viewer.title.includes('bends.score') && studio.viewer.player.playing")

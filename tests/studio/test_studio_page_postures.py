@@ -56,7 +56,7 @@ def test_a_posture_is_deleted_and_comes_back(studio_server: Served, studio_page:
     page.get_by_test_id("open-pose").click()
     page.get_by_test_id("handle-pelvis").wait_for()
     page.get_by_test_id("pose-from").select_option(label="rest")
-    wait_for(page, "studio.viewer.title === 'rest, being changed'")
+    wait_for(page, "studio.viewer.title === 'rest, being edited'")
     page.get_by_test_id("posture-to-timeline").click()
     wait_for(page, "piece.blocks.length === 1")
     page.get_by_test_id("open-between").click()

@@ -173,7 +173,7 @@ def test_nothing_is_reported_unless_it_is_asked_for(ballet: Engine) -> None:
     assert ballet.tween(*ENDS, what_if=True).what_if == ()
     first, second = ballet.alternatives(*ENDS, 2, moves=6, what_if=True)
     assert (len(first.what_if), len(second.what_if)) == (1, 0)
-    with pytest.raises(MotionMindError, match="asked of the best tween"):
+    with pytest.raises(MotionMindError, match="what_if prices the restrictions of the best tween"):
         ballet.tween(*ENDS, unlike=[first], what_if=True)
 
 
