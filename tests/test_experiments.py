@@ -624,7 +624,7 @@ def test_searches_are_listened_to_and_kept_to_their_memory(monkeypatch: pytest.M
         assert max(walk.found.peak_nodes for walk in walks) <= 500
         assert any(walk.found.forgotten for walk in walks) == (answer.peak_nodes == 500)
     assert expansions.astar.search.__module__ == "motionmind.search.astar"
-    assert expansions.bounding.MOST_PAIRS > 0
+    assert expansions.bounding.MAX_STATE_PAIRS > 0
 
 
 # --- growth -----------------------------------------------------------------------------------------------------------

@@ -15,7 +15,9 @@ from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.clip import JointRepair
+from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
+from motionmind.corpus.kept import Kept
 from motionmind.geometry import rotations as rot
 from motionmind.learned.pace import (
     MIN_PEAK_ROOT_ACCELERATION,
@@ -30,7 +32,8 @@ from motionmind.learned.pace import (
     _fit,
     _smooth,
     find_still,
-    learn_pace,
+    measure_pace,
+    refit_pace,
     way_between,
     way_of,
 )
@@ -56,6 +59,10 @@ def reaches(skeleton: Skeleton, seconds: list[float], angles: list[float], strid
     root = np.zeros((len(times), 3))
     root[:, 2] = gone
     return Motion(skeleton, rotations, root, np.array(times), "reaches")
+
+
+def learn_pace(corpus: Corpus) -> Pace:
+    return refit_pace(corpus, measure_pace(Kept.none(corpus)))
 
 
 def learned(*clips: Motion, rate: float | None = 10.0) -> Pace:

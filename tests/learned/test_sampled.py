@@ -13,6 +13,7 @@ from motionmind.body.motion import Motion
 from motionmind.body.plausibility import at_rate
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
+from motionmind.corpus.kept import Kept
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 from motionmind.learned import pace, plausibility
@@ -60,7 +61,7 @@ def test_frames_are_those_of_the_whole_recording(fps: float, rate: float | None,
 
 
 def learned(corpus: Corpus) -> list[np.ndarray]:
-    pace_of = pace.learn_pace(corpus)
+    pace_of = pace.refit_pace(corpus, pace.measure_pace(Kept.none(corpus)))
     return [*vars(pace_of).values(), plausibility.learn_plausibility(corpus, pace_of.fastest).most]
 
 
@@ -79,7 +80,7 @@ def test_what_is_learned_does_not_depend_on_the_blocks(monkeypatch: pytest.Monke
 def test_a_recording_of_more_frames_than_are_made_at_once_is_learned_from(monkeypatch: pytest.MonkeyPatch) -> None:
     clip = recording(60.0)
     usual = Engine.fit([clip], rate=5.0)
-    monkeypatch.setattr(rates, "MOST_PLACES", 1500 * len(BODY))
+    monkeypatch.setattr(rates, "MAX_POSITIONS", 1500 * len(BODY))
     engine = Engine.fit([clip], rate=5.0)
     np.testing.assert_array_equal(engine.plausibility.most, usual.plausibility.most)
     np.testing.assert_array_equal(engine.pace.law, usual.pace.law)

@@ -510,7 +510,7 @@ def test_the_command_refuses_what_it_cannot_measure(run: Run, engine: Engine) ->
         Path(f"{name}.json").write_text(json.dumps(report | {name: changed}))
         said = run("measure", "tween.json", "--corpus", "random", "--report", f"{name}.json")
         assert (said.code, said.out, said.err.count("\n")) == (2, "", 1)
-        assert f"{name}.json: its tween is not of random" in said.err
+        assert f"{name}.json: not a tween of random" in said.err
     said = run("measure", "short.json", "--corpus", "random")
     assert (said.code, said.out) == (2, "")
     assert "too short" in said.err
