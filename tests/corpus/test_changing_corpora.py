@@ -89,7 +89,7 @@ def test_in_any_order_it_is_as_if_it_were_built_so(
     """Each turn removes a dance that is there, or adds it at the end; what was known is taken as it was."""
     there = [0, 1]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(posture_statistics, "MAX_FULL_SEARCH", 40 if trees else posture_statistics.MAX_FULL_SEARCH)
+        patch.setattr(posture_statistics, "MAX_FULL_SEARCH", 20 if trees else posture_statistics.MAX_FULL_SEARCH)
         learned = learn_in(built(way).corpus, built(way).space)
         for dance in turns:
             if dance not in there:

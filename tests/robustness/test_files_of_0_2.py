@@ -1,4 +1,4 @@
-"""Postures, movement, variations and reports that 0.2 wrote are read."""
+"""Postures, movement and variations that 0.2 wrote are read."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import pytest
 from command_line import Run
 
 from motionmind.formats import read_motion, read_posture
-from motionmind.tween.report import read_report
 from motionmind.variation.variation_json import read_variation
 
 
@@ -33,8 +32,3 @@ def test_a_variation_is_read_and_drawn_on(written: Path, run: Run) -> None:
         variation = read_variation(written / name)
         assert (len(variation.transitions), len(variation.edits)) == (2, edits)
     assert run("review", written / "variation.json", "--approve", "1", "-o", "again.json").code == 0
-
-
-def test_a_report_is_explained(written: Path, run: Run) -> None:
-    assert read_report(written / "tween-report.json").status == "optimal"
-    assert "left_knee" in run("explain", written / "tween-report.json").out

@@ -84,7 +84,7 @@ def test_alternatives_keep_what_else_is_asked(ballet: Engine, asked: dict[str, A
 def test_samples_differ_by_their_seeds(ballet: Engine) -> None:
     ends = read_posture(A), read_posture(B)
     found = find(ballet, ends, 3, sample=True, seed=5)
-    assert [tween.request.seed for tween in found] == [5, 6, 7]
+    assert [tween.request.search.seed for tween in found] == [5, 6, 7]
     np.testing.assert_array_equal(found[2].path, ballet.tween(*ends, sample=True, seed=7).path)
 
 

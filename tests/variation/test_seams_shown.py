@@ -135,7 +135,7 @@ def test_a_seam_is_played_with_another_insertion_and_nothing_is_edited(
         assert f"seam {seam.number}, {len(shown)} frames" in played.out
     assert file.read_bytes() == before
     for words, message in (
-        (("--play", 1), "name one by -o, such as -o seam-1.gif"),
+        (("--play", 1), "--play needs a file, such as -o seam-1.gif"),
         (("--play", 999, "-o", "x.gif"), "no seam 999"),
         (("--play", seam.number, "--alternative", 9, "-o", "x.gif"), "has alternatives 1 to 3, no alternative 9"),
         (("--play", 1, "-o", "x.json"), "the name must end in one of .png, .gif, .mp4, .svg, .html"),
