@@ -183,7 +183,9 @@ def test_without_a_way_through_the_joint_is_named() -> None:
     clips[1] = replace(clips[1], rotations=head)
     engine = Engine.fit(clips, discretization=Codebook(15.0))
     a, b = clips[0].posture(3), clips[1].posture(30)
-    with pytest.raises(NoPathError, match=r"no path from A to B in at most 60 moves \(without strict(.|\n)*  head: state"):
+    with pytest.raises(
+        NoPathError, match=r"no path from A to B in at most 60 moves \(without strict(.|\n)*  head: state"
+    ):
         engine.tween(a, b, strict=True)
     bridged = engine.tween(a, b)
     assert "head" in {bridge.joint for bridge in bridged.bridges}
