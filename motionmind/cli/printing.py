@@ -64,7 +64,7 @@ def count(number: int, noun: str) -> str:
 
 
 class Interruption:
-    """A context in which Ctrl-C ends the search, which then returns its best result, instead of the program.
+    """A context in which Ctrl-C ends only the search, not the program; the search then returns its best result.
 
     Attributes:
         is_requested: whether Ctrl-C was pressed.

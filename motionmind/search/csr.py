@@ -19,7 +19,7 @@ def select_entries(
         costs: its entries [E].
         rows: the row that each row of the new matrix is taken from [N].
         numbers: new number of each old column; -1 to leave it out.
-        shifts: offset in `numbers` of the old columns of each new row [N].
+        shifts: for each new row, the offset to add to an old column to index `numbers` [N].
 
     Returns:
         Row pointers [N + 1], columns [M] and entries [M] of the new matrix.
