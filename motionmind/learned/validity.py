@@ -1,6 +1,7 @@
 """Checks of the arrays of a corpus's movement, which may come from elsewhere: compiled code does not check indices.
 
-Letters are sizes: N postures, J joints, L joint chains, G states in all, K frames of detail between postures, C clips and F faults; clip_bytes and fault_bytes are the lengths of their encoded text.
+Letters are sizes: N postures, J joints, L joint chains, G states in all, K frames of detail between postures,
+C clips and F faults; clip_bytes and fault_bytes are the lengths of their encoded text.
 """
 
 from __future__ import annotations
