@@ -23,7 +23,7 @@ from motionmind.geometry import rotations as rot
 MEASURES = ("root speed", "root acceleration", "slide", "joints", "legs")
 BEYOND = 99.5  # percentile of the dancers' own windows
 TOUCHING = 0.01  # metres: legs that are no deeper in each other touch
-REST = 0.5  # metres a second squared: level acceleration of a body at rest; weight is looked at up to CALM_MPS2
+REST = 0.5  # metres a second squared: level acceleration of a body at rest; balance is measured up to CALM_MPS2
 STILL_JOINT = 0.5  # rad/s: no joint's limit is less
 _ENOUGH = 30  # frames of which the greatest hundredth says something
 _FEW = 50  # windows; where clips have fewer of a length, whole clips count as well

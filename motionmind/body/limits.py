@@ -10,6 +10,8 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.skeleton import Skeleton
 
+_N_POSTURES_AT_ONCE = 4096  # bounds the memory for the angles of a large corpus
+
 
 def within_limits(
     skeleton: Skeleton, rotations: Floats, given: Floats, loose: Bools, joints: Sequence[int] | None = None
@@ -58,7 +60,7 @@ def find_loose(skeleton: Skeleton, rotations: Floats) -> Bools:
         return np.zeros(len(skeleton), dtype=np.bool_)
     least, most = anatomy.limits
     counts = np.zeros(len(skeleton), dtype=np.int64)
-    for start in range(0, len(rotations), 4096):
-        degrees = anatomy.degrees(rotations[start : start + 4096])
+    for start in range(0, len(rotations), _N_POSTURES_AT_ONCE):
+        degrees = anatomy.degrees(rotations[start : start + _N_POSTURES_AT_ONCE])
         counts += np.any((degrees < least - 5.0) | (degrees > most + 5.0), axis=-1).sum(axis=0)
     return np.asarray(counts / len(rotations) > 0.01)

@@ -63,5 +63,6 @@ def test_carriage_is_the_same_in_blocks_of_any_size(monkeypatch: pytest.MonkeyPa
     assert not whole.loose.all()
     for size in (1, 7):
         monkeypatch.setattr("motionmind.learned.posture_statistics.BLOCK_FRAMES", size)
+        monkeypatch.setattr("motionmind.body.limits._N_POSTURES_AT_ONCE", size)
         for name, array in vars(learn_posture_statistics(corpus)).items():
             np.testing.assert_array_equal(array, getattr(whole, name), err_msg=name)
