@@ -3,8 +3,8 @@
     python -m tests.robustness.mutate --since HEAD~5 --count 50 --seed 0
     python -m tests.robustness.mutate --only "motionmind/search/*.py"
 
-The tool changes one node of a module's syntax tree in a copy of the checkout. There it runs the tests of the module's room and
-all other tests that import the module. Compiled code is cached by the contents of its sources
+The tool changes one node of a module's syntax tree in a copy of the checkout. There it runs the tests of the module's
+room and all other tests that import the module. Compiled code is cached by the contents of its sources
 (`motionmind.codecache`), so a mutant recompiles only what depends on it.
 """
 
