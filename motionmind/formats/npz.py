@@ -100,9 +100,9 @@ def read_npz(
 def write_npz(path: FilePath, motion: Motion) -> None:
     """Write `motion` as an uncompressed AMASS file: on its own joints if they are one of SMPL's bodies, else on SMPL+H.
 
-    From human44, SMPL+H takes each row of the spine as one joint or two, and its four fingers move as one; any other
-    body is retargeted to human23 first. Joints that nothing maps to stay at rest. Read back, orientations agree to
-    1e-6 rad and the pelvis's places to 1e-9 m. The same motion gives the same bytes.
+    When human44 becomes SMPL+H, each row of spine joints becomes one or two, and the four fingers move as one. Any
+    other body is retargeted to human23 first. Joints that nothing maps to stay at rest. Read back, orientations agree
+    to 1e-6 rad and the pelvis's places to 1e-9 m. The same motion gives the same bytes.
 
     Args:
         path: the file to write.
@@ -177,7 +177,7 @@ def check_array(stream: IO[bytes], size: int, what: str, path: FilePath) -> None
 
 
 def _max_array_bytes(size: int) -> int:
-    """Return the bytes allowed for an array: twice the file's `size`, or the largest made motion's, up to a limit."""
+    """Return the bytes allowed for an array: twice the file's `size` or the largest motion's, up to a limit."""
     return min(max(24 * MAX_POSITIONS, 2 * size), _MAX_ARRAY_BYTES)
 
 

@@ -53,7 +53,7 @@ def _write_entries(
     out_costs: Floats,
 ) -> Ints:
     """Write the columns and entries of `select_entries`, and return its row pointers [N + 1]."""
-    # Write every entry, and let the next overwrite one that is left out: a branch would be mispredicted.
+    # Write every entry, but advance only past kept ones: a branch would often be mispredicted.
     out_ptr, at = np.zeros(len(rows) + 1, np.int64), np.uint64(0)
     for k in range(len(rows)):
         for e in range(np.uint64(ptr[rows[k]]), np.uint64(ptr[rows[k] + 1])):

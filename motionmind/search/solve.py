@@ -73,12 +73,12 @@ class Certificate:
 def solve(problem: Problem, watch: Watch | None = None) -> Certificate:
     """Find the cheapest path over all numbers of moves, and bound its optimality gap.
 
-    First bound the numbers of moves in order of the chains' independent costs, as long as these are below the cost of
-    the best path found. A* then searches the undecided numbers of moves, and always that of the best path; its result
-    is the answer, unless its nodes run out. The proven lower bound is the least of all bounds.
+    First bound each number of moves, in order of the sum of the chains' independent costs, until that sum reaches the
+    cost of the best path found. A* then searches the undecided numbers of moves, and always that of the best path; its
+    result is the answer, unless its nodes run out. The proven lower bound is the least of all bounds.
 
-    Vias divide the path into segments of at least one move. Then the numbers of moves apply to a segment, and each is
-    searched only below the best path's cost minus the lower bounds of the other segments.
+    Vias divide the path into segments of at least one move, each with its own numbers of moves. The search of a segment
+    looks only for paths that cost less than the best path minus the lower bounds of the other segments.
 
     A guide determines how to move in a number of moves, not how many to make. So if the rules leave a choice, take the
     number of moves of the cheapest path without the guide, and certify the guided problem with that number. With tolls,
@@ -143,7 +143,7 @@ class _Solver:
         return Progress(self.segments.best, self.segments.lower_bound(), self.expansions)
 
     def run(self) -> None:
-        """Search until the best path is proven, the budget is spent, or the watcher stops; A* gives the path."""
+        """Search until the best path is proven, the budget is spent or the watcher stops; then A* on its pieces."""
         self._bound(lambda: False)
         self._search(lambda: False)
         for piece in self.segments.best_pieces():

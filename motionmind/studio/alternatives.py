@@ -122,7 +122,7 @@ def account(tween: Tween, corpus: Corpus, own: Floats, first: Motion | None = No
 
 
 def usual_likelihoods(engine: Engine) -> Floats:
-    """Return percentiles [101] of the corpus's own moves' likelihood: the mean ln P over the joints that move."""
+    """Return percentiles [101] of the log-likelihood of the corpus's moves, each the mean over the joints that move."""
     moves, graph = engine.corpus.moves, engine.grammar.transitions
     chosen = np.unique(np.linspace(0, len(moves) - 1, 2000).astype(int))
     states = np.asarray(engine.states)

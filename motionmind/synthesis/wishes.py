@@ -26,9 +26,9 @@ class Style(NamedTuple):
         statistics: its posture statistics: travel and stance.
         tolerances: angle within which a state of each chain stands for an orientation [L], radians.
         fastest: greatest speeds of the joints, of turning and of travel [J + 2], as in `motionmind.learned.pace`, at a
-            pace of 1; None for no bound. With a given length they hold as far as slower parts have time to spare.
-        peaks: function of seconds and a pace that returns the bounds on the peaks of such movement [J + 4]
-            (`motionmind.learned.pace.Pace.peaks_in`); None for no bounds.
+            pace of 1; None for no bound. With a given length, slower parts give up time to meet them.
+        peaks: function of a duration, seconds, and a pace that returns the bounds on the peaks of movement of that
+            length [J + 4] (`motionmind.learned.pace.Pace.peaks_in`); None for no bounds.
         slides: greatest speed of a foot near the floor at a pace of 1, heights/s, in movement with `peaks`.
     """
 
@@ -47,7 +47,7 @@ class Wishes(NamedTuple):
     Attributes:
         a: first posture.
         b: last posture.
-        wished: chains that the request constrains beyond their ends [L].
+        wished: chains that the request constrains at more than A and B [L].
         fixed: chains among them that must not move, not even for the feet [L].
         fps: frames a second; the motion is stretched by less than a frame so that `b` falls on one.
         length: duration, seconds; None for the typical duration of the corpus.
@@ -55,7 +55,7 @@ class Wishes(NamedTuple):
         leaving: velocity at `a`; None where unknown.
         arriving: velocity at `b`; None where unknown.
         without: terms of the solve to leave out.
-        pace: speed relative to the corpus; without effect on a given length.
+        pace: speed relative to the corpus; ignored if `length` is given.
         slows: whether the clock may slow down; if not, the given moves keep their durations.
         liveliness: 0 for the mean of walks, up to 1 for a passage of the corpus (`motionmind.walks.passages`).
         place: start of that passage in the corpus; None for any.

@@ -31,8 +31,11 @@ class PieceReport(msgspec.Struct, frozen=True):
 
 
 class CourseReport(msgspec.Struct, frozen=True):
-    """The trajectories (see `Course`); `parting` in nats from one posture to the next, on average; `departed` is the
-    share of departing steps in the order without limits."""
+    """The trajectories (see `Course`).
+
+    `parting` is their mean divergence from one posture to the next, nats; `departed` is the share of steps that leave
+    the piece's order before limits apply.
+    """
 
     flow: str
     parameters: Mapping[str, float]
@@ -152,7 +155,7 @@ def report_of(
         piece: the piece.
         course: its trajectories, if any.
         control: its control, if any.
-        made: the order from these [L].
+        made: the order that the trajectories or the control give, before limits [L].
         order: the present order [L].
         seams: its seams.
         edits: number of its edits.
