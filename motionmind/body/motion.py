@@ -289,15 +289,40 @@ class Motion:
         Raises:
             MotionMindError: the rate is out of range, or gives too many frames (as for `at`).
         """
-        check_real("rate", rate)
-        if not 0.0 < rate <= MAX_FPS:
-            raise MotionMindError(
-                f"a rate must be a positive number of postures a second, {MAX_FPS:g} at most, not {rate}"
-            )
+        _check_rate(rate)
         span = self.times[-1] - self.times[0]
         steps = np.floor(span * rate + 1e-3)
         self._check_size(steps + 1.0)
         return self.at(self.times[0] + np.arange(steps + 1) / rate)
+
+    def stretch_to(self, rate: float) -> Motion:
+        """Return the motion at `rate` postures a second, stretched so that the last frame is the last posture.
+
+        It lasts the nearest whole number of steps, one at least: less than half a step more or less, unless it is
+        shorter than one. Insertions stretch with it. A single frame stays as it is.
+
+        Args:
+            rate: postures a second, at most FASTEST.
+
+        Raises:
+            MotionMindError: as for `resample`.
+
+        >>> import numpy as np
+        >>> from motionmind import Motion, human23
+        >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (2, 23, 1))
+        >>> Motion(human23(), at_rest, np.zeros((2, 3)), np.array([0.0, 2.7])).stretch_to(24.0).times[-1] * 24.0
+        65.0
+        """
+        if len(self) == 1:
+            return self
+        start, span = self.times[0], self.times[-1] - self.times[0]
+        _check_rate(rate)
+        steps = max(1.0, float(np.round(span * rate)))
+        self._check_size(steps + 1.0)
+        stretch = steps / (span * rate)
+        sampled = self.at(start + span * np.arange(steps + 1) / steps)
+        insertions = tuple(replace(one, times=start + stretch * (one.times - start)) for one in self.insertions)
+        return replace(sampled, times=start + np.arange(steps + 1) / rate, insertions=insertions)
 
     def _check_size(self, frames: float) -> None:
         """Check the size of a result of `frames` frames; always allow up to twice as many as this motion has."""
@@ -363,6 +388,12 @@ class Motion:
 
     def _about(self) -> dict[str, str]:
         return {"name": self.name, "skeleton": self.skeleton.name}
+
+
+def _check_rate(rate: float) -> None:
+    check_real("rate", rate)
+    if not 0.0 < rate <= MAX_FPS:
+        raise MotionMindError(f"a rate must be a positive number of postures a second, {MAX_FPS:g} at most, not {rate}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli import completion
+from motionmind.cli.delivery import Delivery, check_delivery, for_program, on_rig
 from motionmind.cli.files import (
     MOTION_SUFFIXES,
     check_outputs,
-    evened,
     note_licences,
     note_lossy_fields,
     question_recording,
@@ -93,13 +93,8 @@ def posture(
     metavar="UNIT",
     help="Unit of length of a .bvh OUT, as in --unit  [default: cm]",
 )
-@option(
-    "--for",
-    "program",
-    section=Section.OUTPUT,
-    type=click.Choice(["blender", "unreal", "maya"]),
-    help="Program that OUT suits without settings: unit, frames per second, root.",
-)
+@for_program("Program that OUT suits without settings: unit, frames per second, root.")
+@on_rig("File whose skeleton a .bvh OUT gets, or whose character a .glb OUT gets.")
 @option(
     "--form",
     section=Section.OUTPUT,
@@ -116,6 +111,7 @@ def convert(
     fps: float | None,
     out_unit: str | None,
     program: str | None,
+    rig: Path | None,
     form: Form,
     joints: Path | None,
     home: Path | None,
@@ -129,36 +125,38 @@ def convert(
     OUT is .bvh, .json, .glb (a skinned body, for Blender and others), .vrma (a VRM animation), .npz (SMPL's joints) or
     .txt, which holds orientations only, on human23 (human44 if IN is). A note lists the data that OUT cannot hold.
     """
-    from motionmind.formats import lossy_fields, write_motion
+    from motionmind.formats import lossy_fields
     from motionmind.formats.papers import write_papers
-    from motionmind.formats.programs import program_for, write_for
+    from motionmind.formats.rig_files import read_rig
     from motionmind.retarget.joint_mapping import is_human44
-    from motionmind.retarget.retarget import to_human23
+    from motionmind.retarget.retarget import own_skeleton, to_human23
 
     named = parse_movement(source, home)
-    check_outputs([(output, (".bvh", ".json", ".txt", ".glb", ".npz", ".vrma"))], named.source.paths)
+    read_from = [*named.source.paths, *([rig] if rig else [])]
+    check_outputs([(output, (".bvh", ".json", ".txt", ".glb", ".npz", ".vrma"))], read_from)
     suffix = output.suffix.lower()
     if out_unit and suffix != ".bvh":
         raise MotionMindError(f"--out-unit {out_unit}: only BVH needs a unit, and {output} is not BVH")
-    taker = program_for(program, output) if program else None
+    taker = check_delivery([output], program, rig)
+    on = read_rig(rig) if rig else None
     motion = read_part(named, None, home, raw=True, **options)
     upright = "y" if options["up"] else None  # the reader has turned it
     if named.source.kind == "file":
         question_recording(named.source.paths[0], motion, upright)
     if skeleton == "human23" or joints or (suffix == ".txt" and not is_human44(motion.skeleton)):
         motion = to_human23(motion, read_mapping(joints), up=upright)
-    fps = fps or (taker.rates[suffix] if taker else None)
+    if on and motion.skeleton.difference(on.armature.motion.skeleton) is not None:
+        motion = own_skeleton(motion, up=upright)
     if fps is not None:
         motion = motion.resample(fps)
-    motion = evened(output, motion)
-    if taker:
-        write_for(output, motion, taker, unit=out_unit)
-    elif suffix == ".txt":
+    source_file = next(iter(named.source.paths), None)
+    if suffix == ".txt":
         write_papers(output, motion, form=form)
+        note_licences(output, motion)
+        note_lossy_fields(output, lossy_fields(motion, output, source_file))
     else:
-        write_motion(output, motion, unit=out_unit or "cm")
-    note_licences(output, motion)
-    note_lossy_fields(output, lossy_fields(motion, output, source=next(iter(named.source.paths), None)))
+        rate = taker.fps if taker and fps is None else None
+        motion = Delivery(taker, on, rate, out_unit).write(output, motion, source_file)
     size, body = _written_body(suffix, motion)
     click.echo(f"{displayed_path(output)}: {count(len(motion), 'frame')}, {count(size, 'joint')} ({displayed(body)})")
     if taker:

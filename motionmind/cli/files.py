@@ -67,8 +67,14 @@ def question_recording(path: Path, motion: Motion, up: str | None = None) -> Non
         warnings.warn(f"{path}: {doubt}", MotionMindWarning, stacklevel=2)
 
 
-def write(path: Path, movement: Motion | Posture) -> None:
-    """Write a motion or a posture as movement or as a picture, by the suffix of `path`; note the data left out."""
+def write(path: Path, movement: Motion | Posture, source: Path | None = None) -> None:
+    """Write a motion or a posture as movement or as a picture, by the suffix of `path`; note the data left out.
+
+    Args:
+        path: the file.
+        movement: the motion or the posture.
+        source: the file that it comes from, if any, whose other content is left out too.
+    """
     from motionmind.body.motion import Posture
     from motionmind.formats import lossy_fields, write_motion, write_posture
     from motionmind.render.pictures import draw_picture
@@ -82,7 +88,7 @@ def write(path: Path, movement: Motion | Posture) -> None:
         write_posture(path, movement)
     else:
         write_motion(path, motion)
-    note_lossy_fields(path, lossy_fields(motion, path))
+    note_lossy_fields(path, lossy_fields(motion, path, source))
 
 
 def note_licences(path: Path, motion: Motion) -> None:
@@ -97,7 +103,7 @@ def evened(path: Path, motion: Motion) -> Motion:
     """Return a motion as its file can hold it: resampled, with a note, if the format needs evenly spaced frames."""
     if path.suffix.lower() not in EVEN_SUFFIXES or motion.is_even:
         return motion
-    even = motion.resample(_DEFAULT_FPS)
+    even = motion.stretch_to(_DEFAULT_FPS)
     note(
         f"{path}: this format needs evenly spaced frames: resampled {len(motion)} frames to {len(even)}, "
         f"{_DEFAULT_FPS:g} per second (--fps sets another rate)"

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli import completion
+from motionmind.cli.delivery import Delivery, check_delivery, find_rig, for_program, on_rig, takes_delivery
 from motionmind.cli.exits import ExitCode
-from motionmind.cli.files import MOTION_SUFFIXES, check_outputs, numbered, write
+from motionmind.cli.files import MOTION_SUFFIXES, check_outputs, numbered
 from motionmind.cli.options import HOME, OUTPUT_KINDS, Section, command, option, outputs, reading
 from motionmind.cli.printing import Interruption, note, print_alternatives, print_tween
 from motionmind.cli.search_options import request_options, searching, via_sources
@@ -46,6 +47,8 @@ if TYPE_CHECKING:
     help="Corpus to use, by name or folder  [default: the corpus of A and B, if they are its postures]",
 )
 @outputs(f"File to write: {OUTPUT_KINDS}.", required=False)
+@for_program("Program that .bvh and .glb files suit without settings: unit, frames per second, root.")
+@on_rig("File whose skeleton .bvh files get, or whose character .glb files get  [default: the file of A and B]")
 @option("--report", section=Section.OUTPUT, type=FILE, help="File of the report, as JSON; - prints it.")
 @option(
     "--details", section=Section.OUTPUT, is_flag=True, help="Print costs, states and distances from the corpus, too."
@@ -86,6 +89,8 @@ def tween(
     b: str,
     corpus: str | None,
     outputs: tuple[Path, ...],
+    program: str | None,
+    rig: Path | None,
     report: Path | None,
     details: bool,
     problem: Path | None,
@@ -124,9 +129,10 @@ def tween(
     named = parse_posture(a, home), parse_posture(b, home)
     around = tuple(parse_frames(word, home) if word else None for word in (before, after))
     files = _Files(outputs, report, problem, alternatives)
+    taker = check_delivery(outputs, program, rig)
     sources = [one.source for one in (*named, *around) if one]
     vias = via_sources(options, home)
-    files.check([path for source in (*sources, *vias) for path in source.paths])
+    files.check([path for source in (*sources, *vias) for path in source.paths] + ([rig] if rig else []))
     corpus = corpus or _corpus_of(named, home)
     locate(corpus, home)
     given = {"joints": joints, "unit": unit, "asf": asf, "source_fps": source_fps, "up": up}
@@ -137,10 +143,13 @@ def tween(
     with preparing():  # before a bundled corpus is learned
         start, request["before"] = read_end(named[0], around[0], "before", home, read)
         end, request["after"] = read_end(named[1], around[1], "after", home, read)
+        on = None
+        if any(map(takes_delivery, outputs)):
+            on = find_rig(rig, named, joints=joints, unit=unit, source_fps=source_fps, up=up)
         engine = Engine.load(corpus, home)
         with _diagnosing(files), Interruption() as interruption:
             results = _find_tweens(engine, (start, end), request, files.count, interruption)
-        written, reports = files.write(results)
+        written, reports = files.write(results, Delivery(taker, on, taker.fps if taker else None))
     if files.is_report_printed:
         printed = list(map(plain, reports))
         click.echo(json.dumps(printed[0] if alternatives is None else printed))
@@ -224,7 +233,7 @@ class _Files:
             outputs += [(problem, (".cfn",))] if problem else []
         check_outputs(outputs, sources)
 
-    def write(self, results: Sequence[Tween]) -> tuple[list[Path], list[TweenReport]]:
+    def write(self, results: Sequence[Tween], delivery: Delivery) -> tuple[list[Path], list[TweenReport]]:
         """Write all requested files, or none if one fails; return the files, and the reports if requested."""
         from motionmind.files import write_atomically
         from motionmind.tween.report import encode_report
@@ -237,7 +246,7 @@ class _Files:
                 motions, report, problem = self._files_of(number)
                 files += [*motions, *(path for path in (report, problem) if path)]
                 for path in motions:
-                    write(path, result.motion)
+                    delivery.write(path, result.motion)
                 if problem:
                     write_atomically(problem, result.problem().encode())
                 if self.report:

@@ -227,7 +227,7 @@ def write_motion(path: FilePath, motion: Motion, *, unit: str | float = "cm") ->
         from motionmind.formats.programs import note_settings
 
         write_bvh(path, motion, unit)
-        note_settings(path, motion, unit)
+        note_settings(path, motion, unit, " (or write it with --for blender)")
     elif suffix == ".txt":
         from motionmind.formats.papers import write_papers
 

@@ -84,11 +84,8 @@ def normalise(body: Placed) -> NormalisedRig:
 
     Position channels that the file adds to OFFSETs are resolved, and the joint that carries the body becomes the root.
     """
-    notes: list[str] = []
-    if _channels_add_to_offsets(body):
-        offsets = body.skeleton.offsets
-        body = replace(body, places={j: place + offsets[j] * (j > 0) for j, place in body.places.items()})
-        notes.append("position channels near 0 are added to OFFSETs, which are not")
+    body, is_resolved = resolve_places(body)
+    notes = ["position channels near 0 are added to OFFSETs, which are not"] if is_resolved else []
     span = bone_span(np.array(body.skeleton.parents), body.mean_offsets(), body.skeleton.tips)
     if top := _new_root(body, span):
         body = _fold(body, top, span, notes)
@@ -99,6 +96,14 @@ def normalise(body: Placed) -> NormalisedRig:
         if joint > 0 and body.stray(joint) > _STILL_SPAN_SHARE * span
     ]
     return NormalisedRig(replace(body.skeleton, offsets=offsets), body.rotations, body.place(0), notes, strays)
+
+
+def resolve_places(body: Placed) -> tuple[Placed, bool]:
+    """Add position channels to OFFSETs if the file means their sum; return the result, and whether it does."""
+    if not _channels_add_to_offsets(body):
+        return body, False
+    offsets = body.skeleton.offsets
+    return replace(body, places={j: place + offsets[j] * (j > 0) for j, place in body.places.items()}), True
 
 
 def _channels_add_to_offsets(body: Placed) -> bool:

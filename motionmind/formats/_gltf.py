@@ -206,7 +206,7 @@ class Gltf:
         if compressed:
             raise self.fault(f"{what}: compressed ({compressed[0]}), which cannot be read: export without that")
         dtype = np.dtype(COMPONENT_DTYPES[accessor.component_type])
-        width, data = N_COMPONENTS[kind], self._buffer(view.buffer, what)
+        width, data = N_COMPONENTS[kind], self.buffer(view.buffer, what)
         size = width * dtype.itemsize
         stride = view.byte_stride or size
         length = stride * (accessor.count - 1) + size
@@ -228,25 +228,25 @@ class Gltf:
             raise self.fault(f"{what} {index} does not exist: the file has {len(rows)}")
         return rows[index]
 
-    def _buffer(self, index: int, what: str) -> bytes:
+    def buffer(self, index: int, what: str = "file") -> bytes:
         """Return a buffer's bytes; read another file on first use."""
         if index not in self._buffers:
             uri = self.member(self.document.buffers, index, f"{what}: buffer").uri
-            self._buffers[index] = self.binary if uri is None and index == 0 else self._fetch(uri or "")
+            self._buffers[index] = self.binary if uri is None and index == 0 else self.fetch(uri or "")
         return self._buffers[index]
 
-    def _fetch(self, uri: str) -> bytes:
+    def fetch(self, uri: str) -> bytes:
         """Return the bytes of a data URI, or of a file in this one's folder or below (3.6.1.1)."""
         if uri.startswith("data:"):
             kind, _, text = uri.partition(",")
             try:
                 return base64.b64decode(text, validate=True) if kind.endswith(";base64") else unquote(text).encode()
             except (binascii.Error, ValueError):
-                raise self.fault("a buffer's data URI is not base64") from None
+                raise self.fault("a data URI is not base64") from None
         name = unquote(uri)
         beside = Path(name)
         if not name or "\0" in name or ":" in name or "\\" in name or beside.is_absolute() or ".." in beside.parts:
-            raise self.fault(f"a buffer is at {quoted(uri)}: buffers must be in this file's folder or below")
+            raise self.fault(f"data is at {quoted(uri)}: it must be in this file's folder or below")
         return read_bytes(Path(self.path).parent / beside)
 
 
@@ -256,12 +256,17 @@ def read_container(path: FilePath) -> Gltf:
     Raises:
         FormatError: the file cannot be read, or is not glTF 2.
     """
-    data = read_bytes(path)
-    text, binary = _chunks(data, path) if data.startswith(b"glTF") else (data, b"")
+    text, binary = read_chunks(path)
     document = _json.decode(text, Document, path)
     if document.asset.version.split(".")[0] != "2":
         raise FormatError(f"glTF of version {quoted(document.asset.version)}; only version 2 can be read", path=path)
     return Gltf(path, document, binary)
+
+
+def read_chunks(path: FilePath) -> tuple[bytes, bytes]:
+    """Read the JSON and the binary chunk of a glTF file; FormatError if it cannot be read."""
+    data = read_bytes(path)
+    return _chunks(data, path) if data.startswith(b"glTF") else (data, b"")
 
 
 def _chunks(data: bytes, path: FilePath) -> tuple[bytes, bytes]:

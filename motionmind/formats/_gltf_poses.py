@@ -182,7 +182,7 @@ def _unbound_rest(
             f"{gltf.path}: neither a skin nor the nodes show the rest pose: joints are aligned by the movement, head "
             "and feet roughly (export it with a mesh)"
         )
-        warnings.warn(message, MotionMindWarning, 6)
+        warnings.warn(message, MotionMindWarning, 7)
     return np.tile(unturned, (len(joints), 1)), straight
 
 

@@ -8,27 +8,25 @@ Source: M. Meredith and S. Maddock, "Motion capture file formats explained", Uni
 from __future__ import annotations
 
 import logging
-import re
 import warnings
 from collections.abc import Iterator
 
 import numpy as np
 
-from motionmind._typing import Floats
+from motionmind._typing import Bools, Floats
 from motionmind.body.motion import Motion
-from motionmind.body.rates import MAX_FPS, check_size
+from motionmind.body.rates import MAX_FPS
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, quoted
+from motionmind.errors import MotionMindError, MotionMindWarning, quoted
 from motionmind.files import FilePath, name_of, write_atomically
-from motionmind.formats._bvh_hierarchy import BvhJoint, is_comment, read_hierarchy
-from motionmind.formats._bvh_rig import NormalisedRig, Placed, normalise
+from motionmind.formats._bvh_file import assemble, read_file
+from motionmind.formats._bvh_hierarchy import is_comment
+from motionmind.formats._bvh_rig import NormalisedRig, normalise
 from motionmind.formats._clock import even_step
-from motionmind.formats.text import MAX_NUMBER, read_lines, to_number, to_numbers
+from motionmind.formats.text import read_lines
 from motionmind.formats.units import guess_unit, metres_per_unit
 from motionmind.geometry import rotations as rot
 
-_FRAMES = re.compile(r"\s*Frames\s*:?\s*(\S*)\s*", re.IGNORECASE)
-_FRAME_TIME = re.compile(r"\s*Frame\s*Time\s*:?\s*(\S*)\s*", re.IGNORECASE)
 _MIN_MOVING_COUNT = 12  # this many frames, and joints, should show some movement
 
 _log = logging.getLogger(__name__)
@@ -107,120 +105,12 @@ def bvh_unit(path: FilePath) -> tuple[str, float]:
 
 def _read_body(path: FilePath) -> tuple[NormalisedRig, float]:
     """Read the file in its own unit, and its seconds per frame."""
-    lines = read_lines(path)
-    start = next((i for i, line in enumerate(lines) if line.strip().upper() == "MOTION"), None)
-    joints = read_hierarchy(lines[:start], path)
-    if start is None:
-        raise FormatError("no line MOTION: the file ends before its frames", path=path, line=len(lines))
-    channels = sum(len(joint.channels) for joint in joints)
-    if channels == 0:
-        raise FormatError("no joint has CHANNELS: nothing can move", path=path, line=start + 1)
-    declared, frame_time, first = _read_motion_header(lines, start + 1, path)
-    values = _read_frames(lines, first, channels, declared, path)
-    check_size(len(values), max(len(joints) - channels, 1), str(path))  # the file holds the rest
-    body = normalise(_assemble(joints, values, name_of(path)))
-    if declared != len(values):
-        body.notes.append(
-            f"the header says {declared} frames, the file holds {len(values)}; all {len(values)} are read"
-        )
-    return body, frame_time
-
-
-# --- the frames ----------------------------------------------------------------------------------------------------
-
-
-def _read_motion_header(lines: list[str], start: int, path: FilePath) -> tuple[int, float, int]:
-    """Return the header's frame count, its seconds per frame, and the index of the next line."""
-    declared: int | None = None
-    frame_time: float | None = None
-    for index in range(start, len(lines)):
-        line = lines[index]
-        if not line.strip() or is_comment(line):
-            continue
-        if match := _FRAME_TIME.fullmatch(line):
-            frame_time = to_number(match[1], path, index + 1)
-            if frame_time < 1e-9:
-                raise FormatError(
-                    f"Frame Time is {match[1]}; it must be the seconds per frame, more than 0",
-                    path=path,
-                    line=index + 1,
-                )
-        elif match := _FRAMES.fullmatch(line):
-            if not re.fullmatch(r"[0-9]{1,18}", match[1]):
-                raise FormatError(
-                    f"{quoted(match[1])} where the number of frames was expected", path=path, line=index + 1
-                )
-            declared = int(match[1])
-        else:
-            break
-        if declared is not None and frame_time is not None:
-            return declared, frame_time, index + 1
-    missing = "Frame Time" if declared is not None else "Frames"
-    raise FormatError(f"no line '{missing}: ...' between MOTION and the frames", path=path, line=start)
-
-
-def _read_frames(lines: list[str], first: int, channels: int, declared: int, path: FilePath) -> Floats:
-    """Read channel values [T, C], one frame per line; frames may wrap over lines if their total count is right."""
-    rows = [(n, line) for n, line in enumerate(lines[first:], start=first + 1) if line.strip() and not is_comment(line)]
-    if not rows:
-        raise FormatError("no frames after the header", path=path, line=len(lines))
-    if len(rows) * channels >= 10_000:
-        from motionmind.formats._numbers import read_plain  # numba is slow to import
-
-        plain = read_plain([line for _, line in rows], channels)
-        if plain is not None and np.all(np.abs(plain) <= MAX_NUMBER):
-            return plain
-    try:
-        frames = np.loadtxt([line for _, line in rows], dtype=np.float64, comments=None, ndmin=2)
-    except ValueError:  # a word that is not a number, or lines of different lengths
-        return _read_irregular_frames(rows, channels, declared, path)
-    if frames.shape[1] != channels or not np.all(np.abs(frames) <= MAX_NUMBER):  # false for NaN too
-        return _read_irregular_frames(rows, channels, declared, path)
-    return frames
-
-
-def _read_irregular_frames(rows: list[tuple[int, str]], channels: int, declared: int, path: FilePath) -> Floats:
-    """Read frames word by word, to name the first fault or accept frames that wrap over lines."""
-    values = [to_numbers(line.split(), path, number) for number, line in rows]
-    flat = np.array([value for row in values for value in row])
-    irregular = next((i for i, row in enumerate(values) if len(row) != channels), None)
-    if irregular is None or len(flat) == declared * channels:
-        return flat.reshape(-1, channels)
-    fault = f"the line holds {len(values[irregular])} numbers, a frame of this file has {channels}"
-    raise FormatError(fault, path=path, line=rows[irregular][0])
-
-
-def _assemble(joints: list[BvhJoint], values: Floats, name: str) -> Placed:
-    """Turn the channels' values [T, C] into the joints' rotations and places."""
-    frames = len(values)
-    rotations = np.tile(rot.IDENTITY, (frames, len(joints), 1))
-    places: dict[int, Floats] = {}
-    groups: dict[str, list[tuple[int, list[int]]]] = {}  # by rotation order: joints, converted all at once
-    column = 0
-    for index, joint in enumerate(joints):
-        columns = list(enumerate(joint.channels, start=column))
-        column += len(joint.channels)
-        turns = [(channel[0], at) for at, channel in columns if channel.endswith("ROTATION")]
-        moves = [("XYZ".index(channel[0]), at) for at, channel in columns if channel.endswith("POSITION")]
-        if turns:
-            order = "".join(letter for letter, _ in turns)
-            groups.setdefault(order, []).append((index, [at for _, at in turns]))
-        if moves:
-            place = np.tile(np.array(joint.offset, dtype=np.float64), (frames, 1))
-            for axis, at in moves:
-                place[:, axis] = values[:, at]
-            places[index] = place
-    for order, members in groups.items():
-        angles = np.radians(values[:, [columns for _, columns in members]])
-        rotations[:, [index for index, _ in members]] = rot.from_euler(order, angles)
-    skeleton = Skeleton(
-        name,
-        tuple(joint.name for joint in joints),
-        tuple(joint.parent for joint in joints),
-        np.array([joint.offset for joint in joints], dtype=np.float64),
-        np.array([joint.tip or [0.0, 0.0, 0.0] for joint in joints], dtype=np.float64),
-    )
-    return Placed(skeleton, rotations, places)
+    file = read_file(path)
+    body = normalise(assemble(file.joints, file.values, name_of(path)))
+    frames = len(file.values)
+    if file.declared != frames:
+        body.notes.append(f"the header says {file.declared} frames, the file holds {frames}; all {frames} are read")
+    return body, file.frame_time
 
 
 # --- writing -------------------------------------------------------------------------------------------------------
@@ -249,22 +139,40 @@ def write_bvh(path: FilePath, motion: Motion, unit: str | float = "cm") -> None:
     scale = 1.0 / metres_per_unit(unit)
     skeleton = motion.skeleton
     _check_names(skeleton)
-    step = even_step(motion, "BVH")
     order = _depth_first(skeleton)
-    # Lengths to 1e-8 m: rounding errors add up along a chain of bones.
-    digits = max(0, int(np.ceil(8.0 - np.log10(scale))))
-    lines = ["HIERARCHY", *_hierarchy_lines(skeleton, order, scale, digits), "MOTION"]
-    lines += [f"Frames: {len(motion)}", f"Frame Time: {step:.12g}"]
     # ZXY is the commonest order (MotionBuilder's, Bandai-Namco's). Euler angles lock where the middle rotation is 90
     # degrees; about x that is rarer in arms, which a T-pose stretches along x.
     degrees = np.degrees(np.unwrap(rot.to_euler("ZXY", motion.rotations[:, order]), axis=0))
-    # Adding 0 turns -0, printed with its sign, into 0.
-    root = np.round(motion.root * scale, digits) + 0.0
-    values = np.concatenate([root, np.round(degrees, 6).reshape(len(motion), -1) + 0.0], axis=1)
-    row = " ".join([f"%.{digits}f"] * 3 + ["%.6f"] * (3 * len(skeleton)))
-    ends = [_INSERTED_LINE_END if inserted else "" for inserted in motion.inserted()]
-    lines += [row % tuple(frame.tolist()) + end for frame, end in zip(values, ends, strict=True)]
+    values = np.concatenate([motion.root * scale, degrees.reshape(len(motion), -1)], axis=1)
+    is_angle = np.arange(values.shape[1]) >= 3
+    lines = ["HIERARCHY", *_hierarchy_lines(skeleton, order, scale), "MOTION"]
+    lines += frame_lines(motion, values, is_angle, scale)
     write_atomically(path, ("\n".join(lines) + "\n").encode())
+
+
+def frame_lines(motion: Motion, values: Floats, is_angle: Bools, scale: float) -> Iterator[str]:
+    """Yield the lines below MOTION.
+
+    Args:
+        motion: the movement, evenly spaced in time.
+        values: of all channels, in degrees and units [T, C].
+        is_angle: whether each channel is an angle [C].
+        scale: units per metre.
+    """
+    step = even_step(motion, "BVH")
+    yield f"Frames: {len(motion)}"
+    yield f"Frame Time: {step:.12g}"
+    digits = _digits(scale)
+    # Adding 0 turns -0, printed with its sign, into 0.
+    rounded = np.where(is_angle, np.round(values, 6), np.round(values, digits)) + 0.0
+    row = " ".join("%.6f" if angle else f"%.{digits}f" for angle in is_angle)
+    for frame, inserted in zip(rounded, motion.inserted(), strict=True):
+        yield row % tuple(frame.tolist()) + (_INSERTED_LINE_END if inserted else "")
+
+
+def _digits(scale: float) -> int:
+    """Return the decimals of lengths: to 1e-8 m, because rounding errors add up along a chain of bones."""
+    return max(0, int(np.ceil(8.0 - np.log10(scale))))
 
 
 def has_inserted_frames(path: FilePath) -> bool:
@@ -297,8 +205,9 @@ def _depth_first(skeleton: Skeleton) -> list[int]:
     return order
 
 
-def _hierarchy_lines(skeleton: Skeleton, order: list[int], scale: float, digits: int) -> Iterator[str]:
-    """Yield the lines below HIERARCHY, with `digits` decimals and `scale` units per metre."""
+def _hierarchy_lines(skeleton: Skeleton, order: list[int], scale: float) -> Iterator[str]:
+    """Yield the lines below HIERARCHY, with `scale` units per metre."""
+    digits = _digits(scale)
 
     def offset(vector: Floats) -> str:
         return "OFFSET " + " ".join(f"{value:.{digits}f}" for value in np.round(vector * scale, digits) + 0.0)

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Sequence
 from typing import Any
 
 import msgspec
@@ -87,7 +88,7 @@ def write_glb(path: FilePath, motion: Motion, *, has_root: bool = False) -> None
     }
     if moving:
         document["animations"] = [animation_of(buffer, motion, name)]
-    document["nodes"][0]["extras"] = {MARKS_KEY: _marks(path, motion)}
+    document["nodes"][0]["extras"] = {MARKS_KEY: encode_marks(path, motion)}
     if has_root:
         document["scenes"][0]["nodes"] = [len(skeleton) + 1, len(skeleton)]
         document["nodes"].append({"name": "root", "children": [0]})
@@ -102,7 +103,7 @@ def write_glb(path: FilePath, motion: Motion, *, has_root: bool = False) -> None
     write_atomically(path, container(document, bytes(buffer.data), name))
 
 
-def _marks(path: FilePath, motion: Motion) -> str:
+def encode_marks(path: FilePath, motion: Motion) -> str:
     """Return JSON of MarksSchema: all that glTF cannot hold, with times from the first frame on; "{}" if nothing."""
     # A file's movement takes the file's name, but credits of given movement its own.
     recorded = motion.own_credits if motion.name and motion.name != name_of(path) else motion.recorded
@@ -115,10 +116,10 @@ def _marks(path: FilePath, motion: Motion) -> str:
 class GlbBuffer:
     """The binary chunk under construction, with the views and accessors that describe it (3.6)."""
 
-    def __init__(self) -> None:
-        self.data = bytearray()
-        self.views: list[dict[str, Any]] = []
-        self.accessors: list[dict[str, Any]] = []
+    def __init__(self, data: bytes = b"", views: Sequence[Any] = (), accessors: Sequence[Any] = ()) -> None:
+        self.data = bytearray(data + b"\0" * (-len(data) % 4))
+        self.views: list[dict[str, Any]] = [*views]
+        self.accessors: list[dict[str, Any]] = [*accessors]
 
     def add(self, array: NDArray[Any], *, target: int | None = None, bounds: bool = False) -> int:
         """Append an array [n] or [n, components] with a view of its own; return its accessor's index."""
@@ -248,6 +249,23 @@ def _material(paint: str) -> dict[str, Any]:
 
 def animation_of(buffer: GlbBuffer, motion: Motion, name: str) -> dict[str, Any]:
     """Return an animation: a sampler and a channel for each joint's rotations, and for the root's places (3.11)."""
+    clock = add_clock(buffer, motion, name)
+    outputs = [(0, "translation", buffer.add(motion.root.astype("<f4")))]
+    rotations = continuous(motion.rotations).swapaxes(0, 1).astype("<f4")  # [J, T, 4]
+    view = buffer.view(rotations)
+    outputs += [
+        (joint, "rotation", buffer.accessor(view, turns, offset=joint * turns.nbytes))
+        for joint, turns in enumerate(rotations)
+    ]
+    return animation(name, clock, outputs)
+
+
+def add_clock(buffer: GlbBuffer, motion: Motion, name: str) -> int:
+    """Append a motion's times, from 0 on; return the accessor's index.
+
+    Raises:
+        MotionMindError: two of them are equal in single precision.
+    """
     times = (motion.times - motion.times[0]).astype("<f4")
     late = np.flatnonzero(np.diff(times) <= 0.0)
     if len(late):
@@ -257,23 +275,22 @@ def animation_of(buffer: GlbBuffer, motion: Motion, name: str) -> dict[str, Any]
             f"{name}: frame {frame} is {gap:.3g} s after the one before it, at {times[frame]:.6g} s: too close for GLB "
             "(resample the motion, or cut it)"
         )
-    clock = buffer.add(times, bounds=True)
-    outputs = [buffer.add(motion.root.astype("<f4"))]
-    rotations = _continuous(motion.rotations).swapaxes(0, 1).astype("<f4")  # [J, T, 4]
-    view = buffer.view(rotations)
-    outputs += [buffer.accessor(view, turns, offset=joint * turns.nbytes) for joint, turns in enumerate(rotations)]
-    targets = [(0, "translation"), *((joint, "rotation") for joint in range(len(motion.skeleton)))]
+    return buffer.add(times, bounds=True)
+
+
+def animation(name: str, clock: int, outputs: Sequence[tuple[int, str, int]]) -> dict[str, Any]:
+    """Return an animation from the accessor of its times, and for each channel the node, the path and the accessor."""
     return {
         "name": name,
-        "samplers": [{"input": clock, "interpolation": "LINEAR", "output": output} for output in outputs],
+        "samplers": [{"input": clock, "interpolation": "LINEAR", "output": output} for _, _, output in outputs],
         "channels": [
-            {"sampler": sampler, "target": {"node": node, "path": moved}}
-            for sampler, (node, moved) in enumerate(targets)
+            {"sampler": sampler, "target": {"node": node, "path": path}}
+            for sampler, (node, path, _) in enumerate(outputs)
         ],
     }
 
 
-def _continuous(rotations: Floats) -> Floats:
+def continuous(rotations: Floats) -> Floats:
     """Return the same rotations [T, J, 4], each quaternion in the hemisphere of the one before."""
     flips = np.sum(rotations[1:] * rotations[:-1], axis=-1, keepdims=True) < 0.0
     signs = np.cumprod(np.where(flips, -1.0, 1.0), axis=0)

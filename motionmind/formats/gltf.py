@@ -12,7 +12,7 @@ the movement, the pose of zero rotations.
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
@@ -76,8 +76,37 @@ def read_gltf(path: FilePath, *, unit: str | float | None = None) -> Motion:
         raise error if isinstance(error, FormatError) else gltf.fault(f"not movement: {error}") from error
 
 
-def _read(gltf: Gltf, scale: float) -> Motion:
-    """Read the motion; lengths are in units of `scale` metres."""
+@dataclass(frozen=True)
+class GltfBody:
+    """The body in a glTF file, and what moves it.
+
+    Attributes:
+        gltf: the file.
+        parents: index of each node's parent, -1 for none.
+        joints: the body's nodes [J], each after its parent.
+        names: their names, no two alike.
+        skin: name of the skin, "" for none.
+        tracks: of the nodes that move the body.
+        others: names of animations that are not read.
+        times: of the frames [T], seconds.
+        rest_turns: orientations of the joints at rest, without the heading of the nodes above [J, 4].
+        rest: their places at rest [J, 3].
+    """
+
+    gltf: Gltf
+    parents: list[int]
+    joints: list[int]
+    names: tuple[str, ...]
+    skin: str
+    tracks: Tracks
+    others: list[str]
+    times: Floats
+    rest_turns: Floats
+    rest: Floats
+
+
+def find_body(gltf: Gltf) -> GltfBody:
+    """Find the body in a file; FormatError if there is none."""
     parents = _parents(gltf)
     names, skins = _bone_names(gltf), _skins(gltf)
     is_person = bool(names)
@@ -92,30 +121,37 @@ def _read(gltf: Gltf, scale: float) -> Motion:
     rest_turns, rest = rest_pose(gltf, parents, joints, None if is_person else called)
     heading = heading_of(gltf, parents, joints[0])
     rest_turns, rest = rot.inv_mul(heading, rest_turns), rot.mul_vec(rot.inv(heading), rest)
-    turns, places = globals_at(gltf, parents, joints, tracks, times)
-    for what, array in (("rest pose", rest), ("movement", places)):
+    return GltfBody(gltf, parents, joints, called, skin_name, tracks, others, times, rest_turns, rest)
+
+
+def _read(gltf: Gltf, scale: float) -> Motion:
+    """Read the motion; lengths are in units of `scale` metres."""
+    body = find_body(gltf)
+    joints, times = body.joints, body.times
+    turns, places = globals_at(gltf, body.parents, joints, body.tracks, times)
+    for what, array in (("rest pose", body.rest), ("movement", places)):
         if not np.all(np.abs(array) <= MAX_NUMBER):
             raise gltf.fault(f"its {what} reaches beyond {MAX_NUMBER:g} m")
-    if others:
+    if body.others:
         warnings.warn(
-            f"{gltf.path}: the first animation that moves is read, not {enumerated(others)}", MotionMindWarning, 5
+            f"{gltf.path}: the first animation that moves is read, not {enumerated(body.others)}", MotionMindWarning, 5
         )
-    above = [joints.index(parents[node]) if i else -1 for i, node in enumerate(joints)]
-    skeleton = skeleton_at(skin_name or name_of(gltf.path), called, above, rest)
-    turned = rot.mul_inv(turns, rest_turns)
+    above = [joints.index(body.parents[node]) if i else -1 for i, node in enumerate(joints)]
+    skeleton = skeleton_at(body.skin or name_of(gltf.path), body.names, above, body.rest)
+    turned = rot.mul_inv(turns, body.rest_turns)
     rig = _placed(skeleton, turned, places)
     for message in rig.repairs(scale):
         warnings.warn(f"{gltf.path}: {message}", MotionMindWarning, 5)
     marks = _marks(gltf)
-    body = _with_tips(rig.skeleton, marks, scale)
+    tipped = _with_tips(rig.skeleton, marks, scale)
     return Motion(
-        body,
+        tipped,
         rot.normalise(rig.rotations),
         rig.root * scale,
         times - times[0],
         name=name_of(gltf.path),
         insertions=tuple(
-            one.renamed({name: name for name in body.names}) for one in map(_json.to_insertion, marks.insertions)
+            one.renamed({name: name for name in tipped.names}) for one in map(_json.to_insertion, marks.insertions)
         ),
         keyframed=marks.keyframed,
         recorded=tuple(marks.recorded),
@@ -166,7 +202,7 @@ def _find_joints(
         name, wanted = skins[0]
         if left := [skin or "a skin without a name" for skin, _ in skins[1:]]:
             message = f"{gltf.path}: {name or 'the largest skin'} is read, not {enumerated(left)}"
-            warnings.warn(message, MotionMindWarning, 6)
+            warnings.warn(message, MotionMindWarning, 7)
     wanted = wanted or moving
     if not wanted:
         raise gltf.fault("nothing moves: there is no skin, no person's bone and no animation of nodes")

@@ -26,46 +26,43 @@ class Program:
 
     Attributes:
         title: its name.
-        rates: {suffix that it reads: frames a second that it expects}; None takes the file's rate.
+        fps: frames a second of its new scenes.
+        advice: {suffix that it reads: how to open the file}.
         other: {suffix that it does not read: remedy}.
         unit: the unit of BVH's lengths that needs no scaling.
         has_root: whether bodies have an extra bone on the floor at the origin, above the moving root.
-        advice: {suffix: how to open the file}.
     """
 
     title: str
-    rates: Mapping[str, float | None]
-    other: Mapping[str, str]
+    fps: float
+    advice: Mapping[str, str]
+    other: Mapping[str, str] = field(default_factory=dict)
     unit: str = "m"
     has_root: bool = False
-    advice: Mapping[str, str] = field(default_factory=dict)
 
-
-_SCENE_FPS = 24.0  # of a new scene in Blender, and in Maya
 
 PROGRAMS = {
     "blender": Program(
         "Blender",
-        {".bvh": _SCENE_FPS, ".glb": None},
-        {},
-        advice={
+        24.0,
+        {
             ".bvh": "File, Import, Motion Capture (.bvh)",
             ".glb": "File, Import, glTF 2.0",
         },
     ),
     "unreal": Program(
         "Unreal Engine",
-        {".glb": 30.0},
+        30.0,
+        {".glb": "Import to the Content Browser, as a skeletal mesh with its animation"},
         {".bvh": "it reads no BVH: write .glb"},
         has_root=True,
-        advice={".glb": "Import to the Content Browser, as a skeletal mesh with its animation"},
     ),
     "maya": Program(
         "Maya",
-        {".bvh": _SCENE_FPS},
+        24.0,
+        {".bvh": "open it in MotionBuilder (File, Motion File Import), or by a script: Maya alone reads no BVH"},
         {".glb": "it reads no glTF: write .bvh for MotionBuilder, or open the .glb in Blender and export FBX"},
         unit="cm",
-        advice={".bvh": "open it in MotionBuilder (File, Motion File Import), or by a script: Maya alone reads no BVH"},
     ),
 }
 
@@ -77,8 +74,8 @@ def program_for(name: str, path: FilePath) -> Program:
         MotionMindError: it does not; the message names the right format.
     """
     program, suffix = PROGRAMS[name], Path(path).suffix.lower()
-    if suffix not in program.rates:
-        what = program.other.get(suffix, f"it reads {' and '.join(program.rates)}")
+    if suffix not in program.advice:
+        what = program.other.get(suffix, f"it reads {' and '.join(program.advice)}")
         raise MotionMindError(f"{path}: not for {program.title}: {what}")
     return program
 
@@ -101,7 +98,7 @@ def write_for(path: FilePath, motion: Motion, program: Program, *, unit: str | N
         write_glb(path, motion, has_root=program.has_root)
 
 
-def note_settings(path: FilePath, motion: Motion, unit: str | float) -> None:
+def note_settings(path: FilePath, motion: Motion, unit: str | float, remedy: str = "") -> None:
     """Log the settings that Blender's import of BVH needs, if any.
 
     The logger is "motionmind.formats.programs", the level INFO.
@@ -110,10 +107,11 @@ def note_settings(path: FilePath, motion: Motion, unit: str | float) -> None:
         path: the written file.
         motion: the movement in it.
         unit: the unit of its lengths.
+        remedy: another way, to append.
     """
     scale = metres_per_unit(unit)
     settings = [f"set Scale to {scale:.5g}"] if abs(scale - 1.0) > 1e-6 else []
-    if len(motion) > 1 and abs(motion.fps / _SCENE_FPS - 1.0) > 1e-6:
+    if len(motion) > 1 and abs(motion.fps / PROGRAMS["blender"].fps - 1.0) > 1e-6:
         settings.append("tick Update Scene FPS")
     if settings:
-        _log.info("%s: in Blender's import, %s (or write it by convert --for blender)", path, " and ".join(settings))
+        _log.info("%s: in Blender's import, %s%s", path, " and ".join(settings), remedy)

@@ -83,23 +83,15 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
         joints is None
         and up != "z"
         and human23().difference(movement.skeleton) is None
-        and not _rests_along_z(movement.skeleton)
+        and not rests_along_z(movement.skeleton)
     ):
         return movement
-    fit = fit_human23(movement, joints)
-    if fit.unclear:
-        warnings.warn(_describe_unclear(movement.skeleton.name, fit.unclear), MotionMindWarning, stacklevel=2)
+    fit, upright = fit_upright(movement, joints, up)
     renamed: dict[str, Any] = {}
     if isinstance(movement, Motion) and movement.insertions:
         mapping = joint_mapping(movement.skeleton, joints) or {}
         renamed["insertions"] = tuple(one.renamed(mapping) for one in movement.insertions)
     turned = movement.skeleton.global_rotations(movement.rotations)[..., fit.rotation_sources, :]
-    vertical = Vertical(up) if up else _vertical(fit, movement, turned[..., 0, :])
-    if vertical.doubt:
-        name = (movement.name if isinstance(movement, Motion) else "") or movement.skeleton.name
-        message = f"{name}: taken with {vertical.axis} up, which is doubtful: {vertical.doubt}"
-        warnings.warn(message, MotionMindWarning, stacklevel=2)
-    upright = Z_UP_TO_Y_UP if vertical.axis == "z" else rot.IDENTITY
     turned = rot.mul(rot.mul(upright, turned), fit.alignment)
     root = movement.root
     if fit.pelvis > 0 or fit.chest:
@@ -112,42 +104,21 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
     return replace(movement, skeleton=fit.skeleton, rotations=rotations, root=root, **renamed)
 
 
-def from_human23(motion: Motion, like: Posture, joints: Mapping[str, str] | None = None) -> Motion:
-    """Bring a motion of human23 onto the joints of a posture: the inverse of `to_human23`, with y up.
+def fit_upright(movement: Movement, joints: Mapping[str, str] | None, up: str | None) -> tuple[Fit, Floats]:
+    """Fit human23 to a file's skeleton, and find the rotation [4] from the file's world to one with y up.
 
-    Args:
-        motion: the motion, on human23.
-        like: a posture on the rig to move. Joints without a counterpart keep its rotations; several joints in a row
-            that map to one joint turn as one.
-        joints: {rig's joint: human23's joint} as for `joint_mapping`; None recognises the rig by its names.
-
-    Returns:
-        The motion on the rig's skeleton, with human23's rotations and pelvis.
-
-    Raises:
-        SkeletonError: the rig does not map to human23, or its zero pose does not show how the body stands.
+    Arguments, errors and warnings as of `to_human23`.
     """
-    rig = like.skeleton
-    fit = fit_human23(like, joints)
-    sources = fit.rotation_sources
-    target = {joint: i for i, joint in reversed([*enumerate(sources.tolist())])}  # parents win
-    turned = rot.mul_inv(motion.skeleton.global_rotations(motion.rotations), fit.alignment)
-    at_first = rig.global_rotations(like.rotations)
-    orientations = np.empty((len(motion), len(rig), 4))
-    body, mapping = human23(), joint_mapping(rig, joints) or {}
-    last_of_row = {rig.index(name): int(sources[body.index(joint)]) for name, joint in mapping.items()}
-    for joint, parent in enumerate(rig.parents):
-        if joint in target:
-            orientations[:, joint] = turned[:, target[joint]]
-        elif joint in last_of_row:
-            within = rot.inv_mul(at_first[last_of_row[joint]], at_first[joint])
-            orientations[:, joint] = rot.mul(turned[:, target[last_of_row[joint]]], within)
-        else:
-            own = like.rotations[joint]
-            orientations[:, joint] = own if parent < 0 else rot.mul(orientations[:, parent], own)
-    rotations = rot.normalise(rig.local_rotations(orientations))
-    root = motion.root - rig.positions(rotations, np.zeros(3))[:, fit.pelvis]
-    return replace(motion, skeleton=rig, rotations=rotations, root=root, insertions=())
+    fit = fit_human23(movement, joints)
+    if fit.unclear:
+        warnings.warn(_describe_unclear(movement.skeleton.name, fit.unclear), MotionMindWarning, stacklevel=3)
+    turned = movement.skeleton.global_rotations(movement.rotations)[..., fit.rotation_sources[0], :]
+    vertical = Vertical(up) if up else _vertical(fit, movement, turned)
+    if vertical.doubt:
+        name = (movement.name if isinstance(movement, Motion) else "") or movement.skeleton.name
+        message = f"{name}: taken with {vertical.axis} up, which is doubtful: {vertical.doubt}"
+        warnings.warn(message, MotionMindWarning, stacklevel=3)
+    return fit, Z_UP_TO_Y_UP if vertical.axis == "z" else rot.IDENTITY
 
 
 def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None, *, up: str | None = None) -> Movement:
@@ -175,7 +146,7 @@ def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None, *,
     check_type("movement", movement, Motion, Posture)
     check_mapping("joints", joints, or_none=True)
     if joints is None and is_human44(movement.skeleton):
-        return _rest_along_y(movement, up) if _rests_along_z(movement.skeleton) else movement
+        return _rest_along_y(movement, up) if rests_along_z(movement.skeleton) else movement
     known = joint_mapping(movement.skeleton) is not None
     return to_human23(movement, joints, up=up) if known or joints is not None else movement
 
@@ -227,7 +198,7 @@ def _vertical(fit: Fit, movement: Motion | Posture, turned: Floats) -> Vertical:
     return find_vertical(points, trunk, usual=usual, height=fit.skeleton.height)
 
 
-def _rests_along_z(skeleton: Skeleton) -> bool:
+def rests_along_z(skeleton: Skeleton) -> bool:
     """Return whether the zero pose of human23's or human44's joints stands along z, as in Blender's files."""
     zero = skeleton.rest[: len(skeleton)]
     names = plain_names(skeleton.names)

@@ -12,8 +12,9 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Corpus
 from motionmind.errors import SkeletonError
+from motionmind.retarget.armature import from_human23
 from motionmind.retarget.joint_mapping import joint_mapping
-from motionmind.retarget.retarget import from_human23, to_human23
+from motionmind.retarget.retarget import to_human23
 
 _MAX_COMPARED = 4000  # postures of a corpus to find the nearest among
 

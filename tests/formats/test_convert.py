@@ -154,7 +154,7 @@ def test_settings_of_blenders_import(unit: str, rate: int, said: str, convert: R
     write_motion("in.json", moving(human23()))
     ran = convert("in.json", "a.bvh", "--out-unit", unit, "--fps", rate)
     assert ran.err == (
-        f"note: a.bvh: in Blender's import, {said} (or write it by convert --for blender)\n" if said else ""
+        f"note: a.bvh: in Blender's import, {said} (or write it with --for blender)\n" if said else ""
     )
 
 

@@ -169,7 +169,7 @@ def test_text_with_buffers_beside_it_and_in_it(file: File, tmp_path: Path) -> No
         ("/etc/passwd", "buffers must be in this file's folder or below"),
         ("https://example.org/a.bin", "buffers must be in this file's folder or below"),
         ("missing.bin", "missing.bin: cannot be read"),
-        ("data:;base64,???", "a buffer's data URI is not base64"),
+        ("data:;base64,???", "a data URI is not base64"),
     ],
 )
 def test_buffers_from_elsewhere_are_refused(file: File, uri: str, said: str) -> None:

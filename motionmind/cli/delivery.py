@@ -1,0 +1,136 @@
+"""Write movement for another program, and on the rig of a file: --for and --rig."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from motionmind.cli.files import evened, note_licences, note_lossy_fields, read, read_mapping, write
+from motionmind.cli.options import Section, option
+from motionmind.cli.types import EXISTING_FILE
+
+if TYPE_CHECKING:
+    from motionmind.body.motion import Motion
+    from motionmind.formats._rig_file import RigFile
+    from motionmind.formats.programs import Program
+    from motionmind.names.spelling import PostureName
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+_DELIVERED_SUFFIXES = (".bvh", ".glb")  # of movement for other programs
+
+
+def for_program(text: str) -> Callable[[_Function], _Function]:
+    """Add --for as `program`: the name of a program, or None; `text` is its help."""
+    return option(
+        "--for", "program", section=Section.OUTPUT, type=click.Choice(["blender", "unreal", "maya"]), help=text
+    )
+
+
+def on_rig(text: str) -> Callable[[_Function], _Function]:
+    """Add --rig, also called --into, as `rig`: an existing file, or None; `text` is its help."""
+    return option("--rig", "--into", "rig", section=Section.OUTPUT, type=EXISTING_FILE, help=text)
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """How .bvh and .glb files are written.
+
+    Attributes:
+        program: the program that they suit; None for any.
+        rig: the rig that they are written on; None for the movement's own skeleton.
+        fps: frames a second to stretch the movement to; None for its own.
+        unit: the unit of BVH's lengths; None for the rig's or the program's, else centimetres.
+    """
+
+    program: Program | None = None
+    rig: RigFile | None = None
+    fps: float | None = None
+    unit: str | None = None
+
+    def write(self, path: Path, motion: Motion, source: Path | None = None) -> Motion:
+        """Write a motion, note what its file lacks, of the file `source` too, and return the motion as written."""
+        from motionmind.formats import lossy_fields, write_motion
+        from motionmind.formats.programs import write_for
+        from motionmind.formats.rig_files import write_on_rig
+
+        if not takes_delivery(path):
+            write(path, motion, source)
+            return motion
+        motion = evened(path, motion.stretch_to(self.fps) if self.fps else motion)
+        note_licences(path, motion)
+        if self.rig:
+            motion = write_on_rig(path, motion, self.rig)
+        elif self.program:
+            write_for(path, motion, self.program, unit=self.unit)
+        else:
+            write_motion(path, motion, unit=self.unit or "cm")
+        note_lossy_fields(path, lossy_fields(motion, path, source))
+        return motion
+
+
+def takes_delivery(path: Path) -> bool:
+    """Return whether a file holds movement for other programs."""
+    return path.suffix.lower() in _DELIVERED_SUFFIXES
+
+
+def check_delivery(outputs: Sequence[Path], program: str | None, rig: Path | None) -> Program | None:
+    """Return the program of --for; UsageError if no output is for a program or a rig.
+
+    Raises:
+        MotionMindError: the program does not read an output.
+    """
+    from motionmind.formats.programs import program_for
+
+    delivered = [path for path in outputs if takes_delivery(path)]
+    if not delivered and (program or rig):
+        raise click.UsageError(
+            f"--{'for' if program else 'rig'} needs an output for other programs: -o FILE.bvh or .glb"
+        )
+    return next((program_for(program, path) for path in reversed(delivered)), None) if program else None
+
+
+def find_rig(
+    rig: Path | None,
+    ends: Sequence[PostureName],
+    *,
+    joints: Path | None,
+    unit: str | None,
+    source_fps: float | None,
+    up: str | None,
+) -> RigFile | None:
+    """Return the rig of --rig, or of the file or files that both ends of a tween come from; None for neither.
+
+    Args:
+        rig: the file of --rig; None without it.
+        ends: the names of A and B.
+        joints: value of an option that `options.reading` adds, as are the others.
+        unit: the same.
+        source_fps: the same.
+        up: the same.
+    """
+    from motionmind.formats.rig_files import RIG_SUFFIXES, read_rig
+    from motionmind.names.finding import frame_of
+
+    mapping = read_mapping(joints)
+
+    @cache
+    def read_once(path: Path) -> Motion:
+        return read(path, unit, None, source_fps, None)
+
+    def find_end(end: PostureName) -> RigFile | None:
+        path = next(iter(end.source.paths), None)
+        if end.source.kind != "file" or path is None or path.suffix.lower() not in RIG_SUFFIXES:
+            return None
+        motion = read_once(path)
+        frame = frame_of(end, motion)
+        return read_rig(path, (frame, frame), motion=motion, unit=unit, joints=mapping, up=up)
+
+    first, last = map(find_end, ends)
+    if rig is None:
+        return first.with_ends_of(first, last) if first and last and first.is_like(last) else None
+    return read_rig(rig, motion=read_once(rig), unit=unit, joints=mapping, up=up).with_ends_of(first, last)

@@ -1,0 +1,132 @@
+"""Writes BVH on the skeleton of another BVH file: its hierarchy word for word, its channels in their orders."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
+
+import numpy as np
+
+from motionmind._typing import Floats
+from motionmind.body.motion import Motion
+from motionmind.errors import MotionMindError
+from motionmind.files import FilePath, name_of, write_atomically
+from motionmind.formats._bvh_file import assemble, read_file
+from motionmind.formats._bvh_hierarchy import BvhJoint
+from motionmind.formats._bvh_rig import normalise, resolve_places
+from motionmind.formats._rig_file import RigFile
+from motionmind.formats.bvh import frame_lines
+from motionmind.formats.units import guess_unit, metres_per_unit
+from motionmind.geometry import rotations as rot
+from motionmind.retarget.armature import Armature, Pose
+
+
+@dataclass(frozen=True, eq=False)
+class BvhRigFile(RigFile):
+    """The rig of a BVH file.
+
+    Attributes:
+        hierarchy: the lines above MOTION.
+        bvh_joints: the joints in them, with their channels.
+        adds: whether the file adds position channels to OFFSETs.
+        first: values of all channels in the frame before the movement to come [C].
+    """
+
+    hierarchy: tuple[str, ...]
+    bvh_joints: tuple[BvhJoint, ...]
+    adds: bool
+    first: Floats
+    suffix: ClassVar[str] = ".bvh"
+
+    def with_ends_of(self, start: RigFile | None, end: RigFile | None) -> Self:
+        """Return this rig with the first pose of one file and the last of another."""
+        rig = super().with_ends_of(start, end)
+        known = isinstance(start, BvhRigFile) and rig.armature.is_known[0]
+        return replace(rig, first=start.first) if known and isinstance(start, BvhRigFile) else rig
+
+    def write(self, path: FilePath, pose: Pose, motion: Motion) -> None:
+        """Write the rig in another pose: rotations agree to 1e-6 rad and positions to 1e-8 m.
+
+        Angles continue from those in the file's frame, without jumps.
+
+        Raises:
+            MotionMindError: the times are not even, a joint has rotation channels about one axis twice, or the file
+                cannot be written.
+        """
+        scale = 1.0 / self.unit
+        columns: list[Floats] = []
+        is_angle: list[bool] = []
+        for joint, one in enumerate(self.bvh_joints):
+            angles = iter(self._angles(joint, len(columns), pose.rotations[:, joint]).T)
+            place = pose.translations[:, joint] * scale
+            if self.adds and joint:
+                place = place - np.array(one.offset)
+            for channel in one.channels:
+                is_angle.append(channel.endswith("ROTATION"))
+                columns.append(next(angles) if is_angle[-1] else place[:, "XYZ".index(channel[0])])
+        lines = [*self.hierarchy, "MOTION", *frame_lines(motion, np.stack(columns, axis=1), np.array(is_angle), scale)]
+        write_atomically(path, ("\n".join(lines) + "\n").encode())
+
+    def _angles(self, joint: int, column: int, turns: Floats) -> Floats:
+        """Return the values of a joint's rotation channels [T, channels], degrees.
+
+        Args:
+            joint: the joint.
+            column: index of its first channel among all joints' channels.
+            turns: its local rotations [T, 4].
+        """
+        one = self.bvh_joints[joint]
+        at = [column + i for i, channel in enumerate(one.channels) if channel.endswith("ROTATION")]
+        axes = "".join(one.channels[i - column][0] for i in at)
+        if len(set(axes)) < len(axes):
+            raise MotionMindError(f"{self.path}: {one.name} turns about one axis twice, which cannot be written")
+        order = axes + "".join(axis for axis in "XYZ" if axis not in axes)
+        first = np.zeros(3)
+        first[: len(at)] = np.radians(self.first[at])
+        return np.degrees(_continue_angles(rot.to_euler(order, turns), first))[:, : len(at)]
+
+
+def _continue_angles(angles: Floats, first: Floats) -> Floats:
+    """Return the same rotations by Euler angles [T, 3], each nearest to the one before; the first nearest to `first`.
+
+    Two triples of angles within a turn give the same rotation: the second has the outer ones half a turn further, and
+    the middle one mirrored at a right angle.
+    """
+    other = np.stack([angles[:, 0] + np.pi, np.pi - angles[:, 1], angles[:, 2] + np.pi], axis=-1)
+    both = np.stack([angles, other], axis=1)
+    out = np.empty_like(angles)
+    for frame, pair in enumerate(both):
+        near = pair - 2.0 * np.pi * np.round((pair - first) / (2.0 * np.pi))
+        first = out[frame] = near[int(np.abs(near - first).sum(axis=-1).argmin())]
+    return out
+
+
+def read_bvh_rig(
+    path: FilePath, motion: Motion, frames: tuple[int, int] | None, unit: str | float | None = None
+) -> BvhRigFile:
+    """Read the rig of a BVH file.
+
+    Args:
+        path: the file.
+        motion: its movement, as `read_bvh` returns it with the same unit.
+        frames: those before and after the movement to come; None if they are not of this file.
+        unit: as for `read_bvh`.
+    """
+    file = read_file(path)
+    placed, adds = resolve_places(assemble(file.joints, file.values, name_of(path)))
+    scale = metres_per_unit(unit) if unit is not None else guess_unit(normalise(placed).skeleton)[1]
+    first, last = frames or (0, 0)
+    skeleton = placed.skeleton
+    names = skeleton.names
+    places = np.stack([placed.place(joint) for joint in range(len(names))], axis=1)[[first, last]]
+    armature = Armature(
+        motion,
+        skeleton.parents,
+        np.ones((len(names), 3)),
+        np.array([joint in placed.places for joint in range(len(names))]),
+        np.array([names.index(name) for name in motion.skeleton.names]),
+        np.tile(rot.IDENTITY, (len(motion.skeleton), 1)),
+        Pose(placed.rotations[[first, last]], places * scale),
+        (frames is not None, frames is not None),
+    )
+    return BvhRigFile(path, names, armature, scale, tuple(file.hierarchy), tuple(file.joints), adds, file.values[first])

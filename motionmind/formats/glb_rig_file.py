@@ -1,0 +1,165 @@
+"""Writes glTF with the nodes, skins, meshes and materials of another glTF file, and a new animation.
+
+Section numbers refer to "glTF 2.0 Specification", version 2.0.1, The Khronos Group (2021). The new animation comes
+first, where viewers and importers look; the file's own follow it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from copy import deepcopy
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from motionmind._typing import Floats
+from motionmind.body.motion import Motion
+from motionmind.files import FilePath, name_of, write_atomically
+from motionmind.formats._gltf import Gltf, read_chunks, read_container, to_trs
+from motionmind.formats._gltf_poses import PATH_TYPES, lineage
+from motionmind.formats._json import MARKS_KEY
+from motionmind.formats._rig_file import RigFile
+from motionmind.formats.glb import GlbBuffer, add_clock, animation, container, continuous, encode_marks
+from motionmind.formats.gltf import GltfBody, find_body
+from motionmind.formats.units import metres_per_unit
+from motionmind.geometry import rotations as rot
+from motionmind.retarget.armature import Armature, Pose
+
+_SAME_VALUE = 1e-6  # metres, or components of quaternions: single precision
+_IMAGE_TYPES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp"}
+
+
+@dataclass(frozen=True, eq=False)
+class GlbRigFile(RigFile):
+    """The rig of a glTF file.
+
+    Attributes:
+        gltf: the file.
+        nodes: the node of each bone [N].
+        body: the nodes that are joints of the body.
+    """
+
+    gltf: Gltf
+    nodes: list[int]
+    body: frozenset[int]
+    suffix: ClassVar[str] = ".glb"
+
+    def write(self, path: FilePath, pose: Pose, motion: Motion) -> None:
+        """Write the rig with a new animation; a pose of one frame becomes the nodes' own.
+
+        Raises:
+            MotionMindError: times are too close together for single precision, a picture or a buffer beside the rig
+                cannot be read, or the file cannot be written.
+        """
+        text, _ = read_chunks(self.path)
+        document: dict[str, Any] = json.loads(text.decode("utf-8-sig"))
+        name = motion.name or name_of(path)
+        buffer = _take_buffers(self.gltf, document)
+        places = pose.translations / self.unit
+        channels = list(self._channels(Pose(pose.rotations, places)))
+        for node in {node for node, _, _ in channels}:
+            _set_trs(document["nodes"][node], self.gltf, node)
+        if len(motion) == 1:
+            for node, target, values in channels:
+                document["nodes"][node][target] = values[0].tolist()
+        else:
+            clock = add_clock(buffer, motion, name)
+            outputs = [(node, target, buffer.add(values.astype("<f4"))) for node, target, values in channels]
+            document["animations"] = [animation(name, clock, outputs), *document.get("animations", [])]
+        top = document["nodes"][self.nodes[int(self.armature.joints[0])]]
+        if isinstance(top.setdefault("extras", {}), dict):
+            top["extras"][MARKS_KEY] = encode_marks(path, self.armature.motion_of(pose, motion))
+        document |= {"accessors": buffer.accessors, "bufferViews": buffer.views}
+        document["buffers"] = [{"byteLength": len(buffer.data)}, *document["buffers"][1:]]
+        write_atomically(path, container(document, bytes(buffer.data), name))
+
+    def _channels(self, pose: Pose) -> Iterator[tuple[int, str, Floats]]:
+        """Yield the node, the path and the values [T, 3 or 4] of all that turns or moves; of joints all turns."""
+        for bone, node in enumerate(self.nodes):
+            place, turn, _ = to_trs(self.gltf.document.nodes[node])
+            turns = continuous(pose.rotations[:, [bone]])[:, 0]
+            if node in self.body or np.any(rot.angle(turns, turn) > _SAME_VALUE):
+                yield node, "rotation", turns
+            places = pose.translations[:, bone]
+            if np.any(np.abs(places - place) > _SAME_VALUE / self.unit):
+                yield node, "translation", places
+
+
+def read_glb_rig(
+    path: FilePath, motion: Motion, frames: tuple[int, int] | None, unit: str | float | None = None
+) -> GlbRigFile:
+    """Read the rig of a glTF file.
+
+    Args:
+        path: the file.
+        motion: its movement, as `read_gltf` returns it with the same unit.
+        frames: those before and after the movement to come; None if they are not of this file.
+        unit: as for `read_gltf`.
+    """
+    gltf = read_container(path)
+    body = find_body(gltf)
+    rows = gltf.document.nodes
+    nodes = lineage(body.parents, set(range(len(rows))))
+    number = {node: bone for bone, node in enumerate(nodes)}
+    scale = 1.0 if unit is None else metres_per_unit(unit)
+    known = [body.names.index(name) for name in motion.skeleton.names]
+    is_known = frames is not None
+    armature = Armature(
+        motion,
+        tuple(number[body.parents[node]] if body.parents[node] >= 0 else -1 for node in nodes),
+        np.array([to_trs(rows[node])[2] for node in nodes]),
+        np.ones(len(nodes), dtype=bool),
+        np.array([number[body.joints[joint]] for joint in known]),
+        body.rest_turns[known],
+        _pose_at(body, nodes, body.times[list(frames or (0, 0))], scale),
+        (is_known, is_known),
+    )
+    names = tuple(rows[node].name for node in nodes)
+    return GlbRigFile(path, names, armature, scale, gltf, nodes, frozenset(body.joints))
+
+
+def _pose_at(body: GltfBody, nodes: list[int], times: Floats, scale: float) -> Pose:
+    """Return the local transforms of nodes at `times` [T], seconds, with lengths in units of `scale` metres."""
+    rotations, places = np.empty((len(times), len(nodes), 4)), np.empty((len(times), len(nodes), 3))
+    for bone, node in enumerate(nodes):
+        still = dict(zip(PATH_TYPES, to_trs(body.gltf.document.nodes[node]), strict=True))
+        for path, out in (("rotation", rotations), ("translation", places)):
+            out[:, bone] = body.tracks[node, path].at(times) if (node, path) in body.tracks else still[path]
+    return Pose(rot.normalise(rotations), places * scale)
+
+
+def _set_trs(node: dict[str, Any], gltf: Gltf, index: int) -> None:
+    """Replace a node's matrix, which no animation may move (3.11), by its translation, rotation and scale."""
+    if node.pop("matrix", None):
+        place, turn, scale = to_trs(gltf.document.nodes[index])
+        node |= {"translation": place.tolist(), "rotation": turn.tolist(), "scale": scale.tolist()}
+
+
+def _take_buffers(gltf: Gltf, document: dict[str, Any]) -> GlbBuffer:
+    """Return one buffer with all that a file's buffers and pictures hold, beside it or in it; change the document."""
+    data, starts = bytearray(), {}
+    buffers = document.get("buffers", [])
+    for index, one in enumerate(buffers):
+        if index == 0 or "uri" in one:  # others have data of extensions only
+            data += b"\0" * (-len(data) % 4)
+            starts[index] = len(data)
+            data += gltf.buffer(index)
+    kept = [index for index in range(len(buffers)) if index not in starts]
+    views = deepcopy(document.get("bufferViews", []))
+    for view in views:
+        for one in (view, *view.get("extensions", {}).values()):
+            if (index := one.get("buffer")) is not None:
+                one["buffer"] = 0 if index in starts else 1 + kept.index(index)
+                one["byteOffset"] = one.get("byteOffset", 0) + starts.get(index, 0)
+    document["buffers"] = [{}, *(buffers[index] for index in kept)]
+    buffer = GlbBuffer(bytes(data), views, document.get("accessors", []))
+    for image in document.get("images", []):
+        if "uri" in image:
+            picture = gltf.fetch(image.pop("uri"))
+            image["mimeType"] = next((kind for magic, kind in _IMAGE_TYPES.items() if picture.startswith(magic)), "")
+            padded = picture + b"\0" * (-len(picture) % 4)
+            image["bufferView"] = buffer.view(np.frombuffer(padded, dtype=np.uint8))
+            buffer.views[-1]["byteLength"] = len(picture)
+    return buffer
