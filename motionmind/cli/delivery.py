@@ -13,6 +13,7 @@ import click
 from motionmind.cli.files import evened, note_licences, note_lossy_fields, read, read_mapping, write
 from motionmind.cli.options import Section, option
 from motionmind.cli.types import EXISTING_FILE
+from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
@@ -79,19 +80,20 @@ def takes_delivery(path: Path) -> bool:
 
 
 def check_delivery(outputs: Sequence[Path], program: str | None, rig: Path | None) -> Program | None:
-    """Return the program of --for; UsageError if no output is for a program or a rig.
+    """Return the program of --for; check that an output suits it, and the rig.
 
     Raises:
-        MotionMindError: the program does not read an output.
+        MotionMindError: no output is for a program or a rig, or the program does not read one that is.
     """
     from motionmind.formats.programs import program_for
 
     delivered = [path for path in outputs if takes_delivery(path)]
-    if not delivered and (program or rig):
-        raise click.UsageError(
-            f"--{'for' if program else 'rig'} needs an output for other programs: -o FILE.bvh or .glb"
-        )
-    return next((program_for(program, path) for path in reversed(delivered)), None) if program else None
+    if program and outputs:
+        programs = [program_for(program, path) for path in delivered or outputs]
+        return programs[0]
+    if (program or rig) and not delivered:
+        raise MotionMindError(f"--{'for' if program else 'rig'} is for .bvh and .glb files: name one with -o")
+    return None
 
 
 def find_rig(

@@ -14,6 +14,8 @@ from motionmind.formats import read_motion, write_motion
 from motionmind.formats._rig_file import RigFile
 from motionmind.formats.programs import note_settings
 from motionmind.retarget.armature import animate
+from motionmind.retarget.joint_mapping import joint_mapping
+from motionmind.retarget.retarget import describe_doubts, fit_upright
 
 RIG_SUFFIXES = (".bvh", ".glb", ".gltf", ".vrm")
 
@@ -40,11 +42,17 @@ def read_rig(
 
     Raises:
         FormatError: the file has another suffix, or cannot be read.
+
+    Warns:
+        MotionMindWarning: as `to_human23`, if `frames` is None: retargeting the frames has warned.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in RIG_SUFFIXES:
         raise FormatError(f"no rig to write on: it must end in one of {', '.join(RIG_SUFFIXES)}", path=path)
     motion = motion or read_motion(path, unit=unit)
+    if frames is None and joint_mapping(motion.skeleton, joints):
+        for doubt in describe_doubts(motion, *fit_upright(motion, joints, up)):
+            warnings.warn(doubt, MotionMindWarning, stacklevel=2)
     rig: RigFile
     if suffix == ".bvh":
         from motionmind.formats.bvh_rig_file import read_bvh_rig
@@ -72,9 +80,7 @@ def write_on_rig(path: FilePath, motion: Motion, rig: RigFile) -> Motion:
         SkeletonError: the rig's joints do not map to human23.
         MotionMindError: the rig cannot hold the motion, or the file cannot be written.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MotionMindWarning)  # reading the rig as movement has warned
-        pose = animate(rig.armature, motion)
+    pose = animate(rig.armature, motion)
     on_rig = rig.armature.motion_of(pose, motion)
     if Path(path).suffix.lower() != rig.suffix:
         write_motion(path, on_rig)

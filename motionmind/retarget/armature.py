@@ -10,7 +10,7 @@ other, so that the ends are the file's, in every bone.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.joint_mapping import is_human44, joint_mapping
-from motionmind.retarget.retarget import fit_upright, rests_along_z
+from motionmind.retarget.retarget import fit_upright, rests_along_z, to_y_up_world
 from motionmind.retarget.vertical import Z_UP_TO_Y_UP
 
 
@@ -108,16 +108,16 @@ class _Binding:
         alignment: orientation of the body's axes in the frames of these joints [J, 4].
         upright: rotation [4] from the file's world to one with y up.
         pelvis: the file's joint at the place of the body's root.
-        size: the file's body relative to the moving one.
+        body: the moving body with the file's proportions.
         rows: {the file's joint: the one below in its row, with which it turns}.
     """
 
     sources: Indices
     alignment: Floats
-    upright: Floats = field(default_factory=lambda: rot.IDENTITY)
-    pelvis: int = 0
-    size: float = 1.0
-    rows: Mapping[int, int] = field(default_factory=dict)
+    upright: Floats
+    pelvis: int
+    body: Skeleton
+    rows: Mapping[int, int]
 
 
 def animate(armature: Armature, motion: Motion) -> Pose:
@@ -143,8 +143,8 @@ def animate(armature: Armature, motion: Motion) -> Pose:
     rotations[:, roots] = turned[:, roots]
     first, last = armature.ends.translations
     pose = Pose(rot.normalise(rotations), first + share[:, None, None] * (last - first))
-    size = 1.0 if any(armature.is_known) else binding.size
-    pelvis = rot.mul_vec(rot.inv(binding.upright), size * motion.root)
+    root = motion.root if any(armature.is_known) else _scale_root(motion, binding.body)
+    pelvis = rot.mul_vec(rot.inv(binding.upright), root)
     _move_pelvis(armature, pose, turned, sizes, int(armature.joints[binding.pelvis]), pelvis, share)
     return pose
 
@@ -197,29 +197,36 @@ def _bind(armature: Armature, body: Skeleton) -> _Binding:
     if is_same and not (lies and not is_human44(skeleton)):
         turn = Z_UP_TO_Y_UP if up == "z" or (lies and up is None) else rot.IDENTITY
         axes = rot.inv(Z_UP_TO_Y_UP) if lies else rot.IDENTITY
-        sizes = [float(rot.norm(one.offsets).sum()) for one in (skeleton, body)]
-        return _Binding(
-            np.arange(len(body)), np.tile(axes, (len(body), 1)), turn, size=sizes[0] / sizes[1] if sizes[1] else 1.0
-        )
-    fit, upright = fit_upright(armature.motion, joints, up)
-    sources = fit.rotation_sources
+        alignment = np.tile(axes, (len(body), 1))
+        return _Binding(np.arange(len(body)), alignment, turn, 0, skeleton, {})
+    fit, vertical = fit_upright(armature.motion, joints, up)
     mapping = joint_mapping(skeleton, joints) or {}
-    last_of_row = {skeleton.index(name): int(sources[human23().index(joint)]) for name, joint in mapping.items()}
-    lengths = [_leg_length(one) for one in (fit.skeleton, body)]
-    return _Binding(
-        sources,
-        fit.alignment,
-        upright,
-        fit.pelvis,
-        lengths[0] / lengths[1],
-        rows={joint: last for joint, last in last_of_row.items() if joint != last},
-    )
+    last_of_row = {
+        skeleton.index(name): int(fit.rotation_sources[human23().index(joint)]) for name, joint in mapping.items()
+    }
+    rows = {joint: last for joint, last in last_of_row.items() if joint != last}
+    return _Binding(fit.rotation_sources, fit.alignment, to_y_up_world(vertical), fit.pelvis, fit.skeleton, rows)
+
+
+def _scale_root(motion: Motion, body: Skeleton) -> Floats:
+    """Return the root's places [T, 3], metres, for a body of other proportions.
+
+    The way is as much longer as its legs are, and its lowest points are on average at the height of the motion's.
+    """
+    lengths = [_leg_length(one) for one in (body, motion.skeleton)]
+    size = lengths[0] / lengths[1] if lengths[1] > 0.0 else 1.0
+    root = size * motion.root
+    lows = [
+        one.positions_and_tips(motion.rotations, place)[..., 1].min(axis=1)
+        for one, place in ((body, root), (motion.skeleton, motion.root))
+    ]
+    return np.asarray(root + np.array([0.0, float(np.median(size * lows[1] - lows[0])), 0.0]))
 
 
 def _leg_length(body: Skeleton) -> float:
-    """Return the mean length of the legs of human23, metres."""
-    bones = [body.offsets[body.index(f"{side}_{joint}")] for side in ("left", "right") for joint in ("knee", "ankle")]
-    return float(rot.norm(np.array(bones)).sum()) / 2.0
+    """Return the length of a person's legs, of all bones of another body, metres."""
+    legs = [joint for joint, name in enumerate(body.names) if name.endswith(("_knee", "_ankle"))]
+    return float(rot.norm(body.offsets[legs or slice(None)]).sum())
 
 
 def _ease(times: Floats) -> Floats:

@@ -10,7 +10,7 @@ body and axes it was recorded. The performer's proportions stay.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -86,7 +86,10 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
         and not rests_along_z(movement.skeleton)
     ):
         return movement
-    fit, upright = fit_upright(movement, joints, up)
+    fit, vertical = fit_upright(movement, joints, up)
+    for doubt in describe_doubts(movement, fit, vertical):
+        warnings.warn(doubt, MotionMindWarning, stacklevel=2)
+    upright = to_y_up_world(vertical)
     renamed: dict[str, Any] = {}
     if isinstance(movement, Motion) and movement.insertions:
         mapping = joint_mapping(movement.skeleton, joints) or {}
@@ -104,21 +107,25 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
     return replace(movement, skeleton=fit.skeleton, rotations=rotations, root=root, **renamed)
 
 
-def fit_upright(movement: Movement, joints: Mapping[str, str] | None, up: str | None) -> tuple[Fit, Floats]:
-    """Fit human23 to a file's skeleton, and find the rotation [4] from the file's world to one with y up.
-
-    Arguments, errors and warnings as of `to_human23`.
-    """
+def fit_upright(movement: Movement, joints: Mapping[str, str] | None, up: str | None) -> tuple[Fit, Vertical]:
+    """Fit human23 to a file's skeleton, and find which axis is up; arguments and errors as of `to_human23`."""
     fit = fit_human23(movement, joints)
-    if fit.unclear:
-        warnings.warn(_describe_unclear(movement.skeleton.name, fit.unclear), MotionMindWarning, stacklevel=3)
     turned = movement.skeleton.global_rotations(movement.rotations)[..., fit.rotation_sources[0], :]
-    vertical = Vertical(up) if up else _vertical(fit, movement, turned)
+    return fit, Vertical(up) if up else _vertical(fit, movement, turned)
+
+
+def to_y_up_world(vertical: Vertical) -> Floats:
+    """Return the rotation [4] from the world of a file to one with y up."""
+    return Z_UP_TO_Y_UP if vertical.axis == "z" else rot.IDENTITY
+
+
+def describe_doubts(movement: Movement, fit: Fit, vertical: Vertical) -> Iterator[str]:
+    """Describe what a file does not show of its bones and its vertical."""
+    if fit.unclear:
+        yield _describe_unclear(movement.skeleton.name, fit.unclear)
     if vertical.doubt:
         name = (movement.name if isinstance(movement, Motion) else "") or movement.skeleton.name
-        message = f"{name}: taken with {vertical.axis} up, which is doubtful: {vertical.doubt}"
-        warnings.warn(message, MotionMindWarning, stacklevel=3)
-    return fit, Z_UP_TO_Y_UP if vertical.axis == "z" else rot.IDENTITY
+        yield f"{name}: taken with {vertical.axis} up, which is doubtful: {vertical.doubt}"
 
 
 def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None, *, up: str | None = None) -> Movement:

@@ -165,9 +165,9 @@ def test_text_with_buffers_beside_it_and_in_it(file: File, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("uri", "said"),
     [
-        ("../secret.bin", "buffers must be in this file's folder or below"),
-        ("/etc/passwd", "buffers must be in this file's folder or below"),
-        ("https://example.org/a.bin", "buffers must be in this file's folder or below"),
+        ("../secret.bin", "it must be in this file's folder or below"),
+        ("/etc/passwd", "it must be in this file's folder or below"),
+        ("https://example.org/a.bin", "it must be in this file's folder or below"),
         ("missing.bin", "missing.bin: cannot be read"),
         ("data:;base64,???", "a data URI is not base64"),
     ],

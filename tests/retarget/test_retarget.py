@@ -23,10 +23,10 @@ from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, S
 from motionmind.formats.asf_amc import read_amc
 from motionmind.formats.bvh import read_bvh, write_bvh
 from motionmind.geometry import rotations as rot
+from motionmind.retarget.armature import from_human23
 from motionmind.retarget.joint_mapping import known_rig
 from motionmind.retarget.retarget import (
     filled_joints,
-    from_human23,
     joint_mapping,
     own_skeleton,
     read_joint_mapping,
