@@ -150,17 +150,16 @@ def convert(
     if fps is not None:
         motion = motion.resample(fps)
     source_file = next(iter(named.source.paths), None)
+    delivery = Delivery(taker, on, taker.fps if taker and fps is None else None, out_unit)
     if suffix == ".txt":
         write_papers(output, motion, form=form)
         note_licences(output, motion)
         note_lossy_fields(output, lossy_fields(motion, output, source_file))
     else:
-        rate = taker.fps if taker and fps is None else None
-        motion = Delivery(taker, on, rate, out_unit).write(output, motion, source_file)
+        motion = delivery.write(output, motion, source_file)
     size, body = _written_body(suffix, motion)
     click.echo(f"{displayed_path(output)}: {count(len(motion), 'frame')}, {count(size, 'joint')} ({displayed(body)})")
-    if taker:
-        click.echo(f"{taker.title}: {taker.advice[suffix]}")
+    delivery.print([output])
 
 
 def _written_body(suffix: str, motion: Motion) -> tuple[int, str]:

@@ -12,7 +12,9 @@ import click
 
 from motionmind.cli.files import evened, note_licences, note_lossy_fields, read, read_mapping, write
 from motionmind.cli.options import Section, option
+from motionmind.cli.printing import count
 from motionmind.cli.types import EXISTING_FILE
+from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
@@ -72,6 +74,16 @@ class Delivery:
             write_motion(path, motion, unit=self.unit or "cm")
         note_lossy_fields(path, lossy_fields(motion, path, source))
         return motion
+
+    def print(self, outputs: Sequence[Path]) -> None:
+        """Print the rig of the files for other programs, and how a program opens each."""
+        delivered = [path for path in outputs if takes_delivery(path)]
+        if self.rig and delivered:
+            joints = count(len(self.rig.armature.motion.skeleton), "joint")
+            click.echo(f"rig       {displayed_path(Path(self.rig.path))}, {joints}")
+        if self.program:
+            for suffix in dict.fromkeys(path.suffix.lower() for path in delivered):
+                click.echo(f"{self.program.title}: {self.program.advice[suffix]}")
 
 
 def takes_delivery(path: Path) -> bool:

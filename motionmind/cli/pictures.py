@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli import completion
+from motionmind.cli.delivery import for_program
 from motionmind.cli.files import check_outputs, note_licences
 from motionmind.cli.options import HOME, Section, command, option, output, outputs, reading
 from motionmind.cli.printing import count
@@ -143,6 +144,7 @@ def sheet(
     type=RATE,
     help="Frames per second of a film  [default: the movement's own, at most 25 in .gif; .svg 12]",
 )
+@for_program("Program beside whose animation a film is shown: frames per second of its scenes, the last one whole.")
 @option(
     "--view",
     section=Section.DRAW,
@@ -159,7 +161,14 @@ def sheet(
 @reading
 @HOME
 def render(
-    source: str, outputs: tuple[Path, ...], name: str | None, start: int, end: int, home: Path | None, **options: Any
+    source: str,
+    outputs: tuple[Path, ...],
+    name: str | None,
+    start: int,
+    end: int,
+    program: str | None,
+    home: Path | None,
+    **options: Any,
 ) -> None:
     """Draw movement as a picture, a film, or a page that plays it.
 
@@ -168,6 +177,7 @@ def render(
     page plays the movement in any browser, from disk, offline. Inserted movement is violet; a green
     ball marks a bridged joint.
     """
+    from motionmind.formats.programs import PROGRAMS
     from motionmind.render.pictures import draw_picture
 
     drawing = {key: options.pop(key) for key in ("fps", "view", "size")}
@@ -176,6 +186,11 @@ def render(
     whole = read_movement(named.source, name, home, **options)
     frames = select_part(named, whole, start, end)
     motion = whole.slice(frames.start, frames.stop)
+    if program:
+        if drawing["fps"] is not None:
+            raise MotionMindError(f"--fps and --for {program} both set the frames per second; give one of them")
+        motion = motion.stretch_to(PROGRAMS[program].fps)
+        drawing["fps"] = motion.fps
     with all_or_none():
         for path in outputs:
             note_licences(path, motion)

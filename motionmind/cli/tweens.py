@@ -149,7 +149,8 @@ def tween(
         engine = Engine.load(corpus, home)
         with _diagnosing(files), Interruption() as interruption:
             results = _find_tweens(engine, (start, end), request, files.count, interruption)
-        written, reports = files.write(results, Delivery(taker, on, taker.fps if taker else None))
+        delivery = Delivery(taker, on, taker.fps if taker else None)
+        written, reports = files.write(results, delivery)
     if files.is_report_printed:
         printed = list(map(plain, reports))
         click.echo(json.dumps(printed[0] if alternatives is None else printed))
@@ -157,6 +158,8 @@ def tween(
         print_tween(results[0], written, with_details=details)
     else:
         print_alternatives(results, written, with_details=details)
+    if not files.is_report_printed:
+        delivery.print(outputs)
     if interruption.is_requested:
         click.get_current_context().exit(ExitCode.INTERRUPTED)
 

@@ -211,10 +211,11 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with two recordings and a licence, as a user has them."""
+    """A folder with two recordings, a character and a licence, as a user has them."""
     folder = tmp_path_factory.mktemp("recordings")
     for name, clip, frames in (("clip", "adagio", 600), ("plies", "plies", 300)):
         write_motion(folder / f"{name}.bvh", ballet_clip(clip).resample(30.0).slice(0, frames))
+    write_motion(folder / "character.glb", ballet_clip("plies").slice(0, 1))
     (folder / "LICENCE.txt").write_text("Free for all uses.\n")
     return folder
 
