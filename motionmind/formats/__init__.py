@@ -198,7 +198,14 @@ def read_posture(
     return motion.posture(frame or 0)
 
 
-def write_motion(path: FilePath, motion: Motion, *, unit: str | float = "cm") -> None:
+def write_motion(
+    path: FilePath,
+    motion: Motion,
+    *,
+    unit: str | float = "cm",
+    rig: FilePath | None = None,
+    ends: tuple[int, int] | None = None,
+) -> None:
     """Write `motion` in the format of the suffix.
 
     For BVH, a log entry says what to set in Blender's import (logger "motionmind.formats.programs", level INFO).
@@ -207,10 +214,15 @@ def write_motion(path: FilePath, motion: Motion, *, unit: str | float = "cm") ->
         path: the file: `.json`, `.bvh`, `.txt` (the papers' notation), `.glb` (glTF, a skinned body), `.vrma` (VRM
             animation) or `.npz` (AMASS).
         motion: the movement to write.
-        unit: BVH's unit of length (`write_bvh`); other formats define their own.
+        unit: BVH's unit of length (`write_bvh`), unless `rig` has one; other formats define their own.
+        rig: a BVH or glTF file on whose rig a motion of human23 is written as `.bvh` or `.glb`: with the skeleton and
+            channels of BVH, or the nodes and skins of glTF; None for the motion's own skeleton.
+        ends: the frames of `rig` that are the motion's first and last posture, to meet them in every bone; None if it
+            begins and ends elsewhere.
 
     Raises:
         MotionMindError: the suffix is unknown, the format cannot hold this motion, or the file cannot be written.
+        SkeletonError: the joints of `rig` do not map to human23.
 
     >>> import numpy as np
     >>> from motionmind import Posture, human23, write_motion
@@ -221,8 +233,14 @@ def write_motion(path: FilePath, motion: Motion, *, unit: str | float = "cm") ->
     check_path("path", path)
     check_type("motion", motion, Motion)
     check_type("unit", unit, str, Real, wanted="the name of a unit, or its metres")
+    check_path("rig", rig, or_none=True)
+    check_type("ends", ends, tuple, or_none=True)
     suffix = _suffix(path, WRITABLE, "written")
-    if suffix == ".bvh":
+    if rig is not None:
+        from motionmind.formats.rig_files import read_rig, write_on_rig
+
+        write_on_rig(path, motion, read_rig(rig, ends))
+    elif suffix == ".bvh":
         from motionmind.formats.bvh import write_bvh
         from motionmind.formats.programs import note_settings
 

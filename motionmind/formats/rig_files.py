@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from motionmind.body.motion import Motion
-from motionmind.errors import FormatError, MotionMindWarning
+from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.files import FilePath
 from motionmind.formats import read_motion, write_motion
 from motionmind.formats._rig_file import RigFile
@@ -50,6 +50,8 @@ def read_rig(
     if suffix not in RIG_SUFFIXES:
         raise FormatError(f"no rig to write on: it must end in one of {', '.join(RIG_SUFFIXES)}", path=path)
     motion = motion or read_motion(path, unit=unit)
+    for frame in frames or ():
+        motion.posture(frame)  # raises if there is none
     if frames is None and joint_mapping(motion.skeleton, joints):
         for doubt in describe_doubts(motion, *fit_upright(motion, joints, up)):
             warnings.warn(doubt, MotionMindWarning, stacklevel=2)
@@ -78,8 +80,10 @@ def write_on_rig(path: FilePath, motion: Motion, rig: RigFile) -> Motion:
 
     Raises:
         SkeletonError: the rig's joints do not map to human23.
-        MotionMindError: the rig cannot hold the motion, or the file cannot be written.
+        MotionMindError: the file is neither BVH nor GLB, cannot hold the motion, or cannot be written.
     """
+    if Path(path).suffix.lower() not in (".bvh", ".glb"):
+        raise MotionMindError(f"{path}: only .bvh and .glb are written on a rig")
     pose = animate(rig.armature, motion)
     on_rig = rig.armature.motion_of(pose, motion)
     if Path(path).suffix.lower() != rig.suffix:
