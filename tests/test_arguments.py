@@ -139,6 +139,7 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
         "Motion.at": (motion.at, {"times": [0.5]}),
         "Motion.posture": (motion.posture, {"frame": 0}),
         "Motion.resample": (motion.resample, {"rate": 10.0}),
+        "Motion.stretch_to": (motion.stretch_to, {"rate": 10.0}),
         "Motion.slice": (motion.slice, {"start": 0, "stop": 3}),
         "Piece": (mm.Piece, {"motion": motion, "frames": [0, len(motion) - 1]}),
         "Piece.of": (mm.Piece.of, {"motion": motion}),

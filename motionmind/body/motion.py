@@ -313,10 +313,10 @@ class Motion:
         >>> Motion(human23(), at_rest, np.zeros((2, 3)), np.array([0.0, 2.7])).stretch_to(24.0).times[-1] * 24.0
         65.0
         """
+        _check_rate(rate)
         if len(self) == 1:
             return self
         start, span = self.times[0], self.times[-1] - self.times[0]
-        _check_rate(rate)
         steps = max(1.0, float(np.round(span * rate)))
         self._check_size(steps + 1.0)
         stretch = steps / (span * rate)

@@ -101,7 +101,7 @@ class Armature:
 
 @dataclass(frozen=True, eq=False)
 class _Binding:
-    """How the joints of a body turn those of a file's skeleton.
+    """The joints of a file that those of a body turn.
 
     Attributes:
         sources: for each of the body's joints, the file's joint that it turns [J].
