@@ -61,8 +61,8 @@ def question_recording(path: Path, motion: Motion, up: str | None = None) -> Non
     if is_long and SHORTEST_PERSON_M <= person.skeleton.height <= TALLEST_PERSON_M:  # else the unit is wrong
         floor = floor_of(person.slice(added, len(person)))
         if abs(floor) > FLOOR_OFFSET_M:
-            where = "over" if floor > 0.0 else "under"
-            doubts.append(f"its feet stand {100.0 * abs(floor):.0f} cm {where} 0, where the floor is")
+            where = "above" if floor > 0.0 else "below"
+            doubts.append(f"the floor under its feet is {100.0 * abs(floor):.0f} cm {where} 0")
     for doubt in doubts:
         warnings.warn(f"{path}: {doubt}", MotionMindWarning, stacklevel=2)
 

@@ -136,7 +136,7 @@ def test_what_is_wrong_with_a_recording_is_said_as_it_is_read(run: Run) -> None:
     write_motion("film.bvh", replace(film, root=root))
     said = run("convert", "film.bvh", "film.json", "--unit", "cm").err
     assert "note: film.bvh: 3 frames have the whole body elsewhere, or zeros (frames 50-52)\n" in said
-    assert re.search(r"note: film.bvh: its feet stand 1\d cm under 0, where the floor is\n", said)
+    assert re.search(r"note: film.bvh: the floor under its feet is 1\d cm below 0\n", said)
     assert "seems to play" not in said
 
 

@@ -102,7 +102,7 @@ def test_a_floor_of_an_end_that_is_off_is_told_once(run: Run) -> None:
     raised = replace(SLOW, root=SLOW.root + np.array([0.0, 0.2, 0.0]), keyframed=False)
     write_motion("high.bvh", raised)
     ran = run(*TWEEN, "high.bvh@20", "high.bvh@40")
-    assert ran.err.count("high.bvh: its feet stand 19 cm over 0, where the floor is") == 1
+    assert ran.err.count("high.bvh: the floor under its feet is 19 cm above 0") == 1
 
 
 def test_a_corpus_on_its_own_joints_takes_ends_as_they_are(run: Run) -> None:
