@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from numbers import Integral, Real
 from typing import TYPE_CHECKING
 
 from motionmind.display import displayed
-from motionmind.errors import WrongTypeError
+from motionmind.errors import WrongTypeError, did_you_mean
 
 if TYPE_CHECKING:
     from motionmind._typing import Floats, Ints
@@ -103,6 +103,26 @@ def check_items(name: str, value: object, wanted: str, *types: type) -> None:
     for number, item in enumerate(value):
         if not isinstance(item, types):
             raise WrongTypeError(f"{name} must be a sequence of {wanted}; item {number} is {described(item)}")
+
+
+def check_options(
+    owner: str, given: Iterable[str], options: type, function: Callable[..., object] | None = None
+) -> None:
+    """Check the names of options.
+
+    Args:
+        owner: the function or thing that has the options, for the message.
+        given: the names.
+        options: the TypedDict of the options.
+        function: the function, to suggest its other keyword arguments for a misspelt name, too.
+
+    Raises:
+        WrongTypeError: there is no such option; the message suggests the most similar name.
+    """
+    for name in given:
+        if name not in options.__annotations__:
+            known = [*options.__annotations__, *(getattr(function, "__kwdefaults__", None) or {})]
+            raise WrongTypeError(f"{owner} has no option {name!r}{did_you_mean(name, known)}")
 
 
 def as_floats(name: str, value: object) -> Floats:

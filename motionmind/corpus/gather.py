@@ -103,7 +103,7 @@ def gather(
             "stage" leaves it there, so facing the wall and facing the audience are different states.
         flips: treatment of a recording with flips (`find_flips`): "repair" mends them (`repair_flips`), or cuts the
             recording there, so no flip is learned; "keep" takes it unchanged; "drop" leaves it out.
-        flip_degrees: the turn in one frame that counts as a flip.
+        flip_degrees: a joint that turns by more degrees than this in one frame flips.
         mirror: whether to learn from the mirror images of all clips, too.
         reverse: the price, in nats per move, of learning from all clips backwards, too: a move backwards counts
             exp(-price). None keeps the prices of corpora mixed in, and adds no others.

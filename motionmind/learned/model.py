@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import Self, Unpack
 
-from motionmind.arguments import check_mapping, check_path, check_type
+from motionmind.arguments import check_mapping, check_options, check_path, check_type
 from motionmind.body.motion import Motion
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import Gathering, gather
@@ -55,14 +55,15 @@ class LearnedCorpus(Learned):
             home: the folder of the corpora that `mix` names.
             workshop: threads, and room for large arrays; None for this thread and memory. It does not affect the
                 result.
-            options: rate, skip, facing, flips, flip_degrees, mirror, reverse, about, title, author, source, licence,
-                citation: see `motionmind.corpus.gather.gather`.
+            options: how recordings become clips, and whose they are, as for `motionmind.corpus.gather.gather`.
 
         Raises:
             CorpusError: there is nothing to learn from, clips are on different joints, there are too many states, or a
                 corpus to mix does not exist.
             SkeletonError: the body cannot be mirrored.
+            WrongTypeError: an argument has the wrong type, or an option does not exist.
         """
+        check_options("fit", options, Gathering, cls.fit)
         check_type("discretization", discretization, Discretization, wanted=_DISCRETIZATION, or_none=True)
         check_mapping("mix", mix, or_none=True)
         check_path("home", home, or_none=True)

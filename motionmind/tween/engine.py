@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import islice
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -40,7 +40,7 @@ from motionmind.tween.formulate import Formulation, formulate
 from motionmind.tween.modes import Modes
 from motionmind.tween.pacing import tempo_of, worded
 from motionmind.tween.problem import ingredients_of
-from motionmind.tween.request import TweenRequest
+from motionmind.tween.request import TweenOptions, TweenRequest
 from motionmind.tween.result import Tween
 from motionmind.tween.what_if import Answer, WhatIf, find_what_if
 from motionmind.tween.whole_body import Bodies, diagnose_whole_body, find_bodies, solve_whole_body
@@ -54,7 +54,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Engine(LearnedCorpus):
-    """A learned corpus that answers requests; `Engine.fit` learns one, `Engine.load` opens one (see LearnedCorpus).
+    """A learned corpus that answers requests; `Engine.fit` learns one, `Engine.load` opens one.
+
+    Attributes:
+        corpus: the movement learned from.
+        space: the states of each joint chain.
+        states: the states of the corpus's postures [N, L].
+        load_seconds: loading time, seconds; 0 if it was not loaded.
 
     >>> from motionmind import Engine
     >>> engine = Engine.load("ballet")
@@ -78,7 +84,7 @@ class Engine(LearnedCorpus):
         before: Motion | None = None,
         after: Motion | None = None,
         watch: Watch | None = None,
-        **options: Any,
+        **options: Unpack[TweenOptions],
     ) -> Tween:
         """Find the best movement from posture `a` to posture `b` in the style of the corpus.
 
@@ -91,8 +97,7 @@ class Engine(LearnedCorpus):
             after: frames that follow `b`, in the same form; the first frame is `b`.
             watch: called from time to time with the search's progress; return True to end the search and get the best
                 path and bound so far.
-            options: fields of `TweenRequest` and `SearchOptions` to set, as in
-                `engine.tween(a, b, duration=2.0, tau=0.5)`.
+            options: fields of `TweenRequest` and `SearchOptions`, as in `engine.tween(a, b, duration=2.0, tau=0.5)`.
 
         Raises:
             NoPathError: no path joins the postures under these rules; the message is the diagnosis.
@@ -156,7 +161,7 @@ class Engine(LearnedCorpus):
         before: Motion | None = None,
         after: Motion | None = None,
         watch: Watch | None = None,
-        **options: Any,
+        **options: Unpack[TweenOptions],
     ) -> Iterator[Tween]:
         """Find the best movement, then others with as many moves, each at least `differ` from all earlier ones.
 
@@ -195,11 +200,14 @@ class Engine(LearnedCorpus):
         modes: Modes | None = None
         passages: Iterator[str] = iter(())
 
-        def find(**other: Any) -> Tween:
-            search = request.search
-            unlike = {"seed": search.seed + len(found)} if search.sample else {"unlike": (*request.unlike, *found)}
-            first = {"what_if": False} if found else {}
-            return self.tween(a, b, request, before=before, after=after, watch=watch, **unlike, **first, **other)
+        def find(**other: Unpack[TweenOptions]) -> Tween:
+            if request.search.sample:
+                other["seed"] = request.search.seed + len(found)
+            else:
+                other["unlike"] = (*request.unlike, *found)
+            if found:
+                other["what_if"] = False
+            return self.tween(a, b, request, before=before, after=after, watch=watch, **other)
 
         while len(found) < count:
             tween = None

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
 
-from motionmind.arguments import check_type
-from motionmind.errors import MotionMindError, WrongTypeError, did_you_mean
+from motionmind.arguments import check_options, check_type
+from motionmind.errors import MotionMindError
 from motionmind.footing.corrections import Correction
+from motionmind.grammar.schemes import Scheme, Weights
 from motionmind.tween.options import OPTIONS, SearchOptions, take_options
 
 if TYPE_CHECKING:
@@ -22,6 +23,52 @@ class HasPath(Protocol):
     @property
     def path(self) -> States:
         """States of the joint chains [moves + 1, L]."""
+
+
+class SeamOptions(TypedDict, total=False):
+    """Options of the tweens that smooth a variation: fields of `TweenRequest` and `SearchOptions`, with their types."""
+
+    moves: int | tuple[int, int] | None
+    duration: float | None
+    pace: float
+    pin: Mapping[str, str]
+    hold: Sequence[str]
+    avoid: Sequence[tuple[str, int | str]]
+    via: Sequence[Posture | tuple[Posture, int]]
+    differ: float
+    novelty: float
+    liveliness: float
+    passage: str | None
+    without: Sequence[Correction]
+    fps: float
+    search: SearchOptions
+    max_moves: int
+    within: float
+    sample: bool
+    strict: bool
+    node_budget: int
+    memory: int | None
+    weights: Weights
+    coordination: Scheme
+    lambda_: float
+    beta: float
+    tau: float
+    bridge_price: float
+    guide: float
+
+
+class SmoothOptions(SeamOptions, total=False):
+    """Options of `Variation.smooth`; `vary` has a seed of its own."""
+
+    seed: int
+
+
+class TweenOptions(SmoothOptions, total=False):
+    """All options of a tween."""
+
+    unlike: Sequence[HasPath]
+    what_if: bool
+    whole_body: bool
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -107,8 +154,12 @@ class TweenRequest:
             raise MotionMindError(f"unlike: the tweens have {every[0]} moves, which moves={self.moves} rules out")
 
     @classmethod
-    def of(cls, request: TweenRequest | None = None, **options: Any) -> TweenRequest:
+    def of(cls, request: TweenRequest | None = None, **options: Unpack[TweenOptions]) -> TweenRequest:
         """Return `request` (the default one if None) with some options changed, its own or those of its search.
+
+        Args:
+            request: the request.
+            options: see `Engine.tween`.
 
         Raises:
             WrongTypeError: an option does not exist, or `request` is not a TweenRequest.
@@ -119,13 +170,12 @@ class TweenRequest:
         0.5
         """
         check_type("request", request, TweenRequest, or_none=True)
-        for name in options:
-            if name not in OPTIONS and name != "search":
-                raise WrongTypeError(f"a tween has no option {name!r}{did_you_mean(name, OPTIONS)}")
+        check_options("a tween", options, TweenOptions)
         request = cls() if request is None else request
-        inner = {one.name: options.pop(one.name) for one in fields(SearchOptions) if one.name in options}
-        search = options.pop("search", request.search)
-        return replace(request, **options, search=replace(search, **inner) if inner else search)
+        own: dict[str, Any] = dict(options)
+        inner = {one.name: own.pop(one.name) for one in fields(SearchOptions) if one.name in own}
+        search = own.pop("search", request.search)
+        return replace(request, **own, search=replace(search, **inner) if inner else search)
 
     @property
     def move_range(self) -> tuple[int, int]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, TypeVar, Unpack
 
 import msgspec
 import numpy as np
@@ -18,14 +18,13 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Int32s
 from motionmind.body.motion import Motion, Posture
 from motionmind.display import displayed
-from motionmind.errors import NoPathError, SkeletonError, WrongTypeError, did_you_mean
+from motionmind.errors import NoPathError, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.search.solve import Progress, Status, Watch
 from motionmind.tween.certificate import Bridge, Wait, gap_of
 from motionmind.tween.engine import Engine
-from motionmind.tween.options import OPTIONS
+from motionmind.tween.request import SmoothOptions
 from motionmind.tween.result import Tween
-from motionmind.variation.arguments import check_whole
 from motionmind.variation.piece import Piece
 
 OnProgress = Callable[[int, int], None]  # called with the numbers of searches done and in all
@@ -288,20 +287,6 @@ def judge_transitions(
     ]
 
 
-def check_asked(alternatives: int, options: Mapping[str, Any]) -> None:
-    """Check the options for smoothing seams.
-
-    Raises:
-        MotionMindError: `alternatives` is out of its range.
-        WrongTypeError: a name in `options` is no option of a tween.
-    """
-    check_whole("alternatives", alternatives, 1)
-    known = {"search", *OPTIONS} - {"unlike", "what_if"}
-    for name in options:
-        if name not in known:
-            raise WrongTypeError(f"unknown argument {name!r} for smoothing seams{did_you_mean(name, known)}")
-
-
 def judge_and_smooth(
     piece: Piece,
     pairs: Iterable[tuple[int, int]],
@@ -311,7 +296,7 @@ def judge_and_smooth(
     whole_body: bool = False,
     on_progress: OnProgress | None = None,
     watch: Watch | None = None,
-    **options: Any,
+    **options: Unpack[SmoothOptions],
 ) -> tuple[Transition, ...]:
     """Judge the transitions between pairs of a piece's postures, and find movement for the abrupt ones.
 
@@ -325,14 +310,13 @@ def judge_and_smooth(
         whole_body: whether to judge and insert whole bodies.
         on_progress: called before each search with the numbers of searches done and in all.
         watch: as for `Engine.tween`; once it returns True, the remaining transitions stay pending.
-        options: the other arguments of `Engine.tween`.
+        options: see `Variation.smooth`.
 
     Raises:
         SkeletonError: the piece is on another skeleton than the corpus.
         MotionMindError: an option is out of its range.
     """
     transitions = judge_transitions(piece, pairs, engine, whole_body)
-    options = {"whole_body": whole_body, **options}
     ended = False
 
     def watching(so_far: Progress) -> bool:
@@ -347,10 +331,19 @@ def judge_and_smooth(
         transition = transitions[number]
         a, b = piece.ends(transition.start, transition.end)
         before, after = piece.around(transition.start, transition.end)
-        given = {"before": before, "after": after, "watch": watching if watch else None, **options}
+        found = engine.alternatives(
+            a,
+            b,
+            1 if whole_body else alternatives,
+            before=before,
+            after=after,
+            watch=watching if watch else None,
+            whole_body=whole_body,
+            **options,
+        )
         tweens: list[Tween] = []
         try:
-            for tween in engine.alternatives(a, b, 1 if whole_body else alternatives, **given):
+            for tween in found:
                 tweens.append(tween)
                 if ended:
                     break

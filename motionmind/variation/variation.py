@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, Unpack
 
 import msgspec
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from motionmind._cells import html_of
 from motionmind._typing import Ints
-from motionmind.arguments import as_integers, check_flag, check_function, check_items, check_type
+from motionmind.arguments import as_integers, check_flag, check_function, check_items, check_options, check_type
 from motionmind.body.motion import Motion
 from motionmind.chaos.flows import FLOWS, Flow
 from motionmind.chaos.reorder import Itinerary, itinerary
@@ -22,6 +22,7 @@ from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.search.solve import Watch
 from motionmind.tween.engine import Engine
+from motionmind.tween.request import SeamOptions, SmoothOptions
 from motionmind.variation.arguments import check_number, check_numbers, check_whole
 from motionmind.variation.controls import Control, control_of
 from motionmind.variation.course import Course
@@ -48,7 +49,6 @@ from motionmind.variation.seams import (
     OnProgress,
     Transition,
     TransitionTest,
-    check_asked,
     judge_and_smooth,
 )
 from motionmind.variation.stretches import cheapest_order
@@ -244,7 +244,7 @@ class Variation:
         whole_body: bool = False,
         on_progress: OnProgress | None = None,
         watch: Watch | None = None,
-        **options: Any,
+        **options: Unpack[SmoothOptions],
     ) -> Variation:
         """Judge the seams without a judgement, and smooth the abrupt ones without an insertion.
 
@@ -258,7 +258,7 @@ class Variation:
             whole_body: whether to judge whole bodies, and insert only whole bodies of the corpus.
             on_progress: called before each search with the numbers of searches done and in all.
             watch: as for `Engine.tween`; once it returns True, the remaining seams stay as they are.
-            options: the other arguments of `Engine.tween`.
+            options: see `vary`, and `seed`.
 
         Raises:
             SkeletonError: the piece and the corpus have different skeletons.
@@ -267,7 +267,8 @@ class Variation:
         """
         check_type("engine", engine, Engine)
         _check_watchers(whole_body, on_progress, watch)
-        check_asked(alternatives, options)
+        check_whole("alternatives", alternatives, 1)
+        check_options("smooth", options, SmoothOptions, self.smooth)
         inserted = {(seam.start, seam.end) for seam in self.seams if seam.insertion}
         known = {(seam.start, seam.end): seam.transition for seam in self.seams}  # once, however often it comes
         left = [pair for pair, one in known.items() if pair not in inserted and (one is None or one.is_abrupt)]
@@ -326,7 +327,7 @@ def vary(
     whole_body: bool = False,
     on_progress: OnProgress | None = None,
     watch: Watch | None = None,
-    **options: Any,
+    **options: Unpack[SeamOptions],
 ) -> Variation:
     """Vary a piece: order its postures as a trajectory passes the sites of another, nearby one.
 
@@ -354,7 +355,8 @@ def vary(
             move to where the piece resembles itself more (see `motionmind.variation.limits`); if no order meets it, the
             order that inserts least is taken. None for no limit.
         stretch: the least number of postures in each stretch of the piece; None for 4 if insertions are limited, or 1.
-        alternatives: see `Variation.smooth`, as for `whole_body`, `on_progress`, `watch` and `options`.
+        alternatives: see `Variation.smooth`, as for `whole_body`, `on_progress` and `watch`.
+        options: fields of `TweenRequest` and `SearchOptions`, for the tweens that smooth seams.
 
     Raises:
         MotionMindError: an argument is out of its range or refused by this order, a trajectory diverges or settles,
@@ -373,7 +375,8 @@ def vary(
     check_type("piece", piece, Motion, Piece)
     check_type("engine", engine, Engine, or_none=True)
     _check_watchers(whole_body, on_progress, watch)
-    check_asked(alternatives, options)
+    check_whole("alternatives", alternatives, 1)
+    check_options("vary", options, SeamOptions, vary)
     control = control_of(by, seed)
     trajectory: dict[str, Any] = {"flow": flow, "nudge": nudge, "depart": depart, "start": start}
     trajectory |= {"skip": skip, "step": step, "transient": transient}

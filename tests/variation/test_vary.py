@@ -234,7 +234,7 @@ def test_how_to_smooth_is_checked_where_nothing_is_smoothed(kata: Piece, karate:
     for engine in (None, karate):
         with pytest.raises(MotionMindError, match="alternatives must be a whole number from 1, not -3"):
             vary(kata, engine, nudge=0.0, alternatives=-3)
-        with pytest.raises(TypeError, match="'novelti' for smoothing seams; did you mean novelty"):
+        with pytest.raises(TypeError, match="vary has no option 'novelti'; did you mean novelty"):
             vary(kata, engine, nudge=0.0, novelti=1.0)
         with pytest.raises(TypeError, match="'unlike'"):
             vary(kata, engine, nudge=0.0, unlike=[])
