@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from motionmind.arguments import check_function, check_integer, check_type
+from motionmind.arguments import check_function, check_integer, check_text, check_type
 from motionmind.body.motion import Motion, Posture
 from motionmind.display import displayed
 from motionmind.errors import InfeasibleError, MotionMindWarning, NoPathError
@@ -140,16 +140,23 @@ class Engine(LearnedCorpus):
         return self._account_for(formulation, certificate, synthesised, seconds, what_if)
 
     def posture(self, name: str) -> Posture:
-        """Return a posture by name, such as "ballet/arabesque" or "clip.bvh@240": see `find_posture`.
+        """Return a posture by name, such as "arabesque", "adagio@23", "karate/yoi" or "clip.bvh@240".
+
+        A name without a slash or a dot belongs to the corpus of this engine's name, unless a file or a corpus has that
+        name. All others are as for `find_posture`, also the errors.
 
         >>> from motionmind import Engine
         >>> engine = Engine.load("ballet")
-        >>> engine.tween(engine.posture("ballet/arabesque"), engine.posture("ballet/fifth")).moves
+        >>> engine.tween(engine.posture("arabesque"), engine.posture("fifth")).moves
         7
         """
         from motionmind.names.postures import find_posture  # scores are slow to import
+        from motionmind.names.spelling import is_file, parse_posture
 
-        return find_posture(name).posture
+        check_text("name", name)
+        own, source = f"{self.corpus.name}/{name}", parse_posture(name).source
+        is_bare = source.kind == "file" and not {"/", "."} & set(source.place) and not is_file(source.place)
+        return find_posture(own if is_bare and parse_posture(own).source.kind == "corpus" else name).posture
 
     def alternatives(
         self,

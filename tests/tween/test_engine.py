@@ -654,6 +654,28 @@ def test_ends_may_be_found_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         engine.posture("ballet/arabesk")
 
 
+def test_a_bare_name_belongs_to_the_engines_corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    engine = Engine.load("ballet")
+    monkeypatch.chdir(tmp_path)
+    for name in ("arabesque", "adagio@23", "adagio@-1", "adagio@2.0s", "adagio@23~"):
+        own, full = engine.posture(name), find_posture(f"ballet/{name}").posture
+        np.testing.assert_array_equal(own.rotations, full.rotations)
+        np.testing.assert_array_equal(own.root, full.root)
+    with pytest.raises(MotionMindError, match=r"^ballet: no posture or clip 'arabesk'; did you mean arabesque\?$"):
+        engine.posture("arabesk")
+    with pytest.raises(MotionMindError, match=r"^hands: holds 3 clips"):  # a corpus
+        engine.posture("hands")
+    with pytest.raises(MotionMindError, match=r"^arabesque\.json: cannot be read: there is no such file"):
+        engine.posture("arabesque.json")
+    write_posture("arabesque.json", find_posture("ballet/fifth").posture)
+    Path("arabesque.json").rename("arabesque")
+    with pytest.raises(MotionMindError, match="suffix"):  # a file
+        engine.posture("arabesque")
+    fitted = Engine.fit([engine.corpus.motion(engine.corpus.clips[0])], name="fitted")
+    with pytest.raises(MotionMindError, match=r"^fifth: there is no such file or corpus; did you mean ballet/fifth\?$"):
+        fitted.posture("fifth")
+
+
 def test_a_name_in_place_of_a_posture_is_refused_with_what_finds_it() -> None:
     engine = Engine.load("ballet")
     b = engine.posture("ballet/fifth")
