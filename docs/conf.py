@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from pathlib import Path
-from typing import Any
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent), str(HERE / "_extensions")]
@@ -17,7 +15,14 @@ author = "The MotionMind authors"
 copyright = author  # noqa: A001 (Sphinx's name)
 release = version = motionmind.__version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "reference"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+    "docstrings",
+    "reference",
+]
 exclude_patterns = ["_build", "_extensions"]
 default_role = "code"
 smartquotes = False  # options begin with two hyphens
@@ -37,18 +42,3 @@ autodoc_preserve_defaults = True
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
-
-_SPAN = re.compile(r"(`[^`]*`)")
-
-
-def _quote_markup(app: object, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
-    """Escape what reStructuredText would take for markup: docstrings are prose with `code` in backticks."""
-    for number, line in enumerate(lines):
-        parts = _SPAN.split(line)
-        parts[::2] = [re.sub(r"([|*]|(?<=\w)_(?=\W|$))", r"\\\1", part) for part in parts[::2]]
-        lines[number] = "".join(parts)
-
-
-def setup(app: Any) -> None:
-    """Clean docstrings before napoleon reads their sections."""
-    app.connect("autodoc-process-docstring", _quote_markup, priority=100)

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from importlib import import_module
+from types import FunctionType
 from typing import Any, ClassVar
 
 import click
@@ -220,10 +221,16 @@ class PublicNames(SphinxDirective):
         grouped = {name for names in SUBJECTS.values() for name in names}
         for name in sorted(grouped ^ public_names()):
             _log.warning("docs/_extensions/reference.py: SUBJECTS and the public names differ in %s", name)
-        text = "\n\n".join(
-            "\n".join([f"## {subject}", *map(self._entry, names)]) for subject, names in SUBJECTS.items()
-        )
+        listed = (f"**{subject}**\n\n{self._list(names)}" for subject, names in SUBJECTS.items())
+        entries = ("\n".join([f"## {subject}", *map(self._entry, names)]) for subject, names in SUBJECTS.items())
+        text = "\n\n".join(["## Names", *listed, *entries])
         return self.parse_text_to_nodes(text, allow_section_headings=True)
+
+    @staticmethod
+    def _list(names: Iterable[str]) -> str:
+        """Return a table of names with links and first sentences."""
+        rows = "\n   ".join([".. autosummary::", ":nosignatures:", "", *names])
+        return _rest(f".. currentmodule:: motionmind\n\n{rows}\n\n.. currentmodule:: None")
 
     @staticmethod
     def _entry(name: str) -> str:
@@ -234,8 +241,24 @@ class PublicNames(SphinxDirective):
         elif issubclass(thing, Exception):
             kind, members = "exception", ""
         else:
-            kind, members = "class", "\n   :members:" + "\n   :inherited-members:" * (name == "Engine")
-        return f"\n```{{eval-rst}}\n.. auto{kind}:: {room}.{last}{members}\n```\n"
+            kind, members = "class", _inherited_methods(thing) if name == "Engine" else "\n   :members:"
+        return _rest(f".. auto{kind}:: {room}.{last}{members}")
+
+
+def _inherited_methods(thing: type) -> str:
+    """Return directives for a class's methods, those of its base classes first, in the order of their sources."""
+    names = {
+        name: None
+        for base in reversed(thing.__mro__)
+        for name, one in vars(base).items()
+        if not name.startswith("_") and isinstance(one, FunctionType | classmethod)
+    }
+    return "\n" + "".join(f"\n   .. automethod:: {name}" for name in names)
+
+
+def _rest(text: str) -> str:
+    """Return reStructuredText as a block of Markdown."""
+    return f"\n```{{eval-rst}}\n{text}\n```\n"
 
 
 class JsonSchema(SphinxDirective):

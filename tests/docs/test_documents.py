@@ -26,8 +26,11 @@ from command_line import Run
 from ingredients import altered
 from PIL import Image, ImageChops
 
+import motionmind
 from motionmind import __version__, write_motion
 from motionmind.cli import app
+from motionmind.corpus.gather import Gathering
+from motionmind.tween.request import SeamOptions, TweenOptions
 
 ROOT = Path(__file__).parents[2]
 README, GALLERY, REFERENCES = ROOT / "README.md", ROOT / "docs" / "gallery.md", ROOT / "docs" / "references.md"
@@ -436,3 +439,23 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     }
     assert [option for option in sorted(shown) if option.startswith("--") and option not in page] == []
     assert "motionmind corpus build" in page
+    assert [path.name for path in (tmp_path / "site").rglob("*.html") if "mailto:" in path.read_text("utf-8")] == []
+    check_python_page((tmp_path / "site" / "api.html").read_text("utf-8"))
+
+
+def check_python_page(page: str) -> None:
+    """Fail if the page on Python misses a name in its list, misses an option, or shows a private constructor."""
+    entries = {
+        name: re.sub(r"<[^>]*>", "", f"<{text}")
+        for name, text in re.findall(r'id="motionmind\.([\w.]+)"(.*?)(?=<dt class="sig|\Z)', page, re.S)
+    }
+    listed = page[: page.index('id="motionmind.')]
+    assert [name for name in motionmind.__all__ if f'href="#motionmind.{name}"' not in listed] == []
+    for function, options in (("Engine.fit", Gathering), ("Engine.tween", TweenOptions), ("vary", SeamOptions)):
+        found = set(re.findall(r"^(\w+) \(.* = .*\) -- \S", entries[function], re.M))
+        assert found == options.__annotations__.keys(), function
+    for name in ("Engine", "Corpus", "Tween", "TweenReport", "Variation", "discretize.StateSpace"):
+        assert "(" not in entries[name].split("\n")[1], name
+    for name in ("Motion", "Posture", "SearchOptions", "TweenRequest", "chaos.Flow"):
+        assert "(" in entries[name].split("\n")[1], name
+    assert "&lt;factory&gt;" not in page
