@@ -99,8 +99,10 @@ def find_flow(name: str, **parameters: float) -> Flow:
     """Return the registered flow of this name.
 
     Args:
-        name: one of `FLOWS`, or one that an installed package adds (an entry point in `motionmind.flows`).
-        parameters: values for some of its parameters; the others keep their defaults.
+        name: lorenz, rossler, chua, duffing, halvorsen, thomas, or one that an installed package adds (an entry point
+            in `motionmind.flows`).
+        parameters: values for some of its parameters, which `find_flow(name).parameters` lists; the others keep their
+            defaults.
 
     Raises:
         MotionMindError: there is no flow or no parameter of that name, or a value is not a finite number.
