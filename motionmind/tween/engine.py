@@ -199,7 +199,7 @@ class Engine(LearnedCorpus):
         >>> motion = engine.corpus.motion(engine.corpus.clips[0])
         >>> best, other = engine.alternatives(motion.posture(0), motion.posture(9), 2)
         >>> other.moves == best.moves, min(other.differs) >= 0.2, other.request.passage
-        (True, True, 'adagio@0.000s')
+        (True, True, 'sautes@6.467s')
         """
         check_integer("count", count)
         request = TweenRequest.of(request, **options)
