@@ -108,7 +108,7 @@ def print_tween(result: Tween, files: Sequence[Path], *, with_details: bool = Fa
     from motionmind.tween.headline import headline
 
     click.echo(headline(result))
-    _print_beyond(result)
+    _print_seen(result)
     for one in result.what_if:
         click.echo(f"without   {format_what_if(one)}")
     if with_details:
@@ -116,10 +116,12 @@ def print_tween(result: Tween, files: Sequence[Path], *, with_details: bool = Fa
     print_written(files)
 
 
-def _print_beyond(result: Tween, indent: str = "") -> None:
-    """Print each visible flaw, one per line."""
-    from motionmind.tween.headline import beyond
+def _print_seen(result: Tween, indent: str = "") -> None:
+    """Print the feet that stay in place, and each visible flaw, one per line."""
+    from motionmind.tween.headline import beyond, feet_staying
 
+    for sentence in feet_staying(result.motion):
+        click.echo(f"{indent}feet      {sentence}")
     for sentence in beyond(result):
         click.echo(f"{indent}warning   {sentence}")
 
@@ -239,7 +241,7 @@ def print_alternatives(results: Sequence[Tween], files: Sequence[Path], *, with_
         differs = ", ".join(f"{share:.0%}" for share in result.differs)
         passage = f"; follows {displayed(result.request.passage)}" if result.request.passage else ""
         click.echo(f"{number:2}  {headline(result)}{passage}{f'; differs by {differs}' if differs else ''}")
-        _print_beyond(result, "    ")
+        _print_seen(result, "    ")
     for one in results[0].what_if:
         click.echo(f"without   {format_what_if(one)}")
     if with_details:

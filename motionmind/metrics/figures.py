@@ -17,9 +17,10 @@ from motionmind.body.motion import Motion
 from motionmind.body.plausibility import at_rate
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError, SkeletonError
+from motionmind.grammar.grammar import Grammar
 from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.plausibility import MEASURES, UNITS_AND_MEANINGS, summarise_shown
-from motionmind.metrics.paths import Habits, arrival_spread, learn_habits
+from motionmind.metrics.paths import Habits, arrival_spread, attested_share, learn_habits
 from motionmind.metrics.smoothness import angular_jerk, angular_speed, sparc
 from motionmind.metrics.style import WINDOW_FRAMES, Styles, features, learn_styles
 from motionmind.metrics.verbatim import MAX_NGRAM, Phrasebook, learn_phrases
@@ -168,7 +169,8 @@ def measure(motion: Motion, learned: LearnedCorpus, path: States | None = None) 
     clips = [at_rate(corpus.recording(clip)) for clip in corpus.clips]
     seen = [features(clip.rotations) for clip in clips]
     fastest = learned.plausibility.fastest
-    own = _measure_motion(sampled, _learn_style(seen, None), fastest) | _measure_path(path, habits, phrases, None)
+    own = _measure_motion(sampled, _learn_style(seen, None), fastest)
+    own |= _measure_path(path, learned.grammar, habits, phrases, None)
     frames = min(len(sampled), max(sum(map(len, clips)) // 10, _MIN_FRAMES))
     postures = min(len(path), max(len(corpus) // 10, 2))
     rows = [*_measure_clips(clips, seen, frames, fastest), *_measure_clip_paths(learned, postures, habits, phrases)]
@@ -230,13 +232,15 @@ def _measure_motion(motion: Motion, style: Styles | None, fastest: Floats) -> di
     return out
 
 
-def _measure_path(path: States, habits: Habits, phrases: Phrasebook, clip: int | None) -> dict[str, float]:
+def _measure_path(
+    path: States, grammar: Grammar, habits: Habits, phrases: Phrasebook, clip: int | None
+) -> dict[str, float]:
     """Measure a path of states; `clip` is the clip of the corpus that it comes from, if any."""
     runs = phrases.runs(path, clip) or [0]
     return {
         "moves": float(len(path) - 1),
         "arrival_spread": arrival_spread(path),
-        "attested": _mean(habits.attested(path)),
+        "attested": attested_share(path, grammar),
         "log_likelihood": _mean(habits.log_likelihoods(path)),
         "cliche_rate": _mean(habits.cliches(path)),
         "frequency": _mean(habits.percentiles(path)),
@@ -272,7 +276,7 @@ def _measure_clip_paths(
     states, clips = np.asarray(learned.states), learned.corpus.clips
     for number, start in _pieces([len(clip) for clip in clips], postures, 2):
         path = states[clips[number].start : clips[number].stop][start : start + postures]
-        found = _measure_path(path, habits, phrases, number)
+        found = _measure_path(path, learned.grammar, habits, phrases, number)
         del found["moves"]  # the piece's length was chosen, not measured
         if len(clips) == 1:  # no other clip to copy from
             found = {name: value for name, value in found.items() if not name.endswith("run") and "copied" not in name}

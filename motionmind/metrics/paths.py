@@ -37,6 +37,22 @@ def arrival_spread(path: States) -> float:
     return float(arrivals(path)[moving].std()) if moving.sum() > 1 else 0.0
 
 
+def attested_share(path: States, grammar: Grammar) -> float:
+    """Return the share of the joints' transitions, holds included, that the corpus attests; NaN for a single posture.
+
+    Args:
+        path: states of the grammar's chains [T + 1, L].
+        grammar: what was learned from the corpus.
+    """
+    edges = grammar.transitions.edges(path)[:, : _count_joints(grammar)]
+    return float(np.mean(edges >= 0)) if edges.size else float("nan")
+
+
+def _count_joints(grammar: Grammar) -> int:
+    """Return the number of chains that are joints; they come before the facing."""
+    return len(grammar.chains) - (grammar.chains[-1] == FACING)
+
+
 @dataclass(frozen=True, eq=False)
 class Habits:
     """A corpus's usual moves: statistics of its E transitions between G states. Holds do not count as moves.
@@ -89,10 +105,6 @@ class Habits:
         _, edges, _ = self._moves(path)
         return self.log_likelihood[edges[edges >= 0]]
 
-    def attested(self, path: States) -> Bools:
-        """Tell, for each transition of a joint in a path [T + 1, L], holds included, whether the corpus attests it."""
-        return (self._moves(path)[1] >= 0).ravel()
-
     def _moves(self, path: States) -> tuple[Bools, Ints, Ints]:
         """Return whether each joint moves, its transition or -1, and the row of the state left, each [T, joints]."""
         graph = self.transitions
@@ -124,7 +136,7 @@ def learn_habits(grammar: Grammar) -> Habits:
         share = np.bincount(which, weights=graph.counts[mine], minlength=len(seen))
         percentile[mine] = (100.0 * (np.cumsum(share) - 0.5 * share) / max(share.sum(), 1e-300))[which]
     return Habits(
-        len(grammar.chains) - (grammar.chains[-1] == FACING),
+        _count_joints(grammar),
         graph,
         is_hold,
         np.bincount(sources[move], minlength=len(graph.visits)) > 1,

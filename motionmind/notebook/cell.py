@@ -18,7 +18,7 @@ from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.render.markup import base64_of
 from motionmind.render.page import page
-from motionmind.tween.headline import beyond, headline
+from motionmind.tween.headline import beyond, feet_staying, headline
 from motionmind.tween.result import Tween
 from motionmind.variation.piece import Piece
 from motionmind.variation.variation import Variation
@@ -33,7 +33,9 @@ def html_of(movement: Movement) -> str:
 
     Text above it summarises a tween or a variation. Movement that is too long for a cell gets a message instead.
     """
-    words = [headline(movement), *beyond(movement)] if isinstance(movement, Tween) else []
+    words: list[str] = []
+    if isinstance(movement, Tween):
+        words += [headline(movement), *feet_staying(movement.motion), *beyond(movement)]
     words += [repr(movement)] if isinstance(movement, Variation) else []
     motion = motion_of(movement)
     try:

@@ -20,6 +20,7 @@ from motionmind.errors import InfeasibleError, MotionMindWarning, NoPathError
 from motionmind.geometry.splines import rotation_spline
 from motionmind.learned import graphs, summary
 from motionmind.learned.model import LearnedCorpus
+from motionmind.metrics.paths import attested_share
 from motionmind.search.diverse import TooSimilarError, difference, solve_diverse
 from motionmind.search.problem import places
 from motionmind.search.sample import sample_path
@@ -340,6 +341,7 @@ class Engine(LearnedCorpus):
         # Use a spline: a move may fall between two frames, and the arc between them cuts the corner.
         reached = rotation_spline(motion.times, motion.rotations, motion.insertions[0].times)
         path_degrees = self.space.distance(self.corpus.to_chains(reached), path)
+        moved = self.space.assign(self.corpus.to_chains(motion.at(motion.insertions[0].times).rotations))
         followed = path_degrees <= self.space.tolerances + FOLLOWED_SLACK_DEG
         shown = sources_followed(sources, followed)
         found = tuple(sources_of(self.corpus, begins, np.minimum(begins + 1, last), [""] * len(begins)))
@@ -351,6 +353,7 @@ class Engine(LearnedCorpus):
             cost=certificate.cost,
             lower_bound=certificate.lower_bound,
             attested=attested,
+            motion_attested=attested_share(moved, self.grammar) if len(moved) > 1 else None,
             bridges=bridges,
             waits=waits,
             differs=tuple(difference(path, other.path) for other in request.unlike),

@@ -32,7 +32,9 @@ _RESIDUAL_WORDS = {
 
 
 def headline(tween: Tween) -> str:
-    """Summarise a tween in a line: length, proof, attestation, how closely the motion follows the path, and the feet.
+    """Summarise a tween in a line: length, proof of the path, how much of it the motion follows, and what is attested.
+
+    The path of states and the motion that is seen have separate sentences: a proof holds for the path alone.
 
     >>> from motionmind import Engine
     >>> from motionmind.tween.headline import headline
@@ -41,14 +43,14 @@ def headline(tween: Tween) -> str:
     >>> for sentence in headline(engine.tween(motion.posture(0), motion.posture(3))).split(". "):
     ...     print(sentence)
     5 moves, 2.0 s
-    Path optimal; every transition occurs in ballet
-    Motion follows it in 85% of joint-moves; feet stay in place
+    Path proven optimal, all from ballet
+    Motion follows 85% of it; 97% of its own transitions occur in ballet
     """
     if tween.moves == 0:
         return "no move: A and B are the same posture"
-    path = f"{_count(tween.moves, 'move')}, {tween.motion.times[-1]:.1f} s. {_proof(tween)}; {attestation(tween)}"
+    length = f"{_count(tween.moves, 'move')}, {tween.motion.times[-1]:.1f} s"
     share = tween.followed[1:-1].mean() if tween.moves > 1 else 1.0  # A and B themselves are exact
-    return "; ".join([f"{path}. Motion follows it in {share:.0%} of joint-moves", *feet_staying(tween.motion)])
+    return f"{length}. {_proof(tween)}, {_origin(tween)}. Motion follows {share:.0%} of it; {attestation(tween)}"
 
 
 def beyond(tween: Tween) -> list[str]:
@@ -84,14 +86,25 @@ def shown_beyond(name: str, one: Sighting) -> str:
 
 
 def attestation(tween: Tween) -> str:
-    """Describe whether the corpus attests the transitions of joints: "every transition occurs in ballet"."""
-    sources = (source for row in tween.sources for source in row if source is not None)
-    times = Counter(source.corpus for source in sources)
-    corpora = enumerated((displayed(name) for name, _ in times.most_common()), 3) or "the corpus"
+    """Describe how much of the motion the corpus attests: "90% of its own transitions occur in ballet"."""
+    if tween.motion_attested is None:
+        return "nothing moves"
+    return f"{tween.motion_attested:.0%} of its own transitions occur in {_corpora(tween)}"
+
+
+def _origin(tween: Tween) -> str:
+    """Describe where the path's transitions come from: "all from ballet except 2 transitions of neck"."""
+    origin = f"all from {_corpora(tween)}"
     if not tween.bridges:
-        return f"every transition occurs in {corpora}"
-    joints = dict.fromkeys(displayed(bridge.joint) for bridge in tween.bridges)
-    return f"every transition occurs in {corpora} except {len(tween.bridges)} of {enumerated(joints, 3)}"
+        return origin
+    joints = enumerated(dict.fromkeys(displayed(bridge.joint) for bridge in tween.bridges), 3)
+    return f"{origin} except {_count(len(tween.bridges), 'transition')} of {joints}"
+
+
+def _corpora(tween: Tween) -> str:
+    """Name the corpora that attest the path, the most frequent first."""
+    times = Counter(source.corpus for row in tween.sources for source in row if source is not None)
+    return enumerated((displayed(name) for name, _ in times.most_common()), 3) or "the corpus"
 
 
 def _proof(tween: Tween) -> str:
@@ -100,7 +113,7 @@ def _proof(tween: Tween) -> str:
     if tween.status == "sampled":
         return "Path sampled"
     if tween.status == "optimal":
-        return f"Path optimal{rivals}"
+        return f"Path proven optimal{rivals}"
     ended = " (interrupted)" * (tween.status == "interrupted")
     if tween.lower_bound <= 0.0:
         return f"Path without a proven bound{ended}"
@@ -119,7 +132,7 @@ def feet_staying(motion: Motion) -> list[str]:
     if not staying:
         return []
     if len(staying) == len(feet):
-        return ["feet stay in place"]
+        return [f"{'both' if len(feet) == 2 else f'all {len(feet)}'} feet stay in place"]
     side = staying[0].partition("_")[0]
     if len(feet) == 2 and side in ("left", "right"):
         return [f"the {side} foot stays in place"]

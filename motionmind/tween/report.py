@@ -60,7 +60,9 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         seconds: measured seconds for each step.
         joints: names of the joint chains [L].
         path: states [T + 1][L].
-        attested: share of the joints' moves that the corpus attests.
+        attested: share of the path's moves of joints that the corpus attests.
+        motion_attested: share of the motion's own transitions that the corpus attests, between the joints' states at
+            the times of the moves, as `measure` counts them; null if nothing moves.
         bridges: moves that the corpus does not attest.
         waits: moves spent waiting at the goal.
         differs: share of the joints' states between A and B that differ from each tween in `unlike`.
@@ -112,6 +114,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     joints: list[str]
     path: list[list[int]]
     attested: float
+    motion_attested: float | None
     bridges: list[Bridge]
     waits: list[Wait]
     differs: list[float]

@@ -37,7 +37,9 @@ class Tween:
             the search, "sampled" if the path was sampled.
         cost: cost of the path, nats.
         lower_bound: no path that fulfils the request costs less, nats.
-        attested: share of the joints' moves that the corpus attests.
+        attested: share of the path's moves of joints that the corpus attests.
+        motion_attested: share of the motion's own transitions that the corpus attests, between the joints' states at
+            the times of the moves, as `motionmind.metrics.measure` counts them; None if nothing moves.
         bridges: the moves that the corpus does not attest, except waits.
         waits: moves spent waiting at the goal.
         differs: share of the joints' states between A and B that differ from each tween in `unlike` [K].
@@ -83,6 +85,7 @@ class Tween:
     cost: float
     lower_bound: float
     attested: float
+    motion_attested: float | None
     bridges: tuple[Bridge, ...]
     waits: tuple[Wait, ...]
     differs: tuple[float, ...]
@@ -189,6 +192,7 @@ def report_of(tween: Tween, motion_sha256: str | None = None) -> TweenReport:
         joints=list(tween.joints),
         path=tween.path.tolist(),
         attested=tween.attested,
+        motion_attested=tween.motion_attested,
         bridges=list(tween.bridges),
         waits=list(tween.waits),
         differs=list(tween.differs),

@@ -467,7 +467,7 @@ def test_from_files_to_a_tween_on_the_command_line(tmp_path: Path, monkeypatch: 
     assert (info["skeleton"], len(info["joints"])) == ("human44", 44)
     assert "on human44 (44 joints)" in run("posture fist.json --frame 12 -o A.json")
     assert "44 joints" in run("posture toes.bvh --frame 6 -o B.bvh")
-    assert "Path optimal; " in run("tween A.json B.bvh --corpus mine -o tween.json --strict")
+    assert "Path proven optimal, " in run("tween A.json B.bvh --corpus mine -o tween.json --strict")
     assert BODY.difference(read_motion("tween.json").skeleton) is None
     assert "44 joints" in run("convert tween.json tween.txt")
     assert read_motion("tween.txt").skeleton is BODY

@@ -28,7 +28,7 @@ REPORT = {
     *("expansions", "peak_nodes", "node_budget", "seconds", "joints", "path"),
     *("attested", "bridges", "waits", "differs", "what_if", "vias", "snap_degrees", "path_degrees", "followed"),
     *("sources", "detail", "left_out", "shown", "times", "names", "degrees", "likelihood", "costs", "credits"),
-    *("motion_sha256", "gave"),
+    *("motion_sha256", "gave", "motion_attested"),
 }
 
 
@@ -49,6 +49,7 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
     table.pop("warning", None)  # where it goes beyond the corpus
     assert list(table) == [
         "7",
+        "feet",
         "moves",
         "pace",
         "cost",
@@ -77,9 +78,10 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
 def test_a_tween_is_summarised_in_a_line_and_a_missing_output_reported(run: Run) -> None:
     ran = run("tween", ARABESQUE, FIFTH, "--corpus", "ballet")
     summary, *rest = ran.out.splitlines()
-    proof = r"Path optimal; every transition occurs in ballet\. Motion follows it in \d+% of joint-moves"
-    assert re.fullmatch(rf"7 moves, \d\.\d s\. {proof}; the left foot stays in place", summary)
-    assert rest == ["written   nothing (-o FILE writes the result)"]
+    proof = r"Path proven optimal, all from ballet"
+    motion = r"Motion follows \d+% of it; \d+% of its own transitions occur in ballet"
+    assert re.fullmatch(rf"7 moves, \d\.\d s\. {proof}\. {motion}", summary)
+    assert rest == ["feet      the left foot stays in place", "written   nothing (-o FILE writes the result)"]
 
 
 @pytest.mark.parametrize(

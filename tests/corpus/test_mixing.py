@@ -319,7 +319,7 @@ def test_a_corpus_is_built_of_files_and_another_corpus_and_tells_it(run: Run) ->
     write_posture("B.json", dance("spin", 2).posture(3))
     tween = run("tween", "A.json", "B.json", "--corpus", "mine", "--report", "report.json", "--details")
     assert tween.code == 0
-    assert re.search(r" occurs in (mine, theirs|theirs, mine)\b", tween.out)
+    assert re.search(r" occur in (mine, theirs|theirs, mine)\b", tween.out)
     assert "transitions occur in the corpus: " in tween.out
     sources = [source for row in json.loads(Path("report.json").read_text("utf-8"))["sources"] for source in row]
     assert {source["corpus"] for source in sources if source} == {"mine", "theirs"}

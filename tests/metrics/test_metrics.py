@@ -24,7 +24,7 @@ from motionmind.formats import read_motion, write_motion
 from motionmind.geometry import rotations as rot
 from motionmind.metrics.figures import _pieces, at_rate, measure
 from motionmind.metrics.inbetween import l2p, l2q, npss, position_spread, seen
-from motionmind.metrics.paths import arrival_spread, arrivals, learn_habits
+from motionmind.metrics.paths import arrival_spread, arrivals, attested_share, learn_habits
 from motionmind.metrics.smoothness import angular_jerk, angular_speed, sparc
 from motionmind.metrics.style import features, fit_style_classifier
 from motionmind.metrics.verbatim import learn_phrases
@@ -285,7 +285,7 @@ def test_arrivals_are_the_first_postures_after_which_nothing_changes(seed: int) 
 def test_of_the_corpus_itself_all_is_attested_and_the_mean_percentile_is_fifty(engine: Engine) -> None:
     habits = learn_habits(engine.grammar)
     paths = own_paths(engine)
-    assert all(habits.attested(path).all() for path in paths)
+    assert all(attested_share(path, engine.grammar) == 1.0 for path in paths)
     assert np.concatenate([habits.percentiles(path) for path in paths]).mean() == pytest.approx(50.0)
     # A corpus is as likely as its transitions' entropy says.
     counts, graph = engine.grammar.transitions.counts, engine.grammar.transitions
@@ -322,7 +322,9 @@ def test_a_move_that_nobody_made_is_no_cliche(engine: Engine) -> None:
     assert path[1, chain] not in known
     assert habits.percentiles(path).tolist() == [0.0]
     assert not habits.cliches(path).any()
-    assert not habits.attested(path)[chain]
+    joints = len(engine.corpus.skeleton)
+    others = np.delete(engine.grammar.transitions.edges(path)[:, :joints] >= 0, chain)
+    assert attested_share(path, engine.grammar) == pytest.approx(others.sum() / joints)
 
 
 # --- what is copied ---------------------------------------------------------------------------------------------------
@@ -430,6 +432,8 @@ def test_a_tween_is_measured_by_the_states_that_it_passes(engine: Engine) -> Non
     )
     for figure in found.values():
         assert not figure.low > figure.high
+    own = measure(tween.motion, engine)["attested"].value  # of the motion, not of the path
+    assert tween.motion_attested == own < found["attested"].value
     slow = engine.tween(*ends, moves=4, duration=2.9)  # at the corpus's pace that would be 14 moves
     assert measure(slow.motion, engine)["moves"].value == 4
 

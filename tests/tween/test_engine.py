@@ -261,6 +261,7 @@ REPORT = [
     "joints",
     "path",
     "attested",
+    "motion_attested",
     "bridges",
     "waits",
     "differs",
