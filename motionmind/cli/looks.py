@@ -17,12 +17,15 @@ from motionmind.display import displayed, displayed_path, printable
 
 @command("motionmind explain report.json")
 @click.argument("report", type=FILE)
+@option(
+    "--all", "everything", section=Section.OUTPUT, is_flag=True, help="Print every joint, with its likelihood and cost."
+)
 @JSON
-def explain(report: Path, as_json: bool) -> None:
+def explain(report: Path, everything: bool, as_json: bool) -> None:
     """Explain a tween, move by move.
 
-    For each move: the joints that move, the probability, and the source in the corpus. REPORT is a file from tween
-    --report; if the tween found no path, the command prints the reason.
+    For each move: the body parts that turn farthest, their new states or directions, and the source in the corpus.
+    REPORT is a file from tween --report; if the tween found no path, the command prints the reason.
     """
     import msgspec
 
@@ -34,7 +37,10 @@ def explain(report: Path, as_json: bool) -> None:
         click.echo(json.dumps(msgspec.to_builtins(found)) if as_json else printable(found.message))
         return
     explanation = explain(found)
-    click.echo(json.dumps(explanation.plain()) if as_json else str(explanation))
+    if as_json:
+        click.echo(json.dumps(explanation.plain()))
+    else:
+        click.echo(explanation.details() if everything else str(explanation))
 
 
 @command("motionmind graph --corpus ballet --joint left_shoulder -o graph.svg")

@@ -9,6 +9,7 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.body.motion import Motion
+from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import FACING, Corpus
 from motionmind.credits.credit import Credit, add_up
 from motionmind.discretize.states import StateSpace
@@ -17,12 +18,13 @@ from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.rows import searchsorted_rows
 from motionmind.search.problem import Problem, places
+from motionmind.tween.changes import describe_changes
 from motionmind.tween.problem import TRANSITION, WAIT, kinds_of
 
 
 @dataclass(frozen=True, eq=False)
 class CostBreakdown:
-    """The parts of the cost of a path of T moves of L chains; all but `likelihood`, `degrees` and `names` add up to it.
+    """The parts of the cost of a path of T moves of L chains: `moves`, `coordination`, `guide` and `per_move` add up.
 
     Attributes:
         moves: nats for each chain's move, bridge or wait [T, L].
@@ -33,6 +35,7 @@ class CostBreakdown:
         likelihood: P(next state | state), as counted in the corpus; 0 where it attests no such move [T, L].
         degrees: the angle between the two states [T, L].
         names: names of the states of each posture [T + 1][L].
+        changes: each chain's move in words: the new state's name, or the direction without one; "" if still [T][L].
     """
 
     moves: Floats
@@ -42,6 +45,7 @@ class CostBreakdown:
     likelihood: Floats
     degrees: Floats
     names: tuple[tuple[str, ...], ...]
+    changes: tuple[tuple[str, ...], ...]
 
     @property
     def total(self) -> float:
@@ -54,6 +58,7 @@ def break_down_cost(
     problem: Problem,
     grammar: Grammar,
     space: StateSpace,
+    skeleton: Skeleton,
     network: Coordination,
     factor: float,
 ) -> CostBreakdown:
@@ -64,6 +69,7 @@ def break_down_cost(
         problem: the problem that was searched, whose costs come from the grammar.
         grammar: the learned grammar.
         space: the states of each chain.
+        skeleton: the body.
         network: the coordination network over the problem's states.
         factor: factor of the network's -log P in the problem's costs.
     """
@@ -82,7 +88,8 @@ def break_down_cost(
     orientations = space.decode(at)
     degrees = np.degrees(rot.angle(orientations[:-1], orientations[1:]))
     names = tuple(tuple(space.label(chain, state) for chain, state in enumerate(row)) for row in at.tolist())
-    return CostBreakdown(moves, together, guide, problem.rules.per_move, likelihood, degrees, names)
+    changes = describe_changes(space, skeleton, at, orientations)
+    return CostBreakdown(moves, together, guide, problem.rules.per_move, likelihood, degrees, names, changes)
 
 
 @dataclass(frozen=True)

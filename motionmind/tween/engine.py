@@ -327,6 +327,7 @@ class Engine(LearnedCorpus):
             searched,
             self.grammar,
             self.space,
+            self.corpus.skeleton,
             formulation.coordination,
             search.coordination_factor,
         )

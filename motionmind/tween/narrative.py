@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from itertools import groupby
 from typing import Any, Literal
 
 import msgspec
 
 from motionmind.arguments import check_type
+from motionmind.body.plausibility import NOTICEABLE_DEG
 from motionmind.display import displayed
 from motionmind.tween.certificate import Source
 from motionmind.tween.report import TweenReport
 from motionmind.tween.result import Tween, report_of
+
+_PAGE_ROWS, _MAX_PARTS = 30, 3  # rows of a page for all moves, and for one
 
 
 class JointStep(msgspec.Struct, frozen=True):
@@ -20,10 +24,12 @@ class JointStep(msgspec.Struct, frozen=True):
 
     Attributes:
         joint: the joint's name.
+        part: its body part, such as "left arm".
         before: name of the state before the move.
         after: name of the state after it.
         moved: whether the two states differ.
         degrees: angle between them.
+        change: the move in words: "to second" by the new state's name, "toward flexion" without one; "" if still.
         how: whether the corpus attests the move, or it is a wait at the goal, or a bridge.
         likelihood: P(next state | state), as counted in the corpus; 0 if it attests no such move.
         cost: cost of the move, nats.
@@ -34,10 +40,12 @@ class JointStep(msgspec.Struct, frozen=True):
     """
 
     joint: str
+    part: str
     before: str
     after: str
     moved: bool
     degrees: float
+    change: str
     how: Literal["attested", "wait", "bridge"]
     likelihood: float
     cost: float
@@ -73,6 +81,8 @@ class Explanation(msgspec.Struct, frozen=True):
         cost: cost of the path, nats.
         lower_bound: proven lower bound of the cost, nats.
         gap: gap between the two, as a share of the cost.
+        followed: share of joints' states between A and B that the motion is within the tolerance of.
+        motion_attested: share of the motion's own transitions that the corpus attests; None if nothing moves.
         seconds: length of the motion.
         moved: part of the cost for the joints' moves, nats.
         coordinated: part of the cost for the coordination of joints, nats.
@@ -92,6 +102,8 @@ class Explanation(msgspec.Struct, frozen=True):
     cost: float
     lower_bound: float
     gap: float
+    followed: float
+    motion_attested: float | None
     seconds: float
     moved: float
     coordinated: float
@@ -105,7 +117,11 @@ class Explanation(msgspec.Struct, frozen=True):
         return values
 
     def __str__(self) -> str:
-        """Return the explanation as text: for each move, the joints that move, farthest first."""
+        """Return the explanation as a page of text: for each move, the body parts that turn farthest, and where to."""
+        return "\n".join(_page(self))
+
+    def details(self) -> str:
+        """Return all of the explanation as text: for each move, every joint, its likelihood, cost and source."""
         return "\n".join(_lines(self))
 
 
@@ -132,6 +148,8 @@ def explain(tween: Tween | TweenReport) -> Explanation:
         report.cost,
         report.lower_bound,
         report.gap,
+        _share_followed(report),
+        report.motion_attested,
         report.times[-1] - report.times[0],
         sum(map(sum, costs.moves)),
         sum(map(sum, costs.coordination)),
@@ -141,6 +159,12 @@ def explain(tween: Tween | TweenReport) -> Explanation:
     )
 
 
+def _share_followed(report: TweenReport) -> float:
+    """Return the share of states between A and B, which are exact, that the motion follows; 1 if there are none."""
+    inner = [is_near for row in report.followed[1:-1] for is_near in row]
+    return sum(inner) / len(inner) if inner else 1.0
+
+
 def _step(report: TweenReport, t: int, j: int) -> JointStep:
     """Return joint j's part in move t."""
     joint = report.joints[j]
@@ -148,10 +172,12 @@ def _step(report: TweenReport, t: int, j: int) -> JointStep:
     is_wait = any((wait.joint, wait.move) == (joint, t) for wait in report.waits)
     return JointStep(
         joint,
+        report.parts[j],
         report.names[t][j],
         report.names[t + 1][j],
         report.path[t][j] != report.path[t + 1][j],
         report.degrees[t][j],
+        report.changes[t][j],
         "bridge" if is_bridge else "wait" if is_wait else "attested",
         report.likelihood[t][j],
         report.costs.moves[t][j],
@@ -160,6 +186,54 @@ def _step(report: TweenReport, t: int, j: int) -> JointStep:
         report.followed[t][j] and report.followed[t + 1][j] if report.followed else True,
         report.sources[t][j],
     )
+
+
+def _page(explanation: Explanation) -> Iterator[str]:
+    """Yield the lines of a page: a summary, and for each move the body parts that turn farthest."""
+    count = len(explanation.moves)
+    proof = "optimal" if explanation.status == "optimal" else f"{explanation.status}, gap {explanation.gap:.1%}"
+    line = f"{count} move{'s' * (count != 1)} in {explanation.seconds:.2f} s; path {proof}"
+    if explanation.motion_attested is not None:
+        line += f"; motion follows {explanation.followed:.0%} of it, "
+        line += f"{explanation.motion_attested:.0%} of its own transitions attested"
+    yield line
+    most = max(1, min(_MAX_PARTS, _PAGE_ROWS // max(count, 1)))
+    found = [(move, _part_rows(move, most)) for move in explanation.moves]
+    width = max([len(part) for _, rows in found for part, _ in rows], default=0)
+    for is_still, moves in groupby(found, key=lambda one: not one[1]):
+        spans = list(moves)
+        if is_still:
+            spans = [(msgspec.structs.replace(spans[0][0], ends=spans[-1][0].ends), [("still", "")])]
+        for move, rows in spans:
+            time = f"{move.begins:.2f} to {move.ends:.2f} s"
+            for row, (part, words) in enumerate(rows):
+                yield f"{'' if row else time:{len(time)}}  {part:{width}}  {words}".rstrip()
+
+
+def _part_rows(move: ExplainedMove, most: int) -> list[tuple[str, str]]:
+    """Return `most` body parts of a move and the turns of their joints in words, farthest first; then the others."""
+    parts: dict[str, list[JointStep]] = {}
+    for step in sorted(move.joints, key=lambda step: -step.degrees):
+        if step.moved and step.degrees >= NOTICEABLE_DEG:
+            parts.setdefault(step.part, []).append(step)
+    rows = [(displayed(part), _describe_part(part, steps)) for part, steps in list(parts.items())[:most]]
+    return rows + ([("also", ", ".join(map(displayed, list(parts)[most:])))] if len(parts) > most else [])
+
+
+def _describe_part(part: str, steps: list[JointStep]) -> str:
+    """Describe a body part's turns: "elbow 34 degrees to ajar (plies, 2.9 s); shoulder 22"."""
+    side = part.partition(" ")[0]
+    names = [displayed(step.joint.removeprefix(f"{side}_")) for step in steps]
+    first, *others = (f"{name} {step.degrees:.0f}" for name, step in zip(names, steps, strict=True))
+    words = f"{first} degrees {displayed(steps[0].change)}".rstrip() + f" ({_evidence(steps[0])})"
+    return "; ".join([words, ", ".join(others)]) if others else words
+
+
+def _evidence(step: JointStep) -> str:
+    """Return where a step was recorded, or why it has no source."""
+    if step.source is None:
+        return "in no clip" if step.how == "bridge" else "not reached in the motion"
+    return f"{displayed(step.source.clip)}, {step.source.seconds:.1f} s"
 
 
 def _lines(explanation: Explanation) -> Iterator[str]:

@@ -59,6 +59,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         node_budget: number of nodes that A* was allowed to hold.
         seconds: measured seconds for each step.
         joints: names of the joint chains [L].
+        parts: body part of each joint chain, such as "left arm" [L].
         path: states [T + 1][L].
         attested: share of the path's moves of joints that the corpus attests.
         motion_attested: share of the motion's own transitions that the corpus attests, between the joints' states at
@@ -83,6 +84,8 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         times: times of the moves [T + 1], seconds.
         names: names of the states [T + 1][L].
         degrees: angle of each joint's move [T][L].
+        changes: each joint's move in words: "to second" by the new state's name, "toward flexion" without one; "" if
+            still [T][L].
         likelihood: P(next state | state) of each joint's move; 0 if unattested [T][L].
         costs: the parts of the cost.
         credits: the sources of the movement, by share.
@@ -112,6 +115,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     node_budget: int
     seconds: dict[str, float]
     joints: list[str]
+    parts: list[str]
     path: list[list[int]]
     attested: float
     motion_attested: float | None
@@ -131,6 +135,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     times: list[float]
     names: list[list[str]]
     degrees: list[list[float]]
+    changes: list[list[str]]
     likelihood: list[list[float]]
     costs: ReportedCosts
     credits: Ledger
@@ -142,7 +147,8 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         tables: list[tuple[Sequence[Sequence[object]], int]] = [(self.path, moves + 1), (self.names, moves + 1)]
         tables.append((self.followed, moves + 1))
         costs = (self.costs.moves, self.costs.coordination, self.costs.guide)
-        tables += [(table, moves) for table in (self.sources, self.degrees, self.likelihood, *costs)]
+        tables += [(table, moves) for table in (self.sources, self.degrees, self.changes, self.likelihood, *costs)]
+        tables.append(([self.parts], 1))
         if any(len(table) != rows or any(len(row) != joints for row in table) for table, rows in tables):
             raise ValueError(f"its tables are not of {moves} moves of {joints} joints")
         if moves < 0 or len(self.times) != moves + 1:

@@ -19,6 +19,7 @@ from motionmind.search.problem import Problem, Via
 from motionmind.search.solve import Status
 from motionmind.solver.residual import Residual
 from motionmind.tween.certificate import Bridge, CostBreakdown, Source, Wait, gap_of
+from motionmind.tween.changes import name_parts
 from motionmind.tween.pacing import Tempo, UsualTime
 from motionmind.tween.report import PassedPosture, ReportedCosts, TweenReport, plain
 from motionmind.tween.request import TweenRequest
@@ -190,6 +191,7 @@ def report_of(tween: Tween, motion_sha256: str | None = None) -> TweenReport:
         node_budget=tween.node_budget,
         seconds=tween.seconds,
         joints=list(tween.joints),
+        parts=list(name_parts(tween.motion.skeleton, tween.joints)),
         path=tween.path.tolist(),
         attested=tween.attested,
         motion_attested=tween.motion_attested,
@@ -209,6 +211,7 @@ def report_of(tween: Tween, motion_sha256: str | None = None) -> TweenReport:
         times=tween.motion.insertions[0].times.tolist(),
         names=[list(row) for row in costs.names],
         degrees=costs.degrees.tolist(),
+        changes=[list(row) for row in costs.changes],
         likelihood=costs.likelihood.tolist(),
         costs=ReportedCosts(costs.moves.tolist(), costs.coordination.tolist(), costs.per_move, costs.guide.tolist()),
         credits=ledger_of(tween.credits),

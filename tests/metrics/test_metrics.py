@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from dataclasses import replace
 from itertools import pairwise
@@ -22,7 +23,7 @@ from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.formats import read_motion, write_motion
 from motionmind.geometry import rotations as rot
-from motionmind.metrics.figures import _pieces, at_rate, measure
+from motionmind.metrics.figures import MAIN_FIGURES, _pieces, at_rate, measure
 from motionmind.metrics.inbetween import l2p, l2q, npss, position_spread, seen
 from motionmind.metrics.paths import arrival_spread, arrivals, attested_share, learn_habits
 from motionmind.metrics.smoothness import angular_jerk, angular_speed, sparc
@@ -494,13 +495,17 @@ def test_the_command_prints_what_is_measured(run: Run, engine: Engine) -> None:
     for name, figure in found.items():
         expected = [number if np.isfinite(number) else None for number in (figure.value, figure.low, figure.high)]
         assert [figures[name][key] for key in ("value", "low", "high")] == pytest.approx(expected), name
-    shown = run("measure", "tween.json", "--corpus", "random", "--report", "report.json")
-    assert shown.code == 0
-    lines = shown.out.splitlines()[2:]
-    assert [line.split("  ")[0].replace(" ", "_") for line in lines] == list(found)
-    for line, figure in zip(lines, found.values(), strict=True):
-        assert (">" in line[:40]) == (figure.value > figure.high)
-        assert ("<" in line[:40]) == (figure.value < figure.low)
+    for everything, names in ((["--all"], list(found)), ([], [name for name in found if name in MAIN_FIGURES])):
+        shown = run("measure", "tween.json", "--corpus", "random", "--report", "report.json", *everything)
+        assert shown.code == 0
+        lines = shown.out.splitlines()[2:]
+        assert [line.split("  ")[0].replace(" ", "_") for line in lines] == names
+        for line, figure in zip(lines, (found[name] for name in names), strict=True):
+            cells = re.split(r" {2,}", line)
+            assert ("above" in cells) == (figure.value > figure.high)
+            assert ("below" in cells) == (figure.value < figure.low)
+            assert np.isnan(figure.value) or cells[1] == f"{figure.value:.3g} {figure.unit}".rstrip()
+    assert len(MAIN_FIGURES) == 10
 
 
 def test_the_command_refuses_what_it_cannot_measure(run: Run, engine: Engine) -> None:

@@ -12,11 +12,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bodies import insect
 from command_line import Run
 
+from motionmind.body.anatomy_file import anatomy_named
+from motionmind.body.human import human23, human44
 from motionmind.body.motion import Posture
+from motionmind.body.plausibility import NOTICEABLE_DEG
+from motionmind.discretize.states import StateSpace
 from motionmind.errors import FormatError
 from motionmind.geometry import rotations as rot
+from motionmind.tween.changes import describe_changes, name_parts
 from motionmind.tween.engine import Engine
 from motionmind.tween.narrative import explain
 from motionmind.tween.report import read_report
@@ -147,7 +153,7 @@ def test_the_explanation_adds_up_move_by_move(bridged: Tween, tmp_path: Path) ->
 
 
 def test_people_read_who_moves_how_likely_and_where_it_was_seen(bridged: Tween, tmp_path: Path) -> None:
-    text = str(explain(read_report(report_of(bridged, tmp_path))))
+    text = explain(read_report(report_of(bridged, tmp_path))).details()
     assert text.count("\nmove ") == bridged.moves
     for bridge in bridged.bridges:
         part = text.split("\nmove ")[bridge.move + 1]
@@ -167,7 +173,7 @@ def test_what_is_least_expected_and_what_the_motion_passes_by_is_told(
 ) -> None:
     for tween in (bridged, between(insects, 12, 7, moves=5)):
         told = explain(read_report(report_of(tween, tmp_path)))
-        for t, (move, part) in enumerate(zip(told.moves, str(told).split("\nmove ")[1:], strict=True)):
+        for t, (move, part) in enumerate(zip(told.moves, told.details().split("\nmove ")[1:], strict=True)):
             dear = int(tween.costs.coordination[t].argmax())
             words = (
                 f"least expected beside its parent: {tween.joints[dear]} ({tween.costs.coordination[t, dear]:.2f} nats)"
@@ -175,26 +181,86 @@ def test_what_is_least_expected_and_what_the_motion_passes_by_is_told(
             assert part.count("least expected") == part.count(words) == (tween.costs.coordination[t, dear] > 0.0)
             for chain, step in enumerate(move.joints):
                 assert step.followed == (tween.followed[t, chain] and tween.followed[t + 1, chain])
-    assert "(reversed)" in str(told)
-    assert " ()" not in str(told)
+    assert "(reversed)" in told.details()
+    assert " ()" not in told.details()
 
 
 def test_no_move_is_told_too(insects: Engine, tmp_path: Path) -> None:
     still = between(insects, 3, 3)
     told = explain(read_report(report_of(still, tmp_path)))
     assert told.moves == []
-    assert str(told).splitlines()[0] == "0 moves in 0.00 s, optimal, gap 0.00%"
+    assert told.details().splitlines()[0] == "0 moves in 0.00 s, optimal, gap 0.00%"
+    assert str(told) == "0 moves in 0.00 s; path optimal"
 
 
 def test_the_command_names_states_by_their_names(run: Run) -> None:
     ran = run("tween", *ENDS, "--corpus", "ballet", "--report", "report.json")
     assert ran.code == 0
-    shown, report = run("explain", "report.json"), json.loads(Path("report.json").read_text("utf-8"))
+    shown, report = run("explain", "report.json", "--all"), json.loads(Path("report.json").read_text("utf-8"))
     assert (shown.code, shown.err) == (0, "")
     assert "arabesque" in shown.out
     assert f"\n{report['cost']:.3f} nats: " in f"\n{shown.out}"
     told = run("explain", "report.json", "--json").json
     assert [len(move["joints"]) for move in told["moves"]] == [len(report["joints"])] * report["moves"]
+
+
+# --- a page -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("moves", [4, 9, 40])
+def test_a_page_shows_what_turns_farthest_and_nothing_that_is_still(insects: Engine, moves: int) -> None:
+    told = explain(between(insects, 12, 7, moves=moves))
+    first, *lines = str(told).splitlines()
+    assert first.startswith(f"{moves} move")
+    assert f"; motion follows {told.followed:.0%} of it, {told.motion_attested:.0%} of its own" in first
+    assert len(lines) <= max(30 + moves, 2 * moves)
+    shown = "\n".join(lines)
+    for move in told.moves:
+        turning = [step for step in move.joints if step.moved and step.degrees >= NOTICEABLE_DEG]
+        if turning:
+            farthest = max(turning, key=lambda step: step.degrees)
+            row = next(line for line in lines if line.startswith(f"{move.begins:.2f} to {move.ends:.2f} s"))
+            assert f" {farthest.joint.removeprefix('left_').removeprefix('right_')} {farthest.degrees:.0f} deg" in row
+    moved = {step.joint for move in told.moves for step in move.joints if step.moved}
+    for name in {step.joint for step in told.moves[0].joints} - moved:
+        assert f" {name} " not in shown
+
+
+def test_directions_are_those_of_the_anatomy() -> None:
+    skeleton, anatomy = human23(), anatomy_named("human23")
+    rest = {"left_elbow": [0.0, 0.0, 0.0]}
+    for joint, degrees, words in (
+        ("left_elbow", [0.0, -40.0, 0.0], "toward flexion"),
+        ("right_elbow", [0.0, -40.0, 0.0], "toward flexion"),
+        ("right_hip", [0.0, 0.0, 30.0], "toward abduction"),
+        ("left_hip", [0.0, -30.0, 0.0], "toward inward rotation"),
+        ("thorax", [0.0, 20.0, 0.0], "toward turn left"),
+        ("thorax", [0.0, 0.0, 20.0], "toward bend right"),
+        ("left_ankle", [-20.0, 0.0, 0.0], "toward dorsiflexion"),
+    ):
+        turned = anatomy.rotations({name: np.array([given]) for name, given in (rest | {joint: degrees}).items()})
+        ends = np.concatenate([anatomy.rotations({joint: np.zeros((1, 3))}), turned])
+        space = StateSpace(
+            skeleton.names, ends.transpose(1, 0, 2).reshape(-1, 4), 2 * np.arange(24), "codebook", np.full(23, 15.0)
+        )
+        path, chain = np.zeros((2, 23), np.int32), skeleton.index(joint)
+        path[1, chain] = 1
+        (row,) = describe_changes(space, skeleton, path, space.decode(path))
+        assert row[chain] == words, joint
+        assert set(row[:chain] + row[chain + 1 :]) == {""}
+        (back,) = describe_changes(space, skeleton, path[::-1], space.decode(path[::-1]))
+        assert back[chain] != words
+        named = replace(space, labels=tuple(("bas", "second") for _ in range(23)))
+        assert describe_changes(named, skeleton, path, named.decode(path))[0][chain] == "to second"
+
+
+def test_parts_are_what_a_viewer_calls_them() -> None:
+    parts = dict(zip(human44().names, name_parts(human44(), human44().names), strict=True))
+    assert {parts[name] for name in ("left_clavicle", "left_elbow", "left_wrist")} == {"left arm"}
+    assert (parts["right_thumb"], parts["right_toes"], parts["pelvis"]) == ("right hand", "right leg", "torso")
+    assert parts["atlantal"] == "head"
+    insect_parts = set(name_parts(insect(), (*insect().names, "facing")))
+    assert {"trunk", "left front coxa", "whole body"} <= insect_parts
 
 
 # --- bad input --------------------------------------------------------------------------------------------------------
