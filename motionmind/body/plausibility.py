@@ -27,8 +27,6 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import find_support
 from motionmind.geometry.splines import natural_spline, rotation_spline
 
-# The least differences that a viewer notices: of places, of angles, and of speeds and other ratios.
-NOTICEABLE_M, NOTICEABLE_DEG, NOTICEABLE_SHARE = 0.01, 3.0, 0.05
 SEEN = ("balance", "bounce", "flight", "crossed_limbs")
 GRAVITY_MPS2 = 9.81  # metres a second squared
 CALM_MPS2 = 2.0  # metres a second squared: level acceleration up to which a body should be in balance

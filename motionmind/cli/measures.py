@@ -86,7 +86,8 @@ def measure(
 def _cells(name: str, figure: Figure) -> tuple[str, ...]:
     """Return the cells of a figure's row: name, value, comparison with the usual range, the range, and meaning."""
     is_known = not math.isnan(figure.value)
-    place = "below" if figure.value < figure.low else "above" if figure.value > figure.high else ""
-    low, high = ("-" if math.isnan(number) else f"{number:.3g}" for number in (figure.low, figure.high))
-    value = f"{figure.value:.3g} {figure.unit}".rstrip() if is_known else "-"
-    return name.replace("_", " "), value, place, f"{low} to {high}", figure.about
+    value, low, high = (float(f"{number:.3g}") for number in (figure.value, figure.low, figure.high))
+    place = "below" if value < low else "above" if value > high else ""
+    shown = f"{value:g} {figure.unit}".rstrip() if is_known else "-"
+    least, most = ("-" if math.isnan(number) else f"{number:g}" for number in (low, high))
+    return name.replace("_", " "), shown, place, f"{least} to {most}", figure.about

@@ -151,6 +151,7 @@ def _parts(before: Source, after: Source) -> bool:
 
 def _tempo(result: Tween) -> str:
     """Explain the duration of a tween, and its differences from the corpus."""
+    from motionmind.body.noticeable import NOTICEABLE_SHARE
     from motionmind.tween.pacing import worded
 
     tempo = result.tempo
@@ -166,7 +167,7 @@ def _tempo(result: Tween) -> str:
         parts.append(f"faster than anything in the corpus: {worded(tempo.faster)}")
     if tempo.detours:
         parts.append("usual movement after postures like A and before postures like B fills the time")
-    if tempo.creeps > 0.0:
+    if tempo.creeps >= NOTICEABLE_SHARE:
         parts.append(f"slower than 99% of the corpus in {tempo.creeps:.0%} of the time")
     return "; ".join(parts)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from motionmind._typing import Floats
+from motionmind.body.noticeable import NOTICEABLE_SPAN_SHARE
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import enumerated
 from motionmind.formats.units import bone_span
@@ -75,7 +76,7 @@ class NormalisedRig:
         """Describe the repairs, with lengths in millimetres if one unit is `scale` metres."""
         yield from self.notes
         if self.strays:
-            far = [f"{name} (by up to {1000.0 * scale * stray:.1f} mm)" for name, stray in self.strays]
+            far = [f"{name} (by up to {1000.0 * scale * stray:.3g} mm)" for name, stray in self.strays]
             yield f"joints that move against their parents stay at their mean place: {enumerated(far)}"
 
 
@@ -93,7 +94,7 @@ def normalise(body: Placed) -> NormalisedRig:
     strays = [
         (body.skeleton.names[joint], float(np.max(np.linalg.norm(place - offsets[joint], axis=-1))))
         for joint, place in body.places.items()
-        if joint > 0 and body.stray(joint) > _STILL_SPAN_SHARE * span
+        if joint > 0 and body.stray(joint) > NOTICEABLE_SPAN_SHARE * span
     ]
     return NormalisedRig(replace(body.skeleton, offsets=offsets), body.rotations, body.place(0), notes, strays)
 

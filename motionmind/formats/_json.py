@@ -19,7 +19,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.credits.credit import Credit
 from motionmind.errors import FormatError, MotionMindWarning, SkeletonError, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath
-from motionmind.formats.text import MAX_JOINTS, MAX_NUMBER, WRITTEN_LENGTH_TOLERANCE
+from motionmind.formats.text import LENGTH_TOLERANCE, MAX_JOINTS, MAX_NUMBER, WRITTEN_LENGTH_TOLERANCE
 from motionmind.geometry import rotations as rot
 
 Vector = tuple[float, float, float]
@@ -28,8 +28,6 @@ Quaternion = tuple[float, float, float, float]
 POSTURE = "motionmind-posture"
 MOTION = "motionmind-motion"
 VERSION = 1
-
-_LENGTH_TOLERANCE = 1e-6  # without a warning
 
 
 class Header(msgspec.Struct):
@@ -225,7 +223,7 @@ def check_lengths(array: Floats, what: str, path: FilePath) -> None:
 
 
 def normalise_rotations(array: Floats, names: Sequence[str], path: FilePath) -> Floats:
-    """Normalise quaternions [J, 4] or [T, J, 4] in place; FormatError for zero, a warning if off by > 1e-6."""
+    """Normalise quaternions [J, 4] or [T, J, 4] in place; FormatError for zero, a warning beyond `LENGTH_TOLERANCE`."""
     if not np.all(np.abs(array) <= MAX_NUMBER):
         joint = names[np.argwhere(~(np.abs(array) <= MAX_NUMBER))[0][-2]]
         raise FormatError(f"the rotation of {joint} has a number beyond {MAX_NUMBER:g}", path=path)
@@ -234,12 +232,12 @@ def normalise_rotations(array: Floats, names: Sequence[str], path: FilePath) -> 
         where = np.argwhere(length < 1e-6)[0]
         raise FormatError(f"{_place(where, names)} is zero, which is not a rotation (identity is 0 0 0 1)", path=path)
     off = np.abs(length - 1.0)
-    if np.any(off > _LENGTH_TOLERANCE):
-        wrong = np.argwhere(off > _LENGTH_TOLERANCE)
+    if np.any(off > LENGTH_TOLERANCE):
+        wrong = np.argwhere(off > LENGTH_TOLERANCE)
         first = tuple(wrong[0])
         more = f", and {len(wrong) - 1} more like it" if len(wrong) > 1 else ""
         warnings.warn(
-            f"{path}: {_place(wrong[0], names)} has length {length[first]:.6g}, not 1{more}; made 1",
+            f"{path}: {_place(wrong[0], names)} has length {length[first]:.3g}, not 1{more}; made 1",
             MotionMindWarning,
             stacklevel=4,
         )

@@ -24,6 +24,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
+from motionmind.body.noticeable import NOTICEABLE_M
 from motionmind.body.rates import check_size
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath, name_of
@@ -86,7 +87,7 @@ def _assemble(acclaim: Acclaim, values: Floats, degrees: bool) -> tuple[Floats, 
             angles = np.stack([series[channel] for channel in turns], axis=-1)
             turned = fixed_axes("".join(channel[1] for channel in turns), np.radians(angles) if degrees else angles)
             rotations[:, joint] = rot.mul(bone.axis, rot.mul_inv(turned, bone.axis))
-        if joint > 0 and any(np.any(series[channel] != 0.0) for channel in moves):
+        if joint > 0 and any(np.any(np.abs(series[channel]) * acclaim.scale > NOTICEABLE_M) for channel in moves):
             ignored.append(bone.name)
         elif joint == 0:
             for axis, channel in enumerate(("TX", "TY", "TZ")):

@@ -90,7 +90,7 @@ def motion_from_json(data: bytes, path: FilePath) -> Motion:
             quaternion is zero. The message names file, joint and frame.
 
     Warns:
-        MotionMindWarning: quaternions whose length was off by more than 1e-6 have been normalised.
+        MotionMindWarning: quaternions whose length was off by more than 1 % have been normalised.
     """
     kind = _json.kind_of(data, path)
     if kind != _json.MOTION:

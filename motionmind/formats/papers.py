@@ -34,7 +34,7 @@ from motionmind.body.rates import MAX_FPS
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath, name_of, write_atomically
-from motionmind.formats.text import WRITTEN_LENGTH_TOLERANCE, read_lines, to_numbers
+from motionmind.formats.text import LENGTH_TOLERANCE, WRITTEN_LENGTH_TOLERANCE, read_lines, to_numbers
 from motionmind.geometry import rotations as rot
 
 _NUMBER = re.compile(r"[+-]?(\.?[0-9]|(inf|infinity|nan)\b)", re.IGNORECASE)  # begins no joint's name
@@ -65,7 +65,7 @@ def read_papers(path: FilePath, *, skeleton: Skeleton | None = None, rate: float
         FormatError: the file does not exist, or is not in this notation; the message names file, line and joint.
 
     Warns:
-        MotionMindWarning: joints stay at rest, or a quaternion's length was off by more than 1e-3.
+        MotionMindWarning: joints stay at rest, or a quaternion's length was off by more than 1 %.
     """
     if rate is not None and not (np.isfinite(rate) and rate > 0.0):
         raise MotionMindError(f"a rate must be a positive number of postures a second, not {rate}")
@@ -236,18 +236,18 @@ def _quaternion(name: str, words: list[str], path: FilePath, line: int) -> list[
 
 
 def _normalise(rotations: Floats, lines: Indices, skeleton: Skeleton, path: FilePath) -> Floats:
-    """Normalise quaternions [T, J, 4]; FormatError for zero, a warning for a length off by more than 1e-3."""
+    """Normalise quaternions [T, J, 4]; FormatError for zero, a warning for a length off by more than 1 %."""
     length = np.linalg.norm(rotations, axis=-1)
     if np.any(length < 1e-6):
         frame, joint = np.argwhere(length < 1e-6)[0]
         fault = f"the rotation of {skeleton.names[joint]} is zero, which is not a rotation (identity is 0 0 0 1)"
         raise FormatError(fault, path=path, line=int(lines[frame, joint]))
-    off = np.argwhere(np.abs(length - 1.0) > 1e-3)  # numbers with five digits, as in the papers, are off by about 1e-5
+    off = np.argwhere(np.abs(length - 1.0) > LENGTH_TOLERANCE)
     if len(off):
         frame, joint = off[0]
         more = f", and {len(off) - 1} more like it" if len(off) > 1 else ""
         where = f"{path}:{lines[frame, joint]}: the rotation of {skeleton.names[joint]}"
-        message = f"{where} has length {length[frame, joint]:.6g}, not 1{more}; made 1"
+        message = f"{where} has length {length[frame, joint]:.3g}, not 1{more}; made 1"
         warnings.warn(message, MotionMindWarning, stacklevel=4)
     off_written = np.abs(length - 1.0)[..., None] > WRITTEN_LENGTH_TOLERANCE
     return np.where(off_written, rotations / length[..., None], rotations)

@@ -53,7 +53,7 @@ def posture_from_json(data: bytes, path: FilePath) -> Posture:
             message names file and joint.
 
     Warns:
-        MotionMindWarning: a quaternion whose length was off by more than 1e-6 has been normalised.
+        MotionMindWarning: a quaternion whose length was off by more than 1 % has been normalised.
     """
     kind = _json.kind_of(data, path)
     if kind != _json.POSTURE:

@@ -17,6 +17,7 @@ MAX_JOINTS = 4000
 
 # Lengths of quaternions written with ten decimals are off 1 by less; such quaternions are read bit-identical.
 WRITTEN_LENGTH_TOLERANCE = 1e-9
+LENGTH_TOLERANCE = 0.01  # of a quaternion, without a warning: numbers may be rounded to two digits
 
 
 def read_lines(path: FilePath) -> list[str]:

@@ -34,6 +34,7 @@ from motionmind.body.contact import (
     lowest_height,
 )
 from motionmind.body.motion import Motion
+from motionmind.body.noticeable import NOTICEABLE_M, NOTICEABLE_MPS2, NOTICEABLE_SHARE
 from motionmind.body.plausibility import SEEN, at_rate, floor_of, greatest, implausibility
 from motionmind.corpus.corpus import FACING, Corpus
 from motionmind.learned.pace import way_of
@@ -48,6 +49,8 @@ UNITS_AND_MEANINGS = {
     "pace": ("", "greatest ratio of a part's speed to its fastest usual speed"),
     "sliding": ("", "greatest share of a second in which a foot near the floor slides"),
 }
+# By unit: the least excess that a viewer notices.
+_NOTICEABLE = {"m": NOTICEABLE_M, "m/s^2": NOTICEABLE_MPS2, "": NOTICEABLE_SHARE}
 STRETCH_S = 1.0
 LIMIT_PERCENTILE = 99.5  # of the corpus's own stretches
 FOOT_SPEED_PERCENTILE = 95.0  # for feet near the floor
@@ -80,8 +83,10 @@ class Sighting:
 
     @property
     def is_beyond(self) -> bool:
-        """Whether the movement exceeds the corpus's limit."""
-        return self.value is not None and self.most is not None and self.value > self.most
+        """Whether the movement exceeds the corpus's limit by so much that a viewer notices."""
+        if self.value is None or self.most is None:
+            return False
+        return self.value - self.most > max(_NOTICEABLE[self.unit], NOTICEABLE_SHARE * abs(self.most))
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,15 +34,15 @@ def name_parts(skeleton: Skeleton, chains: Sequence[str]) -> tuple[str, ...]:
 
     The facing turns the whole body.
     """
-    anatomy, sides = anatomy_of(skeleton), sides_of(skeleton)
+    anatomy = anatomy_of(skeleton)
     parts: dict[str, str] = {FACING: WHOLE_BODY}
     for part, joints in sided_parts(skeleton).items():
         parts |= {skeleton.names[joint]: part.replace("_", " ") for joint in joints}
-    for name, side in zip(skeleton.names, sides, strict=True) if anatomy else ():
-        joint = anatomy.anatomy(name)[0]
-        layer = next((layer for layer, joints in anatomy.layers.items() if joint in joints), "")
-        if layer:
-            parts[name] = layer if side == MIDDLE else f"{side} {layer.removesuffix('s')}"
+    if anatomy is not None:
+        for name, side in zip(skeleton.names, sides_of(skeleton), strict=True):
+            joint = anatomy.anatomy(name)[0]
+            if layer := next((layer for layer, joints in anatomy.layers.items() if joint in joints), ""):
+                parts[name] = layer if side == MIDDLE else f"{side} {layer.removesuffix('s')}"
     return tuple(parts[chain] for chain in chains)
 
 

@@ -7,21 +7,23 @@ from collections import Counter
 
 from motionmind.body.contact import feet_that_stay, find_feet
 from motionmind.body.motion import Motion
+from motionmind.body.noticeable import NOTICEABLE_BRIDGE_DEG
 from motionmind.body.plausibility import at_rate, floor_of
 from motionmind.display import displayed
 from motionmind.errors import enumerated
 from motionmind.learned.plausibility import Sighting
+from motionmind.tween.certificate import Bridge
 from motionmind.tween.result import Tween
 
-# By measure: a message with the movement's greatest value, the corpus's limit and the body part; then the digits and
-# kind of number for both values.
+# By measure: a message with the movement's greatest value, the corpus's limit and the body part; the format of both
+# values, in which they differ if a viewer notices the difference; and their factor.
 _MEASURE_WORDS = {
-    "balance": ("leans {0} m beyond its support, at most {1} m in the corpus", 2, "f"),
-    "bounce": ("bounces: the centre of mass accelerates at {0} m/s^2, at most {1} in the corpus", 0, "f"),
-    "flight": ("floats: {0} of gravity is missing in the air, at most {1} in the corpus", 0, "%"),
-    "crossed_limbs": ("limbs intersect by {0} m, at most {1} m in the corpus", 3, "f"),
-    "sliding": ("feet slide: near the floor one moves in {0} of a second, at most {1} in the corpus", 0, "%"),
-    "pace": ("{2} is {0}x as fast as fast movement of the corpus, at most {1}x in the corpus", 1, "f"),
+    "balance": ("leans {0} cm beyond its support, at most {1} cm in the corpus", ".0f", 100.0),
+    "bounce": ("bounces: the centre of mass accelerates at {0} m/s^2, at most {1} in the corpus", ".0f", 1.0),
+    "flight": ("floats: {0} of gravity is missing in the air, at most {1} in the corpus", ".0%", 1.0),
+    "crossed_limbs": ("limbs intersect by {0} cm, at most {1} cm in the corpus", ".0f", 100.0),
+    "sliding": ("feet slide: near the floor one moves in {0} of a second, at most {1} in the corpus", ".0%", 1.0),
+    "pace": ("{2} is {0}x as fast as fast movement of the corpus, at most {1}x in the corpus", ".2f", 1.0),
 }
 # Messages for residuals of the solve, and the thresholds of visibility in centimetres and degrees.
 _RESIDUAL_WORDS = {
@@ -61,27 +63,29 @@ def beyond(tween: Tween) -> list[str]:
         for one in tween.gave
         if one.most > _RESIDUAL_WORDS.get(one.term, ("", math.inf))[1]
     ]
-    if tween.bridges:
-        far = max(tween.bridges, key=lambda bridge: bridge.degrees)
-        if far.degrees >= 30.0:  # nobody notices a smaller bridge
-            flaws.append(
-                f"{displayed(far.joint)} turns by {far.degrees:.0f} degrees in move {far.move + 1}, as in no clip"
-            )
+    followed = [bridge for bridge in tween.bridges if _is_followed(tween, bridge)]
+    far = max(followed, key=lambda bridge: bridge.degrees, default=None)
+    if far is not None and far.degrees >= NOTICEABLE_BRIDGE_DEG:
+        seconds = tween.motion.insertions[0].times[far.move] - tween.motion.times[0]
+        flaws.append(f"{displayed(far.joint)} turns by {far.degrees:.0f} degrees from {seconds:.1f} s, as in no clip")
     return flaws
 
 
+def _is_followed(tween: Tween, bridge: Bridge) -> bool:
+    """Return whether the motion follows a bridge of the path: only then does a viewer see it."""
+    chain = tween.joints.index(bridge.joint)
+    return bool(tween.followed[bridge.move : bridge.move + 2, chain].all())
+
+
 def shown_beyond(name: str, one: Sighting) -> str:
-    """Describe a measure that exceeds the corpus's limit.
+    """Describe a measure that noticeably exceeds the corpus's limit.
 
     Args:
         name: name of the measure, one of `motionmind.learned.plausibility.MEASURES`.
-        one: the movement's value, which exceeds the limit.
+        one: the movement's value, which is beyond the limit.
     """
-    words, digits, kind = _MEASURE_WORDS[name]
-    for more in range(4):  # extra digits to tell the two numbers apart
-        value, most = (f"{number:.{digits + more}{kind}}" for number in (one.value, one.most))
-        if value != most:
-            break
+    words, form, factor = _MEASURE_WORDS[name]
+    value, most = (format(factor * (number or 0.0), form) for number in (one.value, one.most))
     return words.format(value, most, displayed(one.part))
 
 

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import msgspec
 
 from motionmind.arguments import check_type
-from motionmind.body.plausibility import NOTICEABLE_DEG
+from motionmind.body.noticeable import NOTICEABLE_DEG
 from motionmind.display import displayed
 from motionmind.tween.certificate import Source
 from motionmind.tween.report import TweenReport

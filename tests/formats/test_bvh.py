@@ -330,9 +330,12 @@ def test_constant_positions_take_the_place_of_the_offset(tmp_path: Path) -> None
 
 def test_positions_that_vary_are_said_with_their_amount(tmp_path: Path) -> None:
     rows = ["0 90 0 0 0 0 0 50 0 0 0 0", "0 90 0 0 0 9 0 52 0 0 0 0"]
-    with pytest.warns(MotionMindWarning, match=r"clip\.bvh: .*mean place: Spine \(by up to 10\.0 mm\)"):
+    with pytest.warns(MotionMindWarning, match=r"clip\.bvh: .*mean place: Spine \(by up to 10 mm\)"):
         motion = read_bvh(write(tmp_path, positioned(rows)), unit="cm")
     np.testing.assert_allclose(motion.skeleton.offsets[1], [0, 0.51, 0])
+    rows[1] = rows[1].replace("52", "50.4")
+    motion = read_bvh(write(tmp_path, positioned(rows)), unit="cm")  # nobody sees 2 mm
+    np.testing.assert_allclose(motion.skeleton.offsets[1], [0, 0.502, 0])
 
 
 def test_what_stands_still_beside_a_new_root_is_left_out_and_named(tmp_path: Path) -> None:

@@ -196,6 +196,14 @@ def test_one_quaternion_that_is_not_unit(posture: Path) -> None:
     assert read.rotations[read.skeleton.index("left_knee")].tolist() == [0, 0, 0, 1]
 
 
+def test_rounded_quaternions_are_mended_without_a_word(posture: Path) -> None:
+    content = json.loads(posture.read_text())
+    content["rotations"]["left_knee"] = [0, 0, 0, 1.005]
+    posture.write_text(json.dumps(content))
+    read = read_posture(posture)
+    assert read.rotations[read.skeleton.index("left_knee")].tolist() == [0, 0, 0, 1]
+
+
 def test_many_quaternions_that_are_not_unit_are_one_warning(motion: Path) -> None:
     content = json.loads(motion.read_text())
     content["rotations"][1][3] = [0, 0, 0, 2]

@@ -502,9 +502,9 @@ def test_the_command_prints_what_is_measured(run: Run, engine: Engine) -> None:
         assert [line.split("  ")[0].replace(" ", "_") for line in lines] == names
         for line, figure in zip(lines, (found[name] for name in names), strict=True):
             cells = re.split(r" {2,}", line)
-            assert ("above" in cells) == (figure.value > figure.high)
-            assert ("below" in cells) == (figure.value < figure.low)
-            assert np.isnan(figure.value) or cells[1] == f"{figure.value:.3g} {figure.unit}".rstrip()
+            value, low, high = (float(f"{number:.3g}") for number in (figure.value, figure.low, figure.high))
+            assert ("above" in cells, "below" in cells) == (value > high, value < low)
+            assert np.isnan(value) or cells[1] == f"{value:g} {figure.unit}".rstrip()
     assert len(MAIN_FIGURES) == 10
 
 

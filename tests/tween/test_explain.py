@@ -18,7 +18,7 @@ from command_line import Run
 from motionmind.body.anatomy_file import anatomy_named
 from motionmind.body.human import human23, human44
 from motionmind.body.motion import Posture
-from motionmind.body.plausibility import NOTICEABLE_DEG
+from motionmind.body.noticeable import NOTICEABLE_DEG
 from motionmind.discretize.states import StateSpace
 from motionmind.errors import FormatError
 from motionmind.geometry import rotations as rot

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from motionmind.learned.plausibility import Sighting
+from motionmind.learned.plausibility import MEASURES, UNITS_AND_MEANINGS, Sighting
 from motionmind.names.postures import find_posture
 from motionmind.tween.certificate import Bridge
 from motionmind.tween.engine import Engine
@@ -18,17 +20,30 @@ from motionmind.tween.headline import beyond, feet_staying, headline, shown_beyo
 from motionmind.tween.result import Tween
 
 
+@given(st.sampled_from(sorted(MEASURES)), st.floats(0.0, 40.0), st.floats(0.0, 40.0))
+def test_the_two_sides_of_a_warning_never_read_alike(name: str, value: float, most: float) -> None:
+    sighting = Sighting(value, most, UNITS_AND_MEANINGS[name][0], "pelvis")
+    numbers = re.findall(r"[\d.]+", shown_beyond(name, sighting).replace("m/s^2", ""))
+    assert len(numbers) == 2
+    if sighting.is_beyond:
+        assert float(numbers[0]) > float(numbers[1])
+
+
 @pytest.mark.parametrize(
-    ("value", "said"),
+    ("name", "value", "most", "is_beyond"),
     [
-        (0.35, "leans 0.35 m beyond its support, at most 0.22 m in the corpus"),
-        (0.2249, "leans 0.225 m beyond its support, at most 0.216 m in the corpus"),
-        (0.2162, "leans 0.2162 m beyond its support, at most 0.2160 m in the corpus"),
-        (0.216 + 1e-9, "leans 0.21600 m beyond its support, at most 0.21600 m in the corpus"),
+        ("crossed_limbs", 0.2719, 0.2718, False),
+        ("balance", 0.069, 0.060, False),
+        ("balance", 0.071, 0.060, True),
+        ("bounce", 27.0, 18.6, False),
+        ("bounce", 28.0, 18.6, True),
+        ("pace", 1.04, 1.0, False),
+        ("sliding", 0.44, 0.40, False),
+        ("sliding", 0.50, 0.40, True),
     ],
 )
-def test_what_exceeds_the_corpus_by_little_gets_the_digits_that_show_it(value: float, said: str) -> None:
-    assert shown_beyond("balance", Sighting(value, 0.216, "m")) == said
+def test_only_an_excess_that_a_viewer_notices_counts(name: str, value: float, most: float, is_beyond: bool) -> None:
+    assert Sighting(value, most, UNITS_AND_MEANINGS[name][0]).is_beyond == is_beyond
 
 
 @pytest.fixture(scope="module")
@@ -97,20 +112,25 @@ def test_a_viewer_winces_at_what_the_corpus_never_shows_and_at_far_bridges(
 ) -> None:
     assert beyond(tween) == []
     for name, sighting, said in (
-        ("balance", Sighting(0.31, 0.1, "m"), "leans 0.31 m beyond its support, at most 0.10 m in the corpus"),
+        ("balance", Sighting(0.31, 0.1, "m"), "leans 31 cm beyond its support, at most 10 cm in the corpus"),
         (
             "sliding",
             Sighting(0.8, 0.4, ""),
             "feet slide: near the floor one moves in 80% of a second, at most",
         ),
-        ("pace", Sighting(3.0, 1.5, "", "left_hip"), "left_hip is 3.0x as fast as fast movement of the corpus"),
+        ("pace", Sighting(3.0, 1.5, "", "left_hip"), "left_hip is 3.00x as fast as fast movement of the corpus"),
     ):
         (sentence,) = beyond(shown(tween, name, sighting))
         assert sentence.startswith(said)
         assert beyond(shown(tween, name, replace(sighting, value=0.0))) == []
-    near, far = Bridge("neck", 0, 29.0, 29.0), Bridge("left_hip", 2, 108.2, 108.2)
-    assert beyond(replace(tween, bridges=(near,))) == []
-    assert beyond(replace(tween, bridges=(near, far))) == ["left_hip turns by 108 degrees in move 3, as in no clip"]
+    near, far = Bridge("cervical", 0, 29.0, 29.0), Bridge("left_hip", 2, 108.2, 108.2)
+    followed = replace(tween, bridges=(near, far), followed=np.ones_like(tween.followed))
+    seconds = tween.motion.insertions[0].times[2]
+    assert beyond(replace(followed, bridges=(near,))) == []
+    assert beyond(followed) == [f"left_hip turns by 108 degrees from {seconds:.1f} s, as in no clip"]
+    unseen = tween.followed.copy()
+    unseen[3, tween.joints.index("left_hip")] = False
+    assert beyond(replace(followed, followed=unseen)) == []
 
 
 @pytest.fixture
