@@ -93,6 +93,7 @@ def add(
         changed = _learn_again(learned, more, workshop)
         persistence.save(changed, place)
     _print_change(changed, f"added {count(len(files), 'file')} to {displayed_path(place)}", details=details)
+    note_kept(place)
 
 
 @command("motionmind corpus remove mine clip")
@@ -117,6 +118,17 @@ def remove(name: str, clips: tuple[str, ...], details: bool, home: Path | None) 
         persistence.save(changed, place)
     gone = len(learned.corpus.clips) - len(changed.corpus.clips)
     _print_change(changed, f"removed {count(gone, 'clip')} from {displayed_path(place)}", details=details)
+    note_kept(place)
+
+
+def note_kept(place: Path) -> None:
+    """Note how to bring back the corpus that the one in a folder replaced, if it is kept."""
+    from motionmind.corpus.manifest import count_clips
+    from motionmind.corpus.store import read_manifest, replaced
+
+    if old := replaced(read_manifest(place)):
+        clips = count(count_clips(old), "clip")
+        note(f"corpus restore {place.name} brings back the replaced corpus ({clips}), until the next change")
 
 
 def take_files(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 from typing import Any
 
 import click
 
 from motionmind.cli import completion
-from motionmind.cli.changes import DETAILS, FLIPS, PERFORMER, add, remove, take_files
+from motionmind.cli.changes import DETAILS, FLIPS, PERFORMER, add, note_kept, remove, take_files
 from motionmind.cli.files import clip_names, read_mapping
 from motionmind.cli.options import (
     HOME,
@@ -121,6 +122,7 @@ def corpora(context: click.Context) -> None:
     metavar="ADDRESS",
     help="Read with the workers of a Dask cluster, by its scheduler: tcp://HOST:8786. They share this disk.",
 )
+@option("--replace", section=Section.OUTPUT, is_flag=True, help="Replace your corpus NAME; corpus restore undoes it.")
 @DETAILS
 @option("--title", section=Section.ABOUT, default="", show_default=False, help="Describe the corpus in a line.")
 @option("--author", section=Section.ABOUT, default="", show_default=False, help="Name who made the movement.")
@@ -143,6 +145,7 @@ def build(
     asf: Path | None,
     source_fps: float | None,
     up: str | None,
+    replace: bool,
     details: bool,
     workers: int,
     scheduler: str | None,
@@ -152,14 +155,13 @@ def build(
     """Learn a corpus from movement.
 
     Learn it from files, from other corpora (--mix), or from both. The files may have any formats, scores included.
-    Files that cannot be read are left out, as are files on other joints than most. An earlier corpus of yours with the
-    same name is replaced.
+    Files that cannot be read are left out, as are files on other joints than most.
     """
     if not (files or mix):
         raise click.UsageError("Missing argument 'FILES...', or --mix.", click.get_current_context())
     from motionmind.corpus.recordings import Taking
     from motionmind.corpus.shards import Reading, shards_of
-    from motionmind.corpus.store import locate, place_for
+    from motionmind.corpus.store import MANIFEST, locate, place_for
     from motionmind.discretize import make_discretization
     from motionmind.executors.cluster import cluster
     from motionmind.executors.opening import open_team
@@ -167,6 +169,8 @@ def build(
     from motionmind.tween.engine import Engine
 
     place = place_for(name, home)
+    if (place / MANIFEST).exists() and not replace:
+        raise MotionMindError(f"you have a corpus {name!r} already ({_describe(place)}); --replace replaces it")
     others = parse_mixture(mix)
     discretization = make_discretization(discretize, *parse_tolerances(tolerance, 15.0))
     takes = Taking("auto" if rate is None else rate, options["skip"], options["flips"], flip_angle, options["mirror"])
@@ -193,6 +197,33 @@ def build(
         engine.save(place)
     print_check(engine.check(), with_states=details, with_details=details)
     click.echo(f"built {displayed_path(place)}")
+    note_kept(place)
+
+
+def _describe(place: Path) -> str:
+    """Describe the built corpus in a folder in a few words: its number of clips, and when it was built or changed."""
+    from motionmind.corpus.manifest import count_clips
+    from motionmind.corpus.store import MANIFEST, read_manifest
+
+    changed = time.strftime("%Y-%m-%d %H:%M", time.localtime((place / MANIFEST).stat().st_mtime))
+    try:
+        return f"{count(count_clips(read_manifest(place)), 'clip')}, {changed}"
+    except MotionMindError:
+        return f"unreadable, {changed}"
+
+
+@command("motionmind corpus restore mine")
+@click.argument("name", shell_complete=completion.own_corpora)
+@HOME
+def restore(name: str, home: Path | None) -> None:
+    """Bring back the corpus that the last build, addition or removal replaced.
+
+    Repeat it to return to the newer one.
+    """
+    from motionmind.corpus import store
+
+    place = store.restore(name, home)
+    click.echo(f"restored {displayed_path(place)} ({_describe(place).partition(',')[0]})")
 
 
 @command("motionmind corpus list --remote", "list")
@@ -316,5 +347,5 @@ def delete(name: str, is_sure: bool, home: Path | None) -> None:
     click.echo(f"deleted {displayed_path(place)}")
 
 
-for _command in (build, add, remove, list_corpora, info, check, rename, delete, publish, fetch):
+for _command in (build, add, remove, restore, list_corpora, info, check, rename, delete, publish, fetch):
     corpora.add_command(_command)

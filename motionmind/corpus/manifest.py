@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -89,3 +91,10 @@ def parse_manifest(manifest: dict[str, Any], schema: type[_Schema], path: Path) 
         return msgspec.convert(manifest, schema)
     except msgspec.ValidationError as error:
         raise FormatError(str(error).replace("Object missing required field", "there is no key"), path=path) from error
+
+
+def count_clips(manifest: Mapping[str, Any]) -> int:
+    """Return the number of clips of a built corpus, from its manifest; 0 if that does not say it."""
+    with suppress(LookupError, TypeError):
+        return int(manifest["arrays"]["clips.order"]["shape"][0])
+    return 0

@@ -7,8 +7,8 @@ import os
 import re
 import shlex
 import time
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 FORMAT, BUILT = "motionmind-corpus", "motionmind-built-corpus"
 VERSIONS = {FORMAT: 1, BUILT: 11}
 MANIFEST = "manifest.json"
+_PREVIOUS = "previous"  # key of a manifest: the manifest of the corpus that this one replaced
 _MAX_RETRIES, _PAUSE_S = 20, 0.005  # until a missing version appears
 
 
@@ -124,12 +125,13 @@ def delete(name: str, folder: str | os.PathLike[str] | None = None) -> None:
     left = unfinished(name, folder)
     if removable(name, folder) != left:
         place = _own(name, folder)
-        before = _digest_of(place)
+        before = _digests_of(place)
         try:
             versions.remove(place)
         except OSError as error:
             raise CorpusError(f"{place}: cannot be deleted: {error.strerror or error}") from error
-        cache.forget(before)
+        for gone in before:
+            cache.forget(gone)
     versions.remove_unused(left)
     with suppress(OSError):
         left.parent.rmdir()
@@ -156,8 +158,7 @@ def rename(name: str, new: str, folder: str | os.PathLike[str] | None = None) ->
     manifest = read_manifest(place)
     try:
         with versions.hold(_place_of(place, manifest)):  # so that no build removes its version meanwhile
-            data = msgspec.json.encode(read_manifest(place) | {"name": new})
-            replace_file(place / MANIFEST, msgspec.json.format(data, indent=1) + b"\n")
+            _write_manifest(place, read_manifest(place) | {"name": new})
             place.rename(target)
         sync_folder(target.parent)
     except OSError as error:
@@ -205,13 +206,13 @@ def _parse(path: Path, data: bytes) -> dict[str, Any]:
 
 def remedy(folder: Path) -> str:
     """Return the advice to rebuild the corpus of a folder, with the command."""
-    words = ["motionmind", "corpus", "build", folder.name]
+    words = ["motionmind", "corpus", "build", folder.name, "FILES", "--replace"]
     if folder.parent != home() / "corpora" and folder.parent.name == "corpora":
         words += ["--home", str(folder.parent.parent)]
-    return f"rebuild it: {shlex.join(words)} FILES"
+    return f"rebuild it: {shlex.join(words)}"
 
 
-def save(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str:
+def save(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], *, keep: bool = True) -> str:
     """Write a corpus's folder, and return the corpus's hash, by which what is learned from it is cached.
 
     An existing corpus is replaced at once when the new one is complete and on disk (`motionmind.corpus.versions`).
@@ -220,6 +221,7 @@ def save(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray
         folder: the corpus's folder.
         manifest: plain values for JSON; format, version, folder and the arrays' entries are added.
         arrays: by name.
+        keep: whether a corpus of other movement that this one replaces stays beside it, for `restore`.
 
     Raises:
         CorpusError: the folder cannot be written, or holds other files.
@@ -228,51 +230,114 @@ def save(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray
         if stranger := versions.find_stranger(folder, MANIFEST):
             name = stranger.relative_to(folder)
             raise CorpusError(f"{folder}: holds {name}, which is no part of a built corpus; it is not replaced")
-        before = _digest_of(folder)
+        before = _digests_of(folder)
         make_folder(folder)
         try:
-            digest = _write(folder, manifest, arrays)
+            digest = _write(folder, manifest, arrays, keep=keep)
         finally:
             with suppress(FormatError):  # no manifest that can be read: all stays until a save succeeds
-                versions.remove_others(folder, lambda: _current(folder))
+                versions.remove_others(folder, lambda: _used(folder))
         versions.remove_leftovers(folder)
         for stray in folder.glob("*.npy"):  # of a version that kept arrays beside the manifest
             stray.unlink(missing_ok=True)
     except OSError as error:
         raise CorpusError(f"{folder}: cannot be written: {error.strerror or error}") from error
-    if before != digest:
-        cache.forget(before)
+    for gone in before - _digests_of(folder):
+        cache.forget(gone)
     return digest
 
 
-def _write(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str:
+def _write(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], *, keep: bool) -> str:
     """Write a new version, make it the current one, and return its hash; its files are on disk before the manifest."""
     with versions.new_version(folder) as version:
         entries = write_arrays(version, arrays, flush=True)
         sync_folder(version)
         sync_folder(folder)
         head = {"format": BUILT, "version": VERSIONS[BUILT], "folder": int(version.name)}
-        data = msgspec.json.encode({**head, **manifest, "arrays": entries})
-        replace_file(folder / MANIFEST, msgspec.json.format(data, indent=1) + b"\n")
-    return _digest(msgspec.json.decode(data))
+        new = msgspec.json.decode(msgspec.json.encode({**head, **manifest, "arrays": entries}))
+        with _held(folder) as old:
+            if keep and old is not None:
+                kept = replaced(old) if _digest(old) == _digest(new) else _without_previous(old)
+                new |= {_PREVIOUS: kept} if kept else {}
+            _write_manifest(folder, new)
+    return _digest(new)
+
+
+def _write_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
+    data = msgspec.json.encode(manifest)
+    replace_file(folder / MANIFEST, msgspec.json.format(data, indent=1) + b"\n")
+
+
+@contextmanager
+def _held(folder: Path) -> Iterator[dict[str, Any] | None]:
+    """Prevent the removal of a built corpus's current version; yield its manifest, None if there is none to hold."""
+    with ExitStack() as stack:
+        manifest = None
+        with suppress(FormatError):
+            manifest = read_manifest(folder)
+            if not stack.enter_context(versions.hold(_place_of(folder, manifest))):
+                manifest = None
+        yield manifest
+
+
+def restore(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
+    """Exchange a user's corpus, at once, for the one that its last change replaced, and return its folder.
+
+    Doing it again brings the newer one back.
+
+    Args:
+        name: the name of the corpus.
+        folder: the user's home (`home`).
+
+    Raises:
+        CorpusError: the user has no such corpus, or none that it replaced, or its folder cannot be written.
+    """
+    place = own_place(name, folder)
+    manifest = read_manifest(place)
+    old = replaced(manifest)
+    try:
+        with versions.hold(_place_of(place, old or manifest)) as there:
+            if old is None or not there:
+                raise CorpusError(f"no corpus is kept that {name!r} replaced")
+            _write_manifest(place, old | {"name": name, _PREVIOUS: _without_previous(manifest)})
+    except OSError as error:
+        raise CorpusError(f"{place}: cannot be written: {error.strerror or error}") from error
+    return place
 
 
 def _digest(manifest: Mapping[str, Any]) -> str:
     """Return a hash of a built corpus: of its manifest, which holds its arrays' checksums, but for its name."""
-    kept = {key: value for key, value in manifest.items() if key not in ("name", "folder")}
+    kept = {key: value for key, value in manifest.items() if key not in ("name", "folder", _PREVIOUS)}
     return hashlib.sha256(msgspec.json.encode(kept)).hexdigest()[:16]
 
 
-def _digest_of(folder: Path) -> str:
-    """Return the hash of the built corpus in a folder; "none" if there is none that can be read."""
+def _digests_of(folder: Path) -> set[str]:
+    """Return the hashes of the built corpus in a folder and of the one that it replaced, as far as there are any."""
     with suppress(FormatError):
-        return _digest(read_manifest(folder))
-    return "none"
+        return {_digest(manifest) for manifest in _manifests(folder)}
+    return set()
 
 
-def _current(folder: Path) -> Path | None:
-    """Return the folder of the arrays of a built corpus; None if it has no manifest yet."""
-    return _place_of(folder, read_manifest(folder)) if (folder / MANIFEST).exists() else None
+def _used(folder: Path) -> list[Path]:
+    """Return the folders of the arrays of a built corpus, and of the one that it replaced; none without a manifest."""
+    return [_place_of(folder, manifest) for manifest in _manifests(folder)] if (folder / MANIFEST).exists() else []
+
+
+def _manifests(folder: Path) -> list[dict[str, Any]]:
+    """Return the manifest of a built corpus, and that of the one that it replaced, if it is kept."""
+    manifest = read_manifest(folder)
+    old = replaced(manifest)
+    return [manifest] if old is None else [manifest, old]
+
+
+def replaced(manifest: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Return the manifest of the corpus that a built corpus replaced, from its manifest; None if it is not kept."""
+    old = manifest.get(_PREVIOUS)
+    return old if isinstance(old, dict) else None
+
+
+def _without_previous(manifest: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in manifest.items() if key != _PREVIOUS}
 
 
 def _place_of(folder: Path, manifest: Mapping[str, Any]) -> Path:

@@ -1,11 +1,12 @@
 """Replace a folder's content atomically: each version has its own subfolder, and one file names the current version.
 
-    corpora/mine/manifest.json     the current version, in "folder": 3
+    corpora/mine/manifest.json     the current version, in "folder": 3, and in "previous" the manifest of version 2
     corpora/mine/3/*.npy           its arrays
+    corpora/mine/2/*.npy           the arrays of the version that it replaced
 
 To replace version 3, a writer makes folder 4, fills and flushes it, and moves a new manifest over the old one. Readers
 find version 3 before that move and version 4 after it. Readers and writers of a version lock its folder; the lock ends
-with the process, and cleaning removes versions without locks.
+with the process, and cleaning removes versions that have no lock and are not in the manifest.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import secrets
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from itertools import count
 from pathlib import Path
@@ -59,18 +60,18 @@ def new_version(folder: Path) -> Iterator[Path]:
                 return
 
 
-def remove_others(folder: Path, current: Callable[[], Path | None]) -> None:
-    """Remove all versions of `folder` except the current one and locked ones; ignore errors.
+def remove_others(folder: Path, used: Callable[[], Collection[Path]]) -> None:
+    """Remove all versions of `folder` except used ones and locked ones; ignore errors.
 
     Args:
         folder: the folder.
-        current: returns the folder of the current version; None if there is none yet.
+        used: returns the folders of the current version, and of the one that it replaced; none if there are none yet.
     """
     with suppress(OSError):
         for version in filter(_is_version, folder.iterdir()):
             with suppress(OSError), locked(version, alone=True) as unused:
-                # Call current() only now: a writer holds a version while it makes it current.
-                if unused and current() != version:
+                # Call used() only now: a writer holds a version while it makes it current.
+                if unused and version not in used():
                     for file in version.iterdir():
                         if _is_array(file) or TEMPORARY.fullmatch(file.name):
                             file.unlink()

@@ -103,7 +103,8 @@ class LearnedCorpus(Learned):
         """Write the corpus to a folder, completely or not at all, and cache the learned data.
 
         Args:
-            folder: the folder; a built corpus in it is replaced.
+            folder: the folder; a built corpus in it is replaced, and kept beside the new one until the next change
+                (`motionmind corpus restore` brings it back).
 
         Raises:
             CorpusError: the folder cannot be written, or holds anything but a built corpus.

@@ -54,22 +54,23 @@ _Part = TypeVar("_Part", Transitions, Bridges, Coordination, PostureStatistics, 
 _CORPUS_KEYS = ("name", "title", "author", "source", "licence", "facing", "rate", "skip", "citation")
 
 
-def save(learned: Learned, folder: str | os.PathLike[str]) -> None:
+def save(learned: Learned, folder: str | os.PathLike[str], *, keep: bool = True) -> None:
     """Write a learned corpus to a folder, atomically, and cache what was learned.
 
     Args:
         learned: the learned corpus.
         folder: the destination; a built corpus there is replaced.
+        keep: whether the replaced one stays beside it (`motionmind.corpus.store.save`).
 
     Raises:
         CorpusError: the folder cannot be written, or holds anything but a built corpus.
     """
-    cache.remember(save_movement(learned, folder), learned_arrays(learned))
+    cache.remember(save_movement(learned, folder, keep=keep), learned_arrays(learned))
 
 
-def save_movement(learned: Learned, folder: str | os.PathLike[str]) -> str:
+def save_movement(learned: Learned, folder: str | os.PathLike[str], *, keep: bool = True) -> str:
     """Write a corpus to a folder, as `save` does, without caching; return the corpus's hash."""
-    return store.save(Path(folder), _manifest(learned), _movement(learned))
+    return store.save(Path(folder), _manifest(learned), _movement(learned), keep=keep)
 
 
 def load_movement(folder: str | os.PathLike[str]) -> Learned:
@@ -172,7 +173,7 @@ def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:
             warnings.warn(f"{what}; learning from {folder.name} again", MotionMindWarning, stacklevel=2)
     learned = learn(*_read_source(folder, source))
     try:
-        save(learned, built)
+        save(learned, built, keep=False)  # it can be made again
     except CorpusError as error:
         warnings.warn(f"{error}; each command will learn {folder.name} again", MotionMindWarning, stacklevel=2)
     return learned

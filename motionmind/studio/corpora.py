@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
@@ -15,6 +14,7 @@ import numpy as np
 from motionmind.body.motion import Motion
 from motionmind.corpus import store
 from motionmind.corpus.corpus import Corpus
+from motionmind.corpus.manifest import count_clips
 from motionmind.display import displayed
 from motionmind.errors import CorpusError, MotionMindError
 from motionmind.studio.reading import Facts, load_clip
@@ -91,7 +91,7 @@ def list_all(home: Path | None) -> list[dict[str, Any]]:
             entry["title"] = displayed(str(manifest.get("title") or ""), _MAX_TITLE_LENGTH)
             entry["rate"] = manifest.get("rate")
             if manifest["format"] == store.BUILT:
-                entry["clips"] = _count_clips(manifest)
+                entry["clips"] = count_clips(manifest)
         except MotionMindError as error:
             entry["error"] = displayed(str(error), _MAX_TITLE_LENGTH)
         found.append(entry)
@@ -105,13 +105,6 @@ def _rate_of(lesson: Lesson, home: Path | None) -> float | Literal["auto"]:
     folders = store.list_corpora(home)
     rates = [store.read_manifest(folders[known(one.name, home)]).get("rate") for one in lesson.mix]
     return min((float(rate) for rate in rates if rate is not None), default="auto")
-
-
-def _count_clips(manifest: dict[str, Any]) -> int:
-    """Return the number of clips of a built corpus."""
-    with suppress(LookupError, TypeError):
-        return int(manifest["arrays"]["clips.order"]["shape"][0])
-    return 0
 
 
 def _is_own(name: str, folder: Path, home: Path | None) -> bool:

@@ -44,7 +44,7 @@ def files_under(folder: Path) -> dict[str, bytes]:
 
 
 def built(run: Run, *arguments: object, name: str = "mine") -> Any:
-    """What there is to know of a corpus that is built with these arguments."""
-    ran = run("corpus", "build", name, *arguments)
+    """What there is to know of a corpus that is built with these arguments, perhaps in place of an earlier one."""
+    ran = run("corpus", "build", name, *arguments, "--replace")
     assert ran.code == 0, ran.err
     return run("corpus", "check", name, "--json", "--pairs", 50).json

@@ -144,7 +144,7 @@ def test_a_posture_among_the_clips_is_noticed(run: Run) -> None:
     write_motion("walk.json", clip(fps=30.0))
     Path("A.json").write_bytes(ARABESQUE.read_bytes())
     for skip in (0, 1):
-        ran = run("corpus", "build", "mine", "A.json", "walk.json", "--skip", skip)
+        ran = run("corpus", "build", "mine", "A.json", "walk.json", "--skip", skip, "--replace")
         assert ran.code == 0
         end = "; left out" if skip else ""
         assert f"note: A.json: holds one posture, and no move to learn from{end}\n" in ran.err
@@ -162,7 +162,7 @@ def test_a_recording_is_varied_as_the_corpus_learned_it(run: Run) -> None:
     assert rot.angle(piece.motion.rotations[piece.frames], learned.rotations).max() < 1e-6
     for words in (("--from", 0), ("--from", 1)):
         assert "begins at frame" not in run(*vary, *words).err
-    assert run("corpus", "build", "mine", "clip.bvh", "--rate", 6).code == 0
+    assert run("corpus", "build", "mine", "clip.bvh", "--rate", 6, "--replace").code == 0
     assert "begins at frame" not in run(*vary).err
 
 
@@ -193,7 +193,8 @@ def test_of_many_warnings_a_few_are_printed(run: Run) -> None:
     for number in range(9):
         Path(f"take{number}.json").write_text(json.dumps(motion), "utf-8")
     takes = [f"take{number}.json" for number in range(9)]
-    few, all_of_them = (run("corpus", "build", "mine", *takes, *more).err.splitlines() for more in ((), ["--details"]))
+    build = ("corpus", "build", "mine", *takes)
+    few, all_of_them = (run(*build, *more).err.splitlines() for more in ((), ["--details", "--replace"]))
     assert few == [*all_of_them[:3], "note: 6 more warnings like these (--details prints them)"]
     assert len(all_of_them) == 9
 

@@ -99,7 +99,7 @@ def test_what_compose_writes_is_left_as_it_is_and_a_recording_is_not(run: Run, s
     keyframes = read_motion(f"score{suffix}")
     assert built(run, f"score{suffix}")["postures"] == len(keyframes)
     write_motion("film.bvh", clip(fps=120.0))
-    ran = run("corpus", "build", "mine", f"score{suffix}", "film.bvh", "--unit", "cm")
+    ran = run("corpus", "build", "mine", f"score{suffix}", "film.bvh", "--unit", "cm", "--replace")
     assert ran.err.count("note: corpus mine: 5 postures a second of each recording") == 1
     found = run("corpus", "info", "mine", "--json").json
     assert [one["postures"] for one in found["clips"]] == [len(keyframes), len(clip(fps=5.0))]
@@ -191,14 +191,35 @@ def test_a_tween_among_recordings_is_told(run: Run, suffix: str) -> None:
     told = "hold movement that the engine made"
     ran = run("corpus", "build", "mine", "walk.bvh", f"tween{suffix}")
     assert f"1 of 2 recordings {told}, learned as if it were recorded: tween" in ran.err
-    assert told not in run("corpus", "build", "mine", "walk.bvh").err
+    assert told not in run("corpus", "build", "mine", "walk.bvh", "--replace").err
 
 
-def test_a_corpus_of_the_same_name_is_replaced(run: Run) -> None:
+def test_a_corpus_of_the_same_name_is_replaced_only_on_demand_and_comes_back(run: Run, tmp_path: Path) -> None:
     write_motion("walk.bvh", clip())
     write_motion("step.bvh", clip("plies"))
-    assert [entry["name"] for entry in built(run, "walk.bvh")["clips"]] == ["walk"]
-    assert [entry["name"] for entry in built(run, "step.bvh", "--rate", 5)["clips"]] == ["step"]
+    build = ("corpus", "build", "mine")
+
+    def clips() -> list[str]:
+        assert [entry["name"] for entry in run("corpus", "list", "--json").json].count("mine") == 1
+        return [entry["name"] for entry in run("corpus", "info", "mine", "--json").json["clips"]]
+
+    assert run(*build, "walk.bvh", "step.bvh").code == 0
+    before = files_under(tmp_path)
+    ran = run(*build, "step.bvh")
+    refusal = r"error: you have a corpus 'mine' already \(2 clips, [-0-9]{10} [:0-9]{5}\); --replace replaces it\n"
+    assert (ran.code, ran.out) == (2, "")
+    assert re.fullmatch(refusal, ran.err), ran.err
+    assert run(*build, "nothing.bvh", "--replace").code == 2
+    assert files_under(tmp_path) == before
+    kept = "note: corpus restore mine brings back the replaced corpus (2 clips), until the next change\n"
+    assert kept in run(*build, "step.bvh", "--rate", 5, "--replace").err
+    assert clips() == ["step"]
+    assert run("corpus", "restore", "mine").out == f"restored {tmp_path / 'home' / 'corpora' / 'mine'} (2 clips)\n"
+    assert clips() == ["walk", "step"]
+    assert "note: corpus restore mine brings back" in run("corpus", "remove", "mine", "walk").err
+    assert clips() == ["step"]
+    assert run("corpus", "restore", "mine").code == 0
+    assert clips() == ["walk", "step"]
 
 
 def test_a_corpus_is_renamed_and_deleted(run: Run, tmp_path: Path) -> None:
@@ -278,7 +299,7 @@ def test_recordings(run: Run, shared_data: Path, tmp_path: Path) -> None:
     assert run("tween", "A.json", "B.json", "--corpus", "mine", "-o", "tween.bvh").code == 0
     truncated = shared_data / "importer" / "cmu_kick_truncated.bvh"
     before = files_under(tmp_path)
-    ran = run("corpus", "build", "mine", recordings[2], truncated, "--strict-files")
+    ran = run("corpus", "build", "mine", recordings[2], truncated, "--strict-files", "--replace")
     assert ran.code == 2
     assert re.search(r"error: \S+cmu_kick_truncated\.bvh:\d+: ", ran.err)
     assert files_under(tmp_path) == before

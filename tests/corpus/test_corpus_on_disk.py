@@ -56,8 +56,9 @@ def test_the_same_things_are_saved_as_the_same_bytes(tmp_path: Path) -> None:
 
 def test_an_older_one_is_replaced_whole(tmp_path: Path) -> None:
     store.save(tmp_path / "arms", MANIFEST, arrays() | {"more": np.zeros(3)})
-    store.save(tmp_path / "arms", MANIFEST, arrays(1))
-    np.testing.assert_array_equal(store.load(tmp_path / "arms").arrays["rotations"], arrays(1)["rotations"])
+    for seed in (1, 2):  # the last but one is kept
+        store.save(tmp_path / "arms", MANIFEST, arrays(seed))
+    np.testing.assert_array_equal(store.load(tmp_path / "arms").arrays["rotations"], arrays(2)["rotations"])
     assert not list(tmp_path.rglob("more.npy"))
     assert [path.name for path in tmp_path.iterdir()] == ["arms"]
 
@@ -150,7 +151,8 @@ def test_a_corpus_of_another_version_is_one_line_with_the_command_that_rebuilds_
     for file in (folder / "states.npy", folder / "3" / "states.npy"):
         np.save(file, np.zeros(3))
     (folder / store.MANIFEST).write_text(json.dumps({"format": store.BUILT, "version": version, "folder": 3}), "utf-8")
-    remedy = f"{folder}/manifest.json: a corpus of {age} version; rebuild it: motionmind corpus build mine FILES\n"
+    command = "motionmind corpus build mine FILES --replace"
+    remedy = f"{folder}/manifest.json: a corpus of {age} version; rebuild it: {command}\n"
     ran = run("corpus", "info", "mine")
     assert (ran.code, ran.out, ran.err) == (2, "", f"error: {remedy}")
     listed = run("corpus", "list")

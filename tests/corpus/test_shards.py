@@ -223,7 +223,7 @@ def test_files_on_other_joints_than_most_are_reported(run: Run, files: dict[Path
     assert f"note: {odd}: is on another skeleton than {next(iter(files))}: odd lacks " in ran.err
     assert "may bring it there); left out\nnote: left out 1 file of 6\n" in ran.err
     assert run("corpus", "info", "mine", "--json").json["joints"][0] == "pelvis"
-    ran = run("corpus", "build", "mine", odd, *files, "--strict-files")
+    ran = run("corpus", "build", "mine", odd, *files, "--strict-files", "--replace")
     assert (ran.code, f"error: {odd}: is on another skeleton than " in ran.err) == (2, True)
 
 

@@ -138,7 +138,10 @@ def test_another_corpus_has_another_cache_and_another_name_has_the_same(
         no_learning(patch)
         assert persistence.load("ours", home).corpus.name == "ours"
     persistence.save(persistence.load("karate"), built.with_name("ours"))
-    assert kept() != before  # which a build of another corpus removed
+    assert before.exists()  # while its corpus can be restored
+    persistence.save(persistence.load("macarena"), built.with_name("ours"))
+    assert not before.exists()
+    assert len(list(before.parent.iterdir())) == 2
     store.delete("ours", home)
     assert list(before.parent.iterdir()) == []
 

@@ -194,7 +194,7 @@ def test_nothing_that_a_terminal_acts_on_is_printed(tmp_path: Path, run: Run) ->
         (0, ("corpus", "build", "strange", "strange.json")),
         (0, ("corpus", "check", "strange")),
         (0, ("corpus", "build", "both", "strange.json", "clip.json")),
-        (2, ("corpus", "build", "both", "strange.json", "clip.json", "--strict-files")),
+        (2, ("corpus", "build", "both", "strange.json", "clip.json", "--strict-files", "--replace")),
         (2, ("tween", f"{FOREIGN}.json", "clip.json", "--corpus", "mine")),
         (2, ("tween", "clip.json@0", "clip.json@9", "--corpus", FOREIGN)),
         (2, ("tween", "strange.json@0", "strange.json@9", "--corpus", "mine")),

@@ -28,6 +28,7 @@ from motionmind.errors import CorpusError, FormatError
 
 PROGRAM = Path(saved_corpora.__file__)
 WHOLE = ["manifest.json", "part.targets.npy", "rotations.npy", "states.npy"]
+WITH_KEPT = sorted([*WHOLE, *WHOLE[1:]])  # and those of the corpus that it replaced
 # Calls that change what is on disk. Others fail or are repeated without a trace.
 CALLS = ("rename", "unlink", "unlinkat", "rmdir", "mkdir", "write", "fsync", "flock")
 
@@ -49,16 +50,24 @@ def saved(folder: Path) -> None:
 
 
 def check(folder: Path, before: Callable[[Path], None]) -> None:
-    """Check that all is old or all new, that nothing else is listed, and that the next build mends the rest."""
-    listed = {name for name, place in store.list_corpora(folder.parents[1]).items() if place.parent == folder.parent}
+    """Check that all is old or all new, that nothing else is listed, and that the next build mends the rest.
+
+    What it replaced is whole, too, and what the next build replaces.
+    """
+    home = folder.parents[1]
+    listed = {name for name, place in store.list_corpora(home).items() if place.parent == folder.parent}
     assert listed <= {"arms"}
     if listed or before is not nothing:
-        assert seed_of(folder) in (1, 2)
+        assert (seed := seed_of(folder)) in (1, 2)
+        if before is saved:
+            assert [seed_of(store.restore("arms", home)) for _ in range(2)] == [seed - 1, seed]
     for temporary in folder.glob(".motionmind-*"):
         os.utime(temporary, (time.time() - 120.0,) * 2)  # no younger one is taken for a leftover
     store.save(folder, MANIFEST, arrays(3))
     assert seed_of(folder) == 3
-    assert sorted(Path(name).name for name in names(folder.parent)) == WHOLE
+    assert sorted(Path(name).name for name in names(folder.parent)) == (WITH_KEPT if listed else WHOLE)
+    if listed:
+        assert seed_of(store.restore("arms", home)) == seed
 
 
 @pytest.mark.parametrize("before", [nothing, saved])
@@ -111,7 +120,7 @@ def test_an_error_or_ctrl_c_on_the_way_leaves_the_old_one_and_nothing_else(
                     assert names(mine.parent) == there
                 else:  # the folder could not be flushed after the move
                     assert (name, seed_of(mine)) == ("fsync", 2)
-                    assert sorted(Path(file).name for file in names(mine.parent)) == WHOLE
+                    assert sorted(Path(file).name for file in names(mine.parent)) == WITH_KEPT
                     break
             shutil.rmtree(mine)
             saved(mine)
@@ -154,7 +163,7 @@ def test_a_version_in_use_is_removed_once_nobody_uses_it(mine: Path) -> None:
         store.save(mine, MANIFEST, arrays(2))
         assert names(mine / "1") == WHOLE[1:]
     store.save(mine, MANIFEST, arrays(3))
-    assert [path.name for path in mine.iterdir() if path.is_dir()] == ["3"]
+    assert sorted(path.name for path in mine.iterdir() if path.is_dir()) == ["2", "3"]
     with versions.hold(mine / "1") as there:
         assert not there
 
@@ -266,7 +275,7 @@ def test_a_version_that_another_writer_removed_and_made_anew_is_that_writers(
     def interrupted(version: Path) -> None:
         monkeypatch.undo()
         version.mkdir()
-        versions.remove_others(mine, lambda: None)  # nobody holds it yet
+        versions.remove_others(mine, lambda: ())  # nobody holds it yet
         assert others.enter_context(versions.new_version(mine)) == version
 
     monkeypatch.setattr(Path, "mkdir", interrupted)
@@ -283,13 +292,13 @@ def test_a_version_made_anew_under_the_number_of_one_that_was_to_go_stays(
 
     def interrupted(descriptor: int, operation: int) -> None:
         monkeypatch.undo()
-        versions.remove_others(mine, lambda: None)  # it is another writer who removes the first, and who makes it anew
+        versions.remove_others(mine, lambda: ())  # it is another writer who removes the first, and who makes it anew
         assert others.enter_context(versions.new_version(mine)) == mine / "1"
         flock(descriptor, operation)
 
     monkeypatch.setattr(fcntl, "flock", interrupted)
     with others:
-        versions.remove_others(mine, lambda: None)
+        versions.remove_others(mine, lambda: ())
         assert (mine / "1").is_dir()
 
 
@@ -333,5 +342,48 @@ def test_arrays_that_were_loaded_outlive_their_version(mine: Path) -> None:
     store.save(mine, MANIFEST, arrays(1))
     _, found, *_ = store.load(mine)
     store.save(mine, MANIFEST, arrays(2))
+    store.save(mine, MANIFEST, arrays(3))
     assert not (mine / "1").exists()
     assert all((array == 1).all() for array in found.values())
+
+
+# --- what was replaced ------------------------------------------------------------------------------------------------
+
+
+def test_the_last_change_is_undone_and_done_again(mine: Path) -> None:
+    saved(mine)
+    store.save(mine, MANIFEST, arrays(2))
+    home = mine.parents[1]
+    assert [seed_of(store.restore("arms", home)) for _ in range(4)] == [1, 2, 1, 2]
+    assert sorted(Path(name).name for name in names(mine)) == WITH_KEPT
+
+
+def test_building_the_same_again_leaves_what_was_there_before(mine: Path) -> None:
+    saved(mine)
+    store.save(mine, MANIFEST, arrays(1))
+    assert seed_of(store.restore("arms", mine.parents[1])) == 0
+
+
+def test_a_renamed_corpus_keeps_what_it_replaced_under_its_new_name(mine: Path) -> None:
+    saved(mine)
+    home = mine.parents[1]
+    store.rename("arms", "legs", home)
+    place = store.restore("legs", home)
+    assert (seed_of(place), store.read_manifest(place)["name"]) == (0, "legs")
+
+
+def test_a_first_corpus_and_one_whose_arrays_are_gone_cannot_be_restored(mine: Path) -> None:
+    store.save(mine, MANIFEST, arrays(1))
+    with pytest.raises(CorpusError, match="no corpus is kept that 'arms' replaced"):
+        store.restore("arms", mine.parents[1])
+    store.save(mine, MANIFEST, arrays(2))
+    shutil.rmtree(mine / "1")
+    with pytest.raises(CorpusError, match="no corpus is kept that 'arms' replaced"):
+        store.restore("arms", mine.parents[1])
+    assert seed_of(mine) == 2
+
+
+def test_what_is_made_again_anyway_keeps_nothing(mine: Path) -> None:
+    store.save(mine, MANIFEST, arrays(1))
+    store.save(mine, MANIFEST, arrays(2), keep=False)
+    assert sorted(Path(name).name for name in names(mine)) == WHOLE
