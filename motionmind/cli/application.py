@@ -77,6 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             sys.exit(_run(arguments, warned))
     finally:
         log.removeHandler(notes)
+        notes.close()
         log.setLevel(level)
         gc.enable()
 

@@ -107,7 +107,13 @@ def corpora(context: click.Context) -> None:
     help="Treat postures that differ only in where they face as one (free), or as two (stage).",
 )
 @reading
-@option("--strict-files", section=Section.INPUT, is_flag=True, help="End with the first file that would be left out.")
+@option(
+    "--strict-files",
+    section=Section.INPUT,
+    advanced=True,
+    is_flag=True,
+    help="End with the first file that would be left out.",
+)
 @option(
     "--workers",
     section=Section.WORKERS,
@@ -119,6 +125,7 @@ def corpora(context: click.Context) -> None:
 @option(
     "--scheduler",
     section=Section.WORKERS,
+    advanced=True,
     metavar="ADDRESS",
     help="Read with the workers of a Dask cluster, by its scheduler: tcp://HOST:8786. They share this disk.",
 )

@@ -11,7 +11,7 @@ import click
 from click.core import ParameterSource
 
 from motionmind.cli import completion
-from motionmind.cli.types import EXISTING_FILE, FILE, FOLDER, RATE
+from motionmind.cli.types import EXISTING_FILE, FILE, FOLDER, RATE, CorpusName
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -235,6 +235,7 @@ CORPUS = option(
     "--corpus",
     section=Section.CORPORA,
     required=True,
+    type=CorpusName(),
     metavar="NAME",
     help="Corpus to use, by name or folder.",
     shell_complete=completion.corpora,
@@ -262,6 +263,7 @@ def reading(function: _Function) -> _Function:
         option(
             "--asf",
             section=Section.INPUT,
+            advanced=True,
             type=EXISTING_FILE,
             help="Skeleton file of an AMC file  [default: the .asf beside it]",
         ),

@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
+from motionmind.cli.noted import Noted
 from motionmind.display import displayed, displayed_path, printable
 from motionmind.errors import MotionMindWarning, enumerated
+from motionmind.files import FilePath
 
 if TYPE_CHECKING:
     from motionmind.search.solve import Progress
@@ -31,14 +33,26 @@ _N_WARNINGS_PRINTED = 3  # without --details
 
 
 class Notes(logging.Handler):
-    """Prints each logged assumption, such as the unit of a file, once: for the first file that needs it."""
+    """Prints each logged assumption, such as the unit of a file, once: for the first file that needs it.
+
+    A record with a `file` is about that file alone, and no later command prints it again.
+    """
 
     def __init__(self, level: int) -> None:
         super().__init__(level)
         self._printed: set[object] = set()
+        self._noted = Noted()
+
+    def close(self) -> None:
+        """Remember the notes about files."""
+        self._noted.save()
+        super().close()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print a record, unless one that differs in its first argument alone, the file, was printed before."""
+        file: FilePath | None = getattr(record, "file", None)
+        if file is not None and not self._noted.is_new(Path(file), str((record.msg, record.args))):
+            return
         key = (record.msg, record.args[1:] if isinstance(record.args, tuple) else record.args)
         if key not in self._printed:
             self._printed.add(key)

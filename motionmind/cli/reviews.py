@@ -98,7 +98,7 @@ if TYPE_CHECKING:
     default=3,
     help="Number of movements to find for each seam that --smooth smooths.",
 )
-@searching
+@searching(few=True)
 @HOME
 @click.pass_context
 def review(

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
+_FEW = ("pace", "novelty", "liveliness")  # fields of options for a whole piece, rather than for one tween
+
 
 @dataclass(frozen=True)
 class SearchOption:
@@ -96,6 +98,7 @@ SEARCH_OPTIONS = (
         "State, by number or name, that JOINT must avoid between A and B. Repeatable.",
         str,
         "JOINT=STATE",
+        advanced=True,
         multiple=True,
         complete=completion.joints,
     ),
@@ -130,11 +133,25 @@ SEARCH_OPTIONS = (
         Section.SEARCH,
         "Allow only whole postures in the order of the corpus, like the search of 1998.",
         bool,
+        advanced=True,
     ),
     SearchOption(
-        "sample", "--sample", Section.SEARCH, "Sample a path, with probability proportional to exp(-cost).", bool
+        "sample",
+        "--sample",
+        Section.SEARCH,
+        "Sample a path, with probability proportional to exp(-cost).",
+        bool,
+        advanced=True,
     ),
-    SearchOption("seed", "--seed", Section.SEARCH, "Seed of random numbers, such as those of --sample.", NATURAL, "N"),
+    SearchOption(
+        "seed",
+        "--seed",
+        Section.SEARCH,
+        "Seed of random numbers, such as those of --sample.",
+        NATURAL,
+        "N",
+        advanced=True,
+    ),
     SearchOption(
         "max_moves",
         "--max-moves",
@@ -159,6 +176,7 @@ SEARCH_OPTIONS = (
         "Cost of an alternative above the optimum that is accepted, as a share; 0.05 is fast.",
         Number(min=0, max=1),
         "SHARE",
+        advanced=True,
     ),
     SearchOption(
         "node_budget",
@@ -191,6 +209,7 @@ SEARCH_OPTIONS = (
         Section.WEIGH,
         "Coordination of joints: by posture, by progression from posture to posture, or none.",
         click.Choice(get_args(Scheme)),
+        advanced=True,
     ),
     SearchOption(
         "weights",
@@ -248,24 +267,32 @@ SEARCH_OPTIONS = (
 )
 
 
-def searching(function: _Function) -> _Function:
-    """Add all options of the search to a command, with their defaults."""
+def searching(*, few: bool = False) -> Callable[[_Function], _Function]:
+    """Add all options of the search to a command, with their defaults.
+
+    Args:
+        few: whether --help lists only the most frequent ones, for a command with many options of its own.
+    """
     defaults = {field.name: field.default for field in (*fields(TweenRequest), *fields(SearchOptions))}
-    for row in reversed(SEARCH_OPTIONS):
-        attributes = {"is_flag": True} if row.type is bool else {"type": row.type}
-        function = option(
-            row.flags,
-            row.field,
-            section=row.section,
-            advanced=row.advanced,
-            default=() if row.multiple else defaults[row.field],
-            metavar=row.metavar,
-            multiple=row.multiple,
-            help=row.help,
-            shell_complete=row.complete,
-            **attributes,
-        )(function)
-    return function
+
+    def decorate(function: _Function) -> _Function:
+        for row in reversed(SEARCH_OPTIONS):
+            attributes = {"is_flag": True} if row.type is bool else {"type": row.type}
+            function = option(
+                row.flags,
+                row.field,
+                section=row.section,
+                advanced=row.advanced or (few and row.field not in _FEW),
+                default=() if row.multiple else defaults[row.field],
+                metavar=row.metavar,
+                multiple=row.multiple,
+                help=row.help,
+                shell_complete=row.complete,
+                **attributes,
+            )(function)
+        return function
+
+    return decorate
 
 
 def request_options(

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
+from motionmind.cli import completion
 from motionmind.cli.listening import address_of, listen
-from motionmind.cli.options import CORPUS, HOME, Section, command, option
+from motionmind.cli.options import HOME, Section, command, option
 from motionmind.cli.printing import note
 from motionmind.cli.types import PORT
 from motionmind.cli.warming import prepare
@@ -17,15 +18,15 @@ from motionmind.errors import MotionMindError
 _KEEP_ALIVE_S = 5
 
 
-@command("motionmind serve --mmcp --corpus ballet")
+@command("motionmind serve --corpus ballet")
 @option(
-    "--mmcp",
-    section=Section.OUTPUT,
-    is_flag=True,
-    required=True,
-    help="Use MMCP, the protocol of animation programs such as Blender with Proscenium.",
+    "--corpus",
+    section=Section.CORPORA,
+    metavar="NAME",
+    default="ballet",
+    shell_complete=completion.corpora,
+    help="Corpus to use, by name or folder.",
 )
-@CORPUS
 @option(
     "--host",
     section=Section.OUTPUT,
@@ -35,14 +36,13 @@ _KEEP_ALIVE_S = 5
 )
 @option("--port", section=Section.OUTPUT, type=PORT, metavar="N", default=8000, help="Port to listen on.")
 @HOME
-def serve(mmcp: bool, corpus: str, host: str, port: int, home: Path | None) -> None:
+def serve(corpus: str, host: str, port: int, home: Path | None) -> None:
     """Serve movement in the style of a corpus to animation programs, until Ctrl-C.
 
     A program sends a skeleton, poses at frames, waypoints and pins, and receives the movement between them, with a
-    certificate for each stretch. Requires an extra: pip install "motionmind[mmcp]".
+    certificate for each stretch. The protocol is MMCP, which Blender speaks with the add-on Proscenium. Requires an
+    extra: pip install "motionmind[mmcp]".
     """
-    if not mmcp:
-        raise click.UsageError("Missing option '--mmcp': there is no other protocol.", click.get_current_context())
     try:
         import uvicorn
 

@@ -21,12 +21,12 @@ from motionmind.cli.options import HOME, OUTPUT_KINDS, Section, command, option,
 from motionmind.cli.printing import Interruption, note, print_alternatives, print_tween
 from motionmind.cli.search_options import request_options, searching, via_sources
 from motionmind.cli.sources import ends_reader
-from motionmind.cli.types import FILE, Whole
+from motionmind.cli.types import FILE, Whole, known_corpora
 from motionmind.cli.warming import preparing
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError, NoPathError
 from motionmind.files import all_or_none, sha256_of
-from motionmind.names.spelling import PostureName, parse_frames, parse_posture
+from motionmind.names.spelling import PostureName, parse_posture
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
@@ -53,7 +53,13 @@ if TYPE_CHECKING:
 @option(
     "--details", section=Section.OUTPUT, is_flag=True, help="Print costs, states and distances from the corpus, too."
 )
-@option("--problem", section=Section.OUTPUT, type=FILE, help="File of the optimisation problem, for toulbar2 (.cfn).")
+@option(
+    "--problem",
+    section=Section.OUTPUT,
+    advanced=True,
+    type=FILE,
+    help="File of the optimisation problem, for toulbar2 (.cfn).",
+)
 @option(
     "--alternatives",
     section=Section.SEARCH,
@@ -64,24 +70,11 @@ if TYPE_CHECKING:
 @option(
     "--what-if",
     section=Section.SEARCH,
+    advanced=True,
     is_flag=True,
     help="Report the cost of each --pin, --hold, --avoid and --via, and of the length, by searching without it.",
 )
-@option(
-    "--before",
-    section=Section.MOTION,
-    metavar="FRAMES",
-    shell_complete=completion.movement,
-    help="Frames that end in A and give its velocity: FILE@FIRST..LAST, or all of FILE.",
-)
-@option(
-    "--after",
-    section=Section.MOTION,
-    metavar="FRAMES",
-    shell_complete=completion.movement,
-    help="Frames that begin with B and give its velocity; same form as --before.",
-)
-@searching
+@searching()
 @reading
 @HOME
 def tween(
@@ -97,8 +90,6 @@ def tween(
     home: Path | None,
     alternatives: int | None,
     what_if: bool,
-    before: str | None,
-    after: str | None,
     joints: Path | None,
     unit: str | None,
     asf: Path | None,
@@ -110,8 +101,7 @@ def tween(
 
     A and B are postures of corpora, such as ballet/arabesque or ballet/adagio@23 (the postures command lists them),
     files of one posture, or frames of clips. Frames count from 0: clip.bvh@240, or by time clip.bvh@2.0s. Velocities
-    are free, unless --before and --after give them; clip.bvh@240~ has the clip's velocity. The input options apply to
-    every motion file on the command line.
+    are free; clip.bvh@240~ has the clip's velocity. The input options apply to every motion file on the command line.
 
     Ctrl-C ends the search: the command writes the best movement found and its bound, and exits with code 130. Exit
     code 3 means that no path joins A and B under these constraints; --report then holds the diagnosis.
@@ -127,10 +117,9 @@ def tween(
     from motionmind.tween.report import plain
 
     named = parse_posture(a, home), parse_posture(b, home)
-    around = tuple(parse_frames(word, home) if word else None for word in (before, after))
     files = _Files(outputs, report, problem, alternatives)
     taker = check_delivery(outputs, program, rig)
-    sources = [one.source for one in (*named, *around) if one]
+    sources = [one.source for one in named]
     vias = via_sources(options, home)
     files.check([path for source in (*sources, *vias) for path in source.paths] + ([rig] if rig else []))
     corpus = corpus or _corpus_of(named, home)
@@ -141,8 +130,8 @@ def tween(
     for source in sources:
         check_named(source, home)
     with preparing():  # before a bundled corpus is learned
-        start, request["before"] = read_end(named[0], around[0], "before", home, read)
-        end, request["after"] = read_end(named[1], around[1], "after", home, read)
+        start, request["before"] = read_end(named[0], "before", home, read)
+        end, request["after"] = read_end(named[1], "after", home, read)
         on = None
         if any(map(takes_delivery, outputs)):
             on = find_rig(rig, named, joints=joints, unit=unit, source_fps=source_fps, up=up)
@@ -173,8 +162,10 @@ def _corpus_of(ends: Sequence[PostureName], home: Path | None) -> str:
     if not corpora:
         for end in ends:
             find_motion(end.source, home)  # raises if there is no such file
-        context = click.get_current_context()
-        raise click.UsageError("Missing option '--corpus': neither A nor B is a posture of a corpus.", context)
+        message = (
+            f"Missing option '--corpus': neither A nor B is a posture of a corpus; there are {known_corpora(home)}."
+        )
+        raise click.UsageError(message, click.get_current_context())
     if len(set(corpora)) > 1:
         for end in ends:
             find_posture(end, home)  # raises if there is no such posture

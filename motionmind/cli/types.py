@@ -51,6 +51,30 @@ def _has_too_many_digits(word: str) -> bool:
     return len(word) > 18 and word.isdecimal()
 
 
+class CorpusName(click.ParamType[str]):
+    """The name of a corpus, or its folder; a missing one is an error that lists the user's corpora and the others."""
+
+    name = "name"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the name."""
+        return str(value)
+
+    def get_missing_message(self, param: click.Parameter, ctx: click.Context | None) -> str:
+        """Return the names of all corpora, the user's own first."""
+        return f"There are {known_corpora(ctx.params.get('home') if ctx else None)}"
+
+
+def known_corpora(home: Path | None) -> str:
+    """Enumerate all corpora for a message, the user's own first."""
+    from motionmind.bundled import bundled
+    from motionmind.corpus.store import list_corpora
+    from motionmind.errors import enumerated
+
+    corpora = list_corpora(home)
+    return enumerated(sorted(corpora, key=lambda name: corpora[name].parent == bundled("corpora")), 20) or "none"
+
+
 class Moves(click.ParamType["int | tuple[int, int]"]):
     """A number of moves, "8", or a range of numbers, "6..10"."""
 

@@ -83,6 +83,7 @@ if TYPE_CHECKING:
 @option(
     "--by",
     section=Section.TRAJECTORY,
+    advanced=True,
     type=click.Choice(ORDERS),
     default="attractor",
     help="Order of the postures: attractor or, to compare, a control: random (shuffle), the attractor's chunks in "
@@ -100,6 +101,7 @@ if TYPE_CHECKING:
 @option(
     "--parameter",
     section=Section.TRAJECTORY,
+    advanced=True,
     multiple=True,
     metavar="NAME=VALUE",
     help="Parameter of the flow, such as rho=28. Repeatable.",
@@ -137,6 +139,7 @@ if TYPE_CHECKING:
 @option(
     "--skip",
     section=Section.TRAJECTORY,
+    advanced=True,
     type=NATURAL,
     metavar="M",
     default=10,
@@ -152,6 +155,7 @@ if TYPE_CHECKING:
 @option(
     "--start",
     section=Section.TRAJECTORY,
+    advanced=True,
     type=Point(),
     metavar="X,Y,Z",
     help="Initial point of the piece's trajectory  [default: the flow's own]",
@@ -179,7 +183,7 @@ if TYPE_CHECKING:
     default=3,
     help="Number of movements to find for each insertion.",
 )
-@searching
+@searching(few=True)
 @reading
 @click.pass_context
 def vary(

@@ -42,7 +42,7 @@ _UNFINISHED_S, _EXPIRY_S = 86_400.0, 60 * 86_400.0  # a folder without change fo
 
 
 def cache_folder(room: str) -> Path:
-    """Return a folder of the user's cache: "corpora" (compiled bundled corpora), "learned" or "archives"."""
+    """Return a folder of the user's cache: "corpora" (compiled bundled corpora), "learned", "archives" or "notes"."""
     return Path(platformdirs.user_cache_dir("motionmind", appauthor=False)) / room
 
 

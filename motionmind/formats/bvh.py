@@ -66,7 +66,8 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None, fps: float | No
     frame_time = stated if fps is None else 1.0 / fps
     if unit is None:
         name, scale = guess_unit(body.skeleton)
-        _log.info("%s: one unit taken as %.5g m (%s), by the height of the body", path, scale, name)
+        text = "%s: one unit taken as %.5g m (%s), by the height of the body"
+        _log.info(text, path, scale, name, extra={"file": path})
     else:
         scale = metres_per_unit(unit)
     for message in (*body.repairs(scale), *_implausible(body, stated if fps is None else 0.0)):

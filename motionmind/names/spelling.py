@@ -20,11 +20,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from motionmind.errors import MotionMindError
-
 _MOMENT = r"-?\d{1,9}|\d{1,9}(?:\.\d{1,9})?s"  # more digits are a typing error
 _POSTURE = re.compile(rf"(.+?)(?:@({_MOMENT}))?(~?)", re.ASCII | re.DOTALL)
-_FRAMES = re.compile(rf"(.+)@({_MOMENT})\.\.({_MOMENT})", re.ASCII | re.DOTALL)
 _SCORE = re.compile(r"(.+?\.score)(?:/(.+))?", re.IGNORECASE | re.DOTALL)
 
 
@@ -85,15 +82,6 @@ class PostureName:
     is_moving: bool = False
 
 
-@dataclass(frozen=True)
-class FramesName:
-    """The name of consecutive frames: their movement, the first and the last frame."""
-
-    source: Source
-    first: Moment
-    last: Moment
-
-
 def parse_source(word: str, home: Path | None = None) -> Source:
     """Parse the name of a movement: a file, a score, a corpus, SCORE/NAME or CORPUS/NAME.
 
@@ -129,24 +117,6 @@ def parse_posture(word: str, home: Path | None = None) -> PostureName:
         return PostureName(word, parse_source(word, home))
     place, moment, tilde = found.groups()
     return PostureName(word, parse_source(place, home), None if moment is None else Moment.of(moment), bool(tilde))
-
-
-def parse_frames(word: str, home: Path | None = None) -> FramesName:
-    """Parse frames such as "clip.bvh@230..240", both inclusive, or "clip.bvh", all frames.
-
-    Args:
-        word: the name.
-        home: the folder of the user's corpora; None for the default folder.
-
-    Raises:
-        MotionMindError: the word names neither a movement nor frames of one.
-    """
-    found = _FRAMES.fullmatch(word)
-    if found and not is_file(word):
-        return FramesName(parse_source(found[1], home), Moment.of(found[2]), Moment.of(found[3]))
-    if "@" in Path(word).name and not is_file(word):
-        raise MotionMindError(f"{word}: give a file, or frames of one such as clip.bvh@230..240")
-    return FramesName(parse_source(word, home), Moment(0), Moment(-1))
 
 
 def is_file(word: str) -> bool:

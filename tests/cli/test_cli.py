@@ -184,6 +184,29 @@ def test_review_says_which_file_it_wants(run: Run) -> None:
         assert ran.err == f"error: {file}: holds movement alone; a variation is the .json that vary wrote{hint}\n"
 
 
+def test_the_unit_of_a_file_is_noted_once(run: Run, empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = [f"{name}.bvh" for name in "abc"]
+    for name in files:
+        write_motion(name, clip())
+
+    def noted(*names: str) -> list[str]:
+        return re.findall(
+            r"note: (\S+): one unit taken", "".join(run("convert", name, "out.json").err for name in names)
+        )
+
+    assert noted(*files) == files
+    assert noted(*files) == []
+    write_motion("b.bvh", clip().slice(0, 5))
+    assert noted(*files) == ["b.bvh"]
+    assert run("corpus", "build", "mine", *files).err.count("one unit taken") == 0
+    monkeypatch.setattr("motionmind.cli.noted._N_REMEMBERED", 1)
+    write_motion("d.bvh", clip())
+    assert noted("d.bvh") == ["d.bvh"]
+    assert noted("d.bvh", "a.bvh") == ["a.bvh"]
+    (empty_cache / "notes" / "printed").write_bytes(b"\xff")
+    assert noted("d.bvh") == ["d.bvh"]
+
+
 def test_of_many_warnings_a_few_are_printed(run: Run) -> None:
     posture = json.loads(ARABESQUE.read_text("utf-8"))
     posture["rotations"]["left_hip"] = [2.0 * number for number in posture["rotations"]["left_hip"]]

@@ -87,7 +87,7 @@ def test_joints_of_ones_own_are_mapped_in_ends_in_movement_around_them_and_in_po
     Path("map.toml").write_text("".join(f'J{i} = "{name}"\n' for i, name in enumerate(names)), "utf-8")
 
     def tween(of: str, *more: object) -> Motion:
-        ends = (f"{of}@20", f"{of}@40", "--before", f"{of}@14..20", "--after", f"{of}@40..46", "--via", f"{of}@30@")
+        ends = (f"{of}@20~", f"{of}@40~", "--via", f"{of}@30@")
         ran = run(*TWEEN, *ends, "-o", "t.json", *more)
         assert ran.code == 0, ran.err
         return read_motion("t.json")

@@ -119,6 +119,12 @@ def test_help_has_whole_sentences_and_no_range_without_bounds(path: tuple[str, .
 
 
 @pytest.mark.parametrize("path", PAGES, ids=" ".join)
+def test_help_lists_few_options(path: tuple[str, ...], run: Run) -> None:
+    listed = [line for line in run(*path, "--help").out.splitlines() if line.startswith("  -")]
+    assert len(listed) <= 24
+
+
+@pytest.mark.parametrize("path", PAGES, ids=" ".join)
 def test_every_option_is_in_exactly_one_section(path: tuple[str, ...]) -> None:
     command = COMMANDS.get(path, app)
     assert isinstance(command, Command)

@@ -21,7 +21,7 @@ from motionmind.errors import MotionMindError
 from motionmind.formats import read_motion, write_motion, write_posture
 from motionmind.geometry import rotations as rot
 from motionmind.names.postures import find_posture
-from motionmind.names.spelling import Moment, parse_frames, parse_posture
+from motionmind.names.spelling import Moment, parse_posture
 
 FIFTH = BALLET / "postures" / "fifth.json"
 
@@ -91,8 +91,8 @@ def test_a_frame_of_every_format_is_the_frame_with_the_movement_around_it(name: 
         found = find_posture(parse_posture(f"{name}@{frame}"), read=read_motion).posture
         np.testing.assert_array_equal(found.rotations, whole.posture(frame).rotations)
         np.testing.assert_array_equal(found.root, whole.posture(frame).root)
-    a, before = read_end(parse_posture(f"{name}@9~"), None, "before")
-    b, after = read_end(parse_posture(f"{name}@9~"), None, "after")
+    a, before = read_end(parse_posture(f"{name}@9~"), "before")
+    b, after = read_end(parse_posture(f"{name}@9~"), "after")
     assert before is not None
     assert after is not None
     around = 6  # 0.2 s
@@ -106,22 +106,12 @@ def test_a_frame_of_every_format_is_the_frame_with_the_movement_around_it(name: 
 def test_movement_next_to_the_ends_of_a_clip_is_what_there_is() -> None:
     write_motion("clip.json", clip())
     last = len(clip()) - 1
-    _, before = read_end(parse_posture("clip.json@2~"), None, "before")
-    _, after = read_end(parse_posture("clip.json@-2~"), None, "after")
+    _, before = read_end(parse_posture("clip.json@2~"), "before")
+    _, after = read_end(parse_posture("clip.json@-2~"), "after")
     assert before is not None
     assert after is not None
     assert (len(before), len(after)) == (3, 2)
     assert after.times[-1] == clip().times[last]
-
-
-def test_the_movement_around_a_frame_is_that_of_the_frames_named() -> None:
-    write_motion("clip.json", clip())
-    named, frames = parse_posture("clip.json@9"), parse_frames("clip.json@3..9")
-    _, before = read_end(named, frames, "before")
-    assert before is not None
-    np.testing.assert_allclose(before.times, clip().times[3:10], atol=1e-9)
-    _, beside = read_end(named, None, "before")
-    assert beside is None
 
 
 # --- on the command line ----------------------------------------------------------------------------------------------
@@ -131,9 +121,6 @@ def test_a_tween_begins_and_ends_as_fast_as_the_clip(run: Run) -> None:
     write_motion("clip.bvh", clip())
     by_tilde = tween(run, "clip.bvh@10~", "clip.bvh@30~").json["asked"]
     assert (by_tilde["before"], by_tilde["after"]) == (pytest.approx(0.2, abs=1e-4), pytest.approx(0.2, abs=1e-4))
-    frames = ("--before", "clip.bvh@7..10", "--after", "clip.bvh@30..31")
-    by_frames = tween(run, "clip.bvh@10", "clip.bvh@30", *frames).json["asked"]
-    assert (by_frames["before"], by_frames["after"]) == (pytest.approx(0.1, abs=1e-4), pytest.approx(1 / 30, abs=1e-4))
     alone = tween(run, "clip.bvh@10", FIFTH).json["asked"]
     assert (alone["before"], alone["after"]) == (None, None)
     ran = run("tween", "clip.bvh@10~", FIFTH, "--corpus", "ballet", "-o", "out.json", "--details")
@@ -164,13 +151,6 @@ def test_a_frame_of_a_clip_is_passed(run: Run) -> None:
             ["clip.bvh@3x", "B.json"],
             r"clip\.bvh: @3x is neither a frame, such as @240, nor seconds, such as @2\.0s",
         ),
-        (["clip.bvh@9~", "B.json", "--before", "clip.bvh@3..9"], r"clip\.bvh@9~: ~ takes .* and so does --before"),
-        (["clip.bvh@9", "B.json", "--before", "clip.bvh@3..99"], r"clip\.bvh: frames are 0 to 36, .* no frame 99"),
-        (["clip.bvh@9", "B.json", "--before", "clip.bvh@9..3"], r"the last frame, 3, lies before the first, 9"),
-        (["clip.bvh@9", "B.json", "--before", "clip.bvh@9"], r"give a file, or frames of one such as"),
-        (["clip.bvh@9", "B.json", "--before", "clip.bvh@3..30"], r"before A does not end in A: \w+ is [\d.]+ degrees"),
-        (["B.json", "clip.bvh@9", "--after", "clip.bvh@3..9"], r"after B does not begin in B: \w+ is [\d.]+ degrees"),
-        (["clip.bvh@9", "B.json", "--before", "clip.bvh@9..9"], r"has one frame, which shows no velocity"),
         (
             ["clip.bvh@0", "B.json", "--via", "clip.bvh@15"],
             r"the last @ is a move, .* write clip\.bvh@15@ for frame 15",
@@ -197,14 +177,9 @@ def test_what_cannot_be_is_said_in_one_line(run: Run, words: Sequence[str], mess
 
 def test_a_clip_that_is_read_is_not_written_over(run: Run) -> None:
     write_motion("clip.bvh", clip())
-    write_motion("lead.bvh", clip().slice(0, 10))
-    for words in (
-        ("clip.bvh@9", FIFTH, "-o", "clip.bvh"),
-        ("clip.bvh@9", FIFTH, "--before", "lead.bvh", "-o", "lead.bvh"),
-    ):
-        ran = run("tween", *words, "--corpus", "ballet")
-        assert ran.code == 2
-        assert "cannot be written: it is read from" in ran.err
+    ran = run("tween", "clip.bvh@9", FIFTH, "-o", "clip.bvh", "--corpus", "ballet")
+    assert ran.code == 2
+    assert "cannot be written: it is read from" in ran.err
 
 
 def test_a_clip_on_another_rig_is_retargeted_with_its_movement(run: Run) -> None:

@@ -262,7 +262,7 @@ def test_the_first_search_says_what_it_waits_for_before_it_learns_a_corpus(
         (("ballet/arabesk", "ballet/fifth"), "error: ballet: no posture or clip 'arabesk'"),
         (("ballet/arabesque", "ballet/adagoi@3"), "error: ballet: no posture or clip 'adagoi'"),
         (("no.json", "ballet/fifth"), "error: no.json: cannot be read: there is no such file"),
-        (("ballet/arabesque", "ballet/fifth", "--before", "no.bvh@2..3"), "error: no.bvh: cannot be read: "),
+        (("ballet/arabesque", "ballet/fifth", "--via", "no.bvh@2@"), "error: no.bvh: cannot be read: "),
         (("ballet/arabesque", "ballet/fifth", "--corpus", "balet"), "error: no corpus 'balet'"),
     ]:
         assert run("tween", *words).err.startswith(said)

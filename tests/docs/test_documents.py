@@ -206,9 +206,9 @@ def test_every_command_of_an_experiment_names_its_script_and_options(document: P
 # --- running --------------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the corpora that the documents build are, for this module alone."""
+    """Where the corpora that a document builds are."""
     return tmp_path_factory.mktemp("home")
 
 

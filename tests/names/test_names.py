@@ -19,7 +19,7 @@ from motionmind.learned.model import LearnedCorpus
 from motionmind.names import finding
 from motionmind.names.finding import find_motion, locate_score, open_collection
 from motionmind.names.postures import find_posture
-from motionmind.names.spelling import Moment, parse_frames, parse_posture, parse_source
+from motionmind.names.spelling import Moment, parse_posture, parse_source
 from motionmind.notation.compose import posture
 from motionmind.notation.read import read_score, read_scores
 from motionmind.notation.score import Score
@@ -83,27 +83,10 @@ def test_a_file_goes_first_then_a_corpus_by_name_then_by_folder() -> None:
         Path(name).touch()
         assert parse_posture(name).source.place == name
         assert parse_posture(name).source.kind == "file"
-    Path("jump.bvh@1..4").touch()
-    assert parse_frames("jump.bvh@1..4").source.place == "jump.bvh@1..4"
     shutil.copytree(BALLET, "ballet", dirs_exist_ok=True)
     assert parse_source("ballet/fifth").place == "ballet"
     assert parse_source("./ballet/fifth").place == "./ballet"
     assert_same(find_posture("./ballet/fifth").posture, find_posture("ballet/fifth").posture)
-
-
-def test_frames_are_a_range_or_all() -> None:
-    for word, first, last in (
-        ("clip.bvh@230..240", Moment(230), Moment(240)),
-        ("clip.bvh@-11..-1", Moment(-11), Moment(-1)),
-        ("clip.bvh@0.5s..2s", Moment(seconds=0.5), Moment(seconds=2.0)),
-        ("clip.bvh", Moment(0), Moment(-1)),
-    ):
-        found = parse_frames(word)
-        assert (found.source.place, found.first, found.last) == ("clip.bvh", first, last)
-    assert parse_frames("ballet/adagio@3..7").source == parse_source("ballet/adagio")
-    for word in ("clip.bvh@230", "clip.bvh@230..", "clip.bvh@240~"):
-        with pytest.raises(MotionMindError, match=r"give a file, or frames of one such as clip.bvh@230..240"):
-            parse_frames(word)
 
 
 # --- what they name ---------------------------------------------------------------------------------------------------

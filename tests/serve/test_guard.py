@@ -172,7 +172,7 @@ def test_the_guard_takes_the_name_that_the_server_was_given() -> None:
 
 
 def test_the_command_serves_until_it_is_interrupted(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "motionmind", "serve", "--mmcp", "--corpus", "ballet", "--port", "0"]
+    command = [sys.executable, "-m", "motionmind", "serve", "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:
         assert server.stdout is not None
         line = server.stdout.readline()
@@ -187,11 +187,7 @@ def test_the_command_serves_until_it_is_interrupted(tmp_path: Path) -> None:
 
 def test_a_port_that_is_taken_is_an_error_in_one_line(run: Run) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
-        done = run("serve", "--mmcp", "--corpus", "ballet", "--port", taken.getsockname()[1])
+        done = run("serve", "--port", taken.getsockname()[1])
     assert done.code == 2
     assert done.err.count("\n") == 1
     assert "cannot listen" in done.err
-
-
-def test_another_protocol_there_is_not(run: Run) -> None:
-    assert "--mmcp" in run("serve", "--corpus", "ballet").err
