@@ -23,7 +23,11 @@ Unless the list below says otherwise, figures are of far pairs, and a share is o
                       support than the dancers' in one of 100 such frames; "at rest" where it is accelerated even less
     standing feet rise  share of one-leg pairs that stand on one foot throughout and lift it by more than 2 cm
     falls in the air  share of frames in the air in which the mass falls freely, in far pairs and jumps
-    followed          share of joint-moves within tolerance of the path
+    proven optimal    share of paths that are
+    followed          share of joint-moves within tolerance of the path; A and B do not count
+    attested          mean share of the motion's own transitions that the corpus attests (`Tween.motion_attested`)
+    attested moves    the same share of the transitions that change a joint's state
+    eased: ...        the same of movement that turns each joint the short way from A to B, eased, in the same moves
     ms                median processor time of making the motion of one path, all kinds of pairs, milliseconds
     seconds           mean length of the movement
 
@@ -73,9 +77,10 @@ from experiments.material import FPS, RECORDED, engine, families, recorded
 from experiments.synthesis.tables import report
 from experiments.wince.dancers import Dancers, Seen, dancers, see
 from experiments.wince.followed import near
-from experiments.wince.run import BUDGET, own_of, pairs_of, row_of
+from experiments.wince.run import BUDGET, eased, own_of, pairs_of, row_of
 from motionmind import Engine, Motion, NoPathError, Posture, Tween, draw_sheet
 from motionmind._typing import Floats
+from motionmind.metrics.paths import attested_share
 from motionmind.render.sheet import evenly, png
 
 QUICK = "ballet,cmu-05"
@@ -175,12 +180,32 @@ def pairs(data: str, name: str, count: int) -> Row:
         row = row_of(name, kind, number, "motionmind", a, b, 0.0, motion, seen, danced)
         row["low"], row["slid"] = low_feet(motion)
         row["joint-moves"], row["followed"], _ = near(tween, found.space.tolerances)
+        row["proven"] = tween.status == "optimal"
+        for maker, made in (("", motion), ("eased ", eased(a, b, len(motion)))):
+            attested = transitions_of(found, made, motion.insertions[0].times)
+            row |= {f"{maker}{key}": value for key, value in attested.items()}
         row["ms"], row["bounce"], row["grounded"] = 1000.0 * spent[0], seen.bounce, grounded(seen)
         rows.append({key: _plain(value) for key, value in row.items()})
     low, slid = np.sum([low_feet(clip) for clip in danced.clips], axis=0)
     floor = np.percentile(np.concatenate([grounded(one) for one in danced.seen]), 99.0)
     own = own_of(danced) | {"own_feet": slid / low, "own_bounce": danced.bounce, "own_grounded": floor}
     return {"pairs": rows} | {key: _plain(value) for key, value in own.items()}
+
+
+def transitions_of(found: Engine, motion: Motion, times: Floats) -> Row:
+    """Count a motion's transitions of joints from each time (seconds) to the next, and those that the corpus attests.
+
+    Moves are transitions to another state.
+    """
+    path = found.space.assign(found.corpus.to_chains(motion.at(times).rotations))
+    joints = len(motion.skeleton)
+    moved = (path[1:] != path[:-1])[:, :joints]
+    seen = found.grammar.transitions.edges(path)[:, :joints] >= 0
+    return {
+        "attested": attested_share(path, found.grammar),
+        "moves": int(moved.sum()),
+        "attested moves": int((moved & seen).sum()),
+    }
 
 
 def low_feet(motion: Motion) -> tuple[float, float]:

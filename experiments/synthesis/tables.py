@@ -67,7 +67,14 @@ PAIRS = (
     _lean("leans at rest", "rests"),
     Column("standing feet rise", ("one leg",), lambda r: (r["rise"] > LIFTED, np.isfinite(r["rise"])), show=".0%"),
     Column("falls in the air", ("far", "jump"), lambda row: (row["falls"], row["airborne"]), show=".0%"),
+    Column("proven optimal", ("far",), lambda row: (row["proven"], 1.0), show=".0%"),
     Column("followed", ("far",), lambda row: (row["followed"], row["joint-moves"]), show=".1%"),
+    Column("attested", ("far",), lambda row: (row["attested"], 1.0), show=".1%"),
+    Column("attested moves", ("far",), lambda row: (row["attested moves"], row["moves"]), show=".1%"),
+    Column("eased: attested", ("far",), lambda row: (row["eased attested"], 1.0), show=".1%"),
+    Column(
+        "eased: attested moves", ("far",), lambda row: (row["eased attested moves"], row["eased moves"]), show=".1%"
+    ),
     Column("ms", EVERY, lambda row: [row["ms"]], percent=50.0, show=".0f"),
     Column("seconds", ("far",), lambda row: (row["seconds"], 1.0)),
 )
