@@ -223,7 +223,7 @@ def _distance_lines(result: Tween) -> list[tuple[str, str]]:
     ends = zip("AB", (result.before, result.after), result.snap_degrees, strict=True)
     stops = [(end, "" if seconds is None else "moving, ", row) for end, seconds, row in ends]
     for number, (move, row) in enumerate(zip(result.passed, result.via_degrees, strict=True), start=1):
-        stops.insert(number, (f"via {number}", f"at move {move}, ", row))
+        stops.insert(number, (f"via {number}", f"after move {move}, ", row))
     lines = []
     for stop, where, row in stops:
         worst = int(row.argmax())

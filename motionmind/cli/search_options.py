@@ -64,8 +64,8 @@ SEARCH_OPTIONS = (
         "via",
         "--via",
         Section.THROUGH,
-        "Posture to pass through at move N, or at any move; a frame of a clip is CLIP@FRAME@N, or CLIP@FRAME@. "
-        "Repeatable, in order.",
+        "Posture to pass through after move N, from 1, or after any; a frame of a clip is CLIP@FRAME@N, or "
+        "CLIP@FRAME@. Repeatable, in order.",
         str,
         "POSTURE[@N]",
         multiple=True,
@@ -336,6 +336,6 @@ def _find_via(name: PostureName, move: int | None, home: Path | None, read: Call
     if not is_clear and (count := len(find_motion(name.source, home, as_clip=False, read=read))) > 1:
         raise MotionMindError(
             f"--via {word}@{move}: the last @ is a move, and {word} has {count} frames; write {word}@{move}@ for frame "
-            f"{move} at any move, or {word}@FRAME@{move}"
+            f"{move} after any move, or {word}@FRAME@{move}"
         )
     return find_posture(name, home, read=read).posture

@@ -128,8 +128,8 @@ def parse_avoided(words: Sequence[str]) -> list[tuple[str, int | str]]:
 
 
 def parse_vias(words: Sequence[str], home: Path | None = None) -> list[tuple[PostureName, int | None]]:
-    """Parse postures to pass through: "C.json", at any move, "C.json@3", at move 3; "clip.bvh@150@3" and
-    "clip.bvh@150@" are frame 150 at move 3 and at any.
+    """Parse postures to pass through: "C.json", after any move, "C.json@3", after move 3; "clip.bvh@150@3" and
+    "clip.bvh@150@" are frame 150 after move 3 and after any.
 
     Args:
         words: values of --via.

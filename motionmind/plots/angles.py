@@ -159,7 +159,7 @@ class _Panel:
         for insertion in self.motion.insertions:
             values = np.interp(insertion.times, self.motion.times, self.degrees)
             for move, place in enumerate(self._at(insertion.times, values)):
-                seen = f"{displayed(self.name)}, move {move}: {values[move]:.0f}° at {insertion.times[move]:.2f} s"
+                seen = f"{displayed(self.name)} after move {move}: {values[move]:.0f}° at {insertion.times[move]:.2f} s"
                 yield Dot(as_point(place), 2.6, VIOLET, PAPER, 0.8, seen)
 
 

@@ -98,7 +98,7 @@ def find_conflicts(chains: Sequence[str], model: Model, problem: Problem, constr
             f"{' and '.join(names[i] for i in guilty)} leave{'s' * (len(guilty) == 1)} none"
             for guilty in _minimal_conflicts(every, possible)
         ]
-    lines += [f"with via {i + 1} at move {move} there is one" for i, move in _feasible_moves(problem)]
+    lines += [f"with via {i + 1} after move {move} there is one" for i, move in _feasible_moves(problem)]
     lines += _blocked_segments(chains, problem)
     number = str(rules.longest) if rules.shortest == rules.longest else f"{rules.shortest} to {rules.longest}"
     first = f"no path from A to B in {number} move{'s' * (rules.longest != 1)} under these constraints:"
@@ -161,7 +161,7 @@ def _blocked_segments(chains: Sequence[str], problem: Problem) -> Iterator[str]:
 
 def _via_name(problem: Problem, i: int) -> str:
     move = problem.vias[i].move
-    return f"via {i + 1}" + ("" if move is None else f" at move {move}")
+    return f"via {i + 1}" + ("" if move is None else f" after move {move}")
 
 
 def _only(space: StateSpace, chain: int, state: int) -> Bools:

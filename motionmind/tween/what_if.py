@@ -89,7 +89,7 @@ def _without_each(asked: Answer) -> Iterator[tuple[str, TweenRequest]]:
     for i, (joint, state) in enumerate(request.avoid):
         yield f"avoid {joint}={state}", replace(request, avoid=_all_but(request.avoid, i))
     for i, (_, move) in enumerate(request.vias):
-        name = f"via {i + 1}" + ("" if move is None else f" at move {move}")
+        name = f"via {i + 1}" + ("" if move is None else f" after move {move}")
         yield name, replace(request, via=_all_but(request.via, i))
     if request.fixes_length:
         longest = max(request.search.max_moves, _moves(asked))

@@ -467,7 +467,9 @@ def test_a_restriction_that_leaves_no_path_is_named(engine: Engine) -> None:
         NoPathError, match=r"without pin right_elbow=B there is one(.|\n)*right_elbow: no path from A to B"
     ):
         join(engine, pin={"left_knee": "A", "right_elbow": "B"}, strict=True)
-    with pytest.raises(NoPathError, match=r"without via 1 at move 3 there is one\n  with via 1 at move 4 there is one"):
+    with pytest.raises(
+        NoPathError, match=r"without via 1 after move 3 there is one\n  with via 1 after move 4 there is one"
+    ):
         join(engine, via=[(posture("passe"), 3)])
 
 
@@ -480,7 +482,7 @@ def test_of_restrictions_that_leave_no_path_together_as_few_as_do_so_are_named(e
     assert "left_" not in str(fault.value)
     with pytest.raises(NoPathError) as fault:
         join(engine, pin={"right_elbow": "B"}, via=[(posture("passe"), 3)], strict=True)
-    assert re.findall(r"(.*) leaves none", str(fault.value)) == ["  via 1 at move 3", "  pin right_elbow=B"]
+    assert re.findall(r"(.*) leaves none", str(fault.value)) == ["  via 1 after move 3", "  pin right_elbow=B"]
     with pytest.raises(NoPathError, match=r"in at most 1 move \(allow more moves\)"):  # not for what was asked
         join(engine, pin={"left_knee": "A"}, moves=1)
 
@@ -558,7 +560,7 @@ def test_everything_can_be_asked_on_the_command_line(run: Run, engine: Engine) -
     drawn = join(engine, sample=True, seed=3, coordination="none")
     assert lively.json["path"] == drawn.path.tolist()
     table = run("tween", A, B, "--corpus", "ballet", *asked, "--details").out
-    assert "\nvia 1     at move 4, " in table
+    assert "\nvia 1     after move 4, " in table
 
 
 def test_alternatives_go_to_files_of_their_own(run: Run) -> None:
@@ -601,7 +603,7 @@ def test_what_cannot_be_asked_is_one_line(run: Run, words: str, fault: str) -> N
 def test_no_path_is_exit_code_3_and_names_what_was_asked(run: Run) -> None:
     ran = run("tween", A, B, "--corpus", "ballet", "--via", f"{POSTURES / 'bow.json'}@1", "-o", "out.json")
     assert ran.code == 3
-    assert "without via 1 at move 1 there is one" in ran.err
+    assert "without via 1 after move 1 there is one" in ran.err
     assert not Path("out.json").exists()
     ran = run("tween", A, B, "--corpus", "ballet", "--hold", "left_ankle")
     assert (ran.code, ran.err.count("\n")) == (3, 1)

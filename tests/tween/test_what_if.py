@@ -150,7 +150,7 @@ def test_a_duration_of_as_many_moves_is_priced_without_the_guide(ballet: Engine)
 def test_vias_are_named_by_their_moves_where_they_have_one(ballet: Engine) -> None:
     passe = read_posture(PASSE)
     found = ballet.tween(*ENDS, via=[passe, (passe, 9)], moves=14, what_if=True)
-    assert [one.without for one in found.what_if] == ["via 1", "via 2 at move 9", "moves 14"]
+    assert [one.without for one in found.what_if] == ["via 1", "via 2 after move 9", "moves 14"]
 
 
 def test_without_a_given_number_of_moves_as_many_are_searched_at_least(ballet: Engine) -> None:
@@ -214,7 +214,7 @@ def test_the_command_line_prints_a_line_for_each_restriction_and_the_report_has_
     assert ran.code == 0, ran.err
     lines = [line[10:] for line in ran.out.splitlines() if line.startswith("without   ")]
     report = read_report(Path("r.json"))
-    assert [one.without for one in report.what_if] == ["pin left_wrist=A", "via 1 at move 4", "moves 8"]
+    assert [one.without for one in report.what_if] == ["pin left_wrist=A", "via 1 after move 4", "moves 8"]
     assert lines == [format_what_if(one) for one in report.what_if]
     assert json.loads(Path("r.json").read_text())["what_if"][1].keys() == {
         *("without", "least", "most", "proven", "moves", "compared"),
