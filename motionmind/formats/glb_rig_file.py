@@ -27,7 +27,7 @@ from motionmind.formats.units import metres_per_unit
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.armature import Armature, Pose
 
-_SAME_VALUE = 1e-6  # metres, or components of quaternions: single precision
+_SINGLE_PRECISION_M, _SINGLE_PRECISION_RAD = 1e-6, 1e-6
 _IMAGE_TYPES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp"}
 
 
@@ -80,10 +80,10 @@ class GlbRigFile(RigFile):
         for bone, node in enumerate(self.nodes):
             place, turn, _ = to_trs(self.gltf.document.nodes[node])
             turns = continuous(pose.rotations[:, [bone]])[:, 0]
-            if node in self.body or np.any(rot.angle(turns, turn) > _SAME_VALUE):
+            if node in self.body or np.any(rot.angle(turns, turn) > _SINGLE_PRECISION_RAD):
                 yield node, "rotation", turns
             places = pose.translations[:, bone]
-            if np.any(np.abs(places - place) > _SAME_VALUE / self.unit):
+            if np.any(np.abs(places - place) > _SINGLE_PRECISION_M / self.unit):
                 yield node, "translation", places
 
 
