@@ -233,8 +233,8 @@ def test_a_tween_says_what_a_viewer_sees_beyond_the_corpus(capsys: pytest.Captur
     print_tween(carried, [])
     (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("warning"))
     pace = carried.report()["shown"]["pace"]
-    assert line.startswith(f"warning   travel is {pace['value']:.1f}x as fast as fast movement of the corpus, ")
-    assert line.endswith(f"at most {pace['most']:.1f}x in the corpus")
+    assert line.startswith(f"warning   travel is {pace['value']:.2f}x as fast as fast movement of the corpus, ")
+    assert line.endswith(f"at most {pace['most']:.2f}x in the corpus")
 
 
 def test_the_report_has_the_keys_that_are_promised(run: Run) -> None:
