@@ -111,10 +111,10 @@ def check_options(
     """Check the names of options.
 
     Args:
-        owner: the function or thing that has the options, for the message.
+        owner: what has the options, for the message: a function, or "a tween".
         given: the names.
         options: the TypedDict of the options.
-        function: the function, to suggest its other keyword arguments for a misspelt name, too.
+        function: the function whose other keyword arguments the message may suggest, too; None for none.
 
     Raises:
         WrongTypeError: there is no such option; the message suggests the most similar name.

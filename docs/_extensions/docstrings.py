@@ -1,4 +1,4 @@
-"""Show docstrings and signatures for readers: prose as it is, no private constructors, and each of the `**options`.
+"""Prepare docstrings and signatures for readers: escape prose, hide private constructors, list each of the `**options`.
 
 A function with `**options: Unpack[...]` lists them among its parameters, unless its docstring says "options: see ...".
 """
@@ -25,7 +25,7 @@ from motionmind.tween.request import SeamOptions, TweenOptions
 _log = logging.getLogger(__name__)
 _SPAN = re.compile(r"(`[^`]*`)")
 
-# Classes that users construct; functions make the others, whose constructors stay hidden.
+# Classes that users construct. Functions return the others, so their constructors stay hidden.
 CONSTRUCTED = {
     "Flow",
     "Insertion",
@@ -38,7 +38,7 @@ CONSTRUCTED = {
     "Velocity",
 }
 
-# The dataclass or function that describes the options of a TypedDict, and has their defaults.
+# By TypedDict: the dataclasses or the function that describe its options and hold their defaults.
 _TWEEN = (motionmind.TweenRequest, motionmind.SearchOptions)
 OWNERS: dict[type, tuple[Any, ...]] = {Gathering: (gather,), SeamOptions: _TWEEN, TweenOptions: _TWEEN}
 
@@ -47,7 +47,7 @@ OWNERS: dict[type, tuple[Any, ...]] = {Gathering: (gather,), SeamOptions: _TWEEN
 
 
 def escape(text: str) -> str:
-    """Escape what reStructuredText would take for markup or an address in prose with `code` in backticks."""
+    """Escape prose that reStructuredText would read as markup or an address, but not `code` in backticks."""
     parts = _SPAN.split(text)
     parts[::2] = [re.sub(r"([|*@]|(?<=\w)_(?=\W|$))", r"\\\1", part) for part in parts[::2]]
     return "".join(parts)
@@ -98,7 +98,7 @@ def meanings(owner: Any) -> dict[str, str]:
 
 
 def types(options: type) -> dict[str, str]:
-    """Return the types of the options of a TypedDict, literals as their values."""
+    """Return the types of the options of a TypedDict, with literals as their values."""
     hints = typing.get_type_hints(options, localns={name: getattr(motionmind, name) for name in motionmind.__all__})
     shown = {name: stringify_annotation(hint, "smart", short_literals=True) for name, hint in hints.items()}
     return {name: re.sub(r"~[\w.]+\.", "", text) for name, text in shown.items()}
@@ -126,7 +126,7 @@ def add_options(app: object, what: str, name: str, thing: Any, options: object, 
 
 @cache
 def public_paths() -> dict[str, str]:
-    """Return the path by which to import each public class, by that of its definition."""
+    """Return the path from which to import each public name, by the path of its definition."""
     paths = {}
     for name in public_names():
         room, _, last = f"motionmind.{name}".rpartition(".")
@@ -136,7 +136,7 @@ def public_paths() -> dict[str, str]:
 
 
 def shorten_types(app: object, what: str, name: str, thing: Any, options: object, lines: list[str]) -> None:
-    """Show attributes' types by their last names, with links to public ones."""
+    """Shorten the types of attributes to their last names, with links to public ones."""
     for number, line in enumerate(lines):
         field, _, type_ = line.rpartition(": ")
         if field.startswith(":vartype "):

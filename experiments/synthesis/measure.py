@@ -23,11 +23,11 @@ Unless the list below says otherwise, figures are of far pairs, and a share is o
                       support than the dancers' in one of 100 such frames; "at rest" where it is accelerated even less
     standing feet rise  share of one-leg pairs that stand on one foot throughout and lift it by more than 2 cm
     falls in the air  share of frames in the air in which the mass falls freely, in far pairs and jumps
-    proven optimal    share of paths that are
+    proven optimal    share of paths that are proven optimal
     followed          share of joint-moves within tolerance of the path; A and B do not count
     attested          mean share of the motion's own transitions that the corpus attests (`Tween.motion_attested`)
     attested moves    the same share of the transitions that change a joint's state
-    eased: ...        the same of movement that turns each joint the short way from A to B, eased, in the same moves
+    eased: ...        the same for eased SLERP from A to B, at the same times
     ms                median processor time of making the motion of one path, all kinds of pairs, milliseconds
     seconds           mean length of the movement
 
@@ -193,7 +193,7 @@ def pairs(data: str, name: str, count: int) -> Row:
 
 
 def transitions_of(found: Engine, motion: Motion, times: Floats) -> Row:
-    """Count a motion's transitions of joints from each time (seconds) to the next, and those that the corpus attests.
+    """Count a motion's joint transitions from each time (seconds) to the next, and how many the corpus attests.
 
     Moves are transitions to another state.
     """

@@ -284,7 +284,7 @@ class Motion:
         The last posture survives jitter of the source's clock of up to a thousandth of a step.
 
         Args:
-            rate: postures a second, at most FASTEST.
+            rate: postures a second, at most MAX_FPS.
 
         Raises:
             MotionMindError: the rate is out of range, or gives too many frames (as for `at`).
@@ -298,11 +298,11 @@ class Motion:
     def stretch_to(self, rate: float) -> Motion:
         """Return the motion at `rate` postures a second, stretched so that the last frame is the last posture.
 
-        It lasts the nearest whole number of steps, one at least: less than half a step more or less, unless it is
-        shorter than one. Insertions stretch with it. A single frame stays as it is.
+        The new duration is the nearest whole number of steps, at least one. Insertions stretch with the motion. A
+        single frame stays as it is.
 
         Args:
-            rate: postures a second, at most FASTEST.
+            rate: postures a second, at most MAX_FPS.
 
         Raises:
             MotionMindError: as for `resample`.

@@ -122,7 +122,7 @@ def remove(name: str, clips: tuple[str, ...], details: bool, home: Path | None) 
 
 
 def note_kept(place: Path) -> None:
-    """Note how to bring back the corpus that the one in a folder replaced, if it is kept."""
+    """Note how to bring back the corpus that the last change of a folder replaced, if it is kept."""
     from motionmind.corpus.manifest import count_clips
     from motionmind.corpus.store import read_manifest, replaced
 

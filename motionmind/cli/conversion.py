@@ -93,8 +93,8 @@ def posture(
     metavar="UNIT",
     help="Unit of length of a .bvh OUT, as in --unit  [default: cm]",
 )
-@for_program("Program that OUT suits without settings: unit, frames per second, root.")
-@on_rig("File whose skeleton a .bvh OUT gets, or whose character a .glb OUT gets.")
+@for_program("Program to open OUT in: OUT gets the unit, frames per second and root that it expects.")
+@on_rig("File with the rig for OUT: the skeleton of a .bvh OUT, or the character of a .glb OUT.")
 @option(
     "--form",
     section=Section.OUTPUT,

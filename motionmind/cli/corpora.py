@@ -129,7 +129,7 @@ def corpora(context: click.Context) -> None:
     metavar="ADDRESS",
     help="Read with the workers of a Dask cluster, by its scheduler: tcp://HOST:8786. They share this disk.",
 )
-@option("--replace", section=Section.OUTPUT, is_flag=True, help="Replace your corpus NAME; corpus restore undoes it.")
+@option("--replace", section=Section.OUTPUT, is_flag=True, help="Replace your corpus NAME; corpus restore undoes this.")
 @DETAILS
 @option("--title", section=Section.ABOUT, default="", show_default=False, help="Describe the corpus in a line.")
 @option("--author", section=Section.ABOUT, default="", show_default=False, help="Name who made the movement.")
@@ -162,7 +162,7 @@ def build(
     """Learn a corpus from movement.
 
     Learn it from files, from other corpora (--mix), or from both. The files may have any formats, scores included.
-    Files that cannot be read are left out, as are files on other joints than most.
+    The build leaves out unreadable files, and files whose joints differ from those of most.
     """
     if not (files or mix):
         raise click.UsageError("Missing argument 'FILES...', or --mix.", click.get_current_context())

@@ -41,13 +41,13 @@ def on_rig(text: str) -> Callable[[_Function], _Function]:
 
 @dataclass(frozen=True)
 class Delivery:
-    """A program, a rig, a rate and a unit that suit .bvh and .glb files to where they go on.
+    """The target of .bvh and .glb files: a program, a rig, a rate and a unit.
 
     Attributes:
-        program: the program that they suit; None for any.
-        rig: the rig that they are written on; None for the movement's own skeleton.
+        program: the program that opens them; None for any.
+        rig: the rig to write them on; None for the movement's own skeleton.
         fps: frames a second to stretch the movement to; None for its own.
-        unit: the unit of BVH's lengths; None for the rig's or the program's, else centimetres.
+        unit: the unit of BVH's lengths; None for that of the rig or the program, or else centimetres.
     """
 
     program: Program | None = None
@@ -56,7 +56,7 @@ class Delivery:
     unit: str | None = None
 
     def write(self, path: Path, motion: Motion, source: Path | None = None) -> Motion:
-        """Write a motion, note what its file lacks, of the file `source` too, and return the motion as written."""
+        """Write a motion, note what the file cannot hold of it and of `source`, and return the motion as written."""
         from motionmind.formats import lossy_fields, write_motion
         from motionmind.formats.programs import write_for
         from motionmind.formats.rig_files import write_on_rig
@@ -76,7 +76,7 @@ class Delivery:
         return motion
 
     def print(self, outputs: Sequence[Path]) -> None:
-        """Print the rig of the files for other programs, and how a program opens each."""
+        """Print the rig of the files, and how to open each in the program."""
         delivered = [path for path in outputs if takes_delivery(path)]
         if self.rig and delivered:
             joints = count(len(self.rig.armature.motion.skeleton), "joint")
@@ -92,10 +92,10 @@ def takes_delivery(path: Path) -> bool:
 
 
 def check_delivery(outputs: Sequence[Path], program: str | None, rig: Path | None) -> Program | None:
-    """Return the program of --for; check that an output suits it, and the rig.
+    """Return the program of --for, None without it; check that it and --rig apply to an output.
 
     Raises:
-        MotionMindError: no output is for a program or a rig, or the program does not read one that is.
+        MotionMindError: no output is a .bvh or .glb file, or the program does not read one of these.
     """
     from motionmind.formats.programs import program_for
 
@@ -104,7 +104,7 @@ def check_delivery(outputs: Sequence[Path], program: str | None, rig: Path | Non
         programs = [program_for(program, path) for path in delivered or outputs]
         return programs[0]
     if (program or rig) and not delivered:
-        raise MotionMindError(f"--{'for' if program else 'rig'} is for .bvh and .glb files: name one with -o")
+        raise MotionMindError(f"--{'for' if program else 'rig'} applies to .bvh and .glb files: name one with -o")
     return None
 
 
@@ -117,15 +117,15 @@ def find_rig(
     source_fps: float | None,
     up: str | None,
 ) -> RigFile | None:
-    """Return the rig of --rig, or of the file or files that both ends of a tween come from; None for neither.
+    """Return the rig of --rig, or else the rig that the files of both ends share; None if there is neither.
 
     Args:
         rig: the file of --rig; None without it.
         ends: the names of A and B.
-        joints: value of an option that `options.reading` adds, as are the others.
-        unit: the same.
-        source_fps: the same.
-        up: the same.
+        joints: the value of --joints.
+        unit: the value of --unit.
+        source_fps: the value of --source-fps.
+        up: the value of --up.
     """
     from motionmind.formats.rig_files import RIG_SUFFIXES, read_rig
     from motionmind.names.finding import frame_of

@@ -73,7 +73,7 @@ def write(path: Path, movement: Motion | Posture, source: Path | None = None) ->
     Args:
         path: the file.
         movement: the motion or the posture.
-        source: the file that it comes from, if any, whose other content is left out too.
+        source: the file that the movement comes from, whose other data may be left out, too; None for none.
     """
     from motionmind.body.motion import Posture
     from motionmind.formats import lossy_fields, write_motion, write_posture

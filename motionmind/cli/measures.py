@@ -46,7 +46,7 @@ def measure(
     """Measure movement, and compare it with a corpus.
 
     SOURCE is any movement: a tween, a recording, CORPUS/CLIP or SCORE/CLIP. The command prints the ten figures that a
-    viewer notices most; --all and --json give all. Dynamics are measured at 30 frames per second, vocabulary in the
+    viewer notices most; --all and --json print all. Dynamics are measured at 30 frames per second, vocabulary in the
     corpus's states. The usual range runs from the 5th to the 95th percentile of the corpus's clips, cut to the length
     of SOURCE, or to a tenth of the corpus.
     """

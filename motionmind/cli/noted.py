@@ -1,4 +1,4 @@
-"""Remember which notes about which files were printed, so that later commands do not repeat them."""
+"""Remember the notes printed about each file, so that later commands do not repeat them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _N_REMEMBERED = 20_000  # notes, the newest ones: 340 kB
 class Noted:
     """The notes about files that commands printed, in the user's cache.
 
-    A changed file counts as another one. Without a cache that can be read and written, all notes are new.
+    A changed file counts as a new one. If the cache cannot be read or written, all notes are new.
     """
 
     def __init__(self) -> None:

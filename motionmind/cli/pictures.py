@@ -144,7 +144,7 @@ def sheet(
     type=RATE,
     help="Frames per second of a film  [default: the movement's own, at most 25 in .gif; .svg 12]",
 )
-@for_program("Program beside whose animation a film is shown: frames per second of its scenes, the last one whole.")
+@for_program("Program whose frames per second a film gets, to match an animation there.")
 @option(
     "--view",
     section=Section.DRAW,

@@ -35,7 +35,7 @@ _N_WARNINGS_PRINTED = 3  # without --details
 class Notes(logging.Handler):
     """Prints each logged assumption, such as the unit of a file, once: for the first file that needs it.
 
-    A record with a `file` is about that file alone, and no later command prints it again.
+    A record with a `file` is about that file alone; later commands do not print it again.
     """
 
     def __init__(self, level: int) -> None:

@@ -64,7 +64,7 @@ SEARCH_OPTIONS = (
         "via",
         "--via",
         Section.THROUGH,
-        "Posture to pass through after move N, from 1, or after any; a frame of a clip is CLIP@FRAME@N, or "
+        "Posture to pass through after move N (the first is 1), or after any; a frame of a clip is CLIP@FRAME@N, or "
         "CLIP@FRAME@. Repeatable, in order.",
         str,
         "POSTURE[@N]",

@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     help="Corpus to use, by name or folder  [default: the corpus of A and B, if they are its postures]",
 )
 @outputs(f"File to write: {OUTPUT_KINDS}.", required=False)
-@for_program("Program that .bvh and .glb files suit without settings: unit, frames per second, root.")
-@on_rig("File whose skeleton .bvh files get, or whose character .glb files get  [default: the file of A and B]")
+@for_program("Program to open .bvh and .glb files in: they get the unit, frames per second and root that it expects.")
+@on_rig("File with the rig for .bvh files (its skeleton) or .glb files (its character)  [default: the file of A and B]")
 @option("--report", section=Section.OUTPUT, type=FILE, help="File of the report, as JSON; - prints it.")
 @option(
     "--details", section=Section.OUTPUT, is_flag=True, help="Print costs, states and distances from the corpus, too."
@@ -162,9 +162,7 @@ def _corpus_of(ends: Sequence[PostureName], home: Path | None) -> str:
     if not corpora:
         for end in ends:
             find_motion(end.source, home)  # raises if there is no such file
-        message = (
-            f"Missing option '--corpus': neither A nor B is a posture of a corpus; there are {known_corpora(home)}."
-        )
+        message = f"Missing option '--corpus': neither A nor B is a posture of a corpus. Corpora: {known_corpora(home)}"
         raise click.UsageError(message, click.get_current_context())
     if len(set(corpora)) > 1:
         for end in ends:

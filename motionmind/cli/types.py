@@ -52,7 +52,7 @@ def _has_too_many_digits(word: str) -> bool:
 
 
 class CorpusName(click.ParamType[str]):
-    """The name of a corpus, or its folder; a missing one is an error that lists the user's corpora and the others."""
+    """The name or folder of a corpus; if it is missing, the error lists all corpora, the user's own first."""
 
     name = "name"
 
@@ -62,7 +62,7 @@ class CorpusName(click.ParamType[str]):
 
     def get_missing_message(self, param: click.Parameter, ctx: click.Context | None) -> str:
         """Return the names of all corpora, the user's own first."""
-        return f"There are {known_corpora(ctx.params.get('home') if ctx else None)}"
+        return f"Corpora: {known_corpora(ctx.params.get('home') if ctx else None)}"
 
 
 def known_corpora(home: Path | None) -> str:
@@ -168,4 +168,4 @@ NATURAL = Whole(min=0)
 NATS = Number(min=0, max=1e6)  # as `motionmind.tween.request.MOST_NATS`
 PORT = Whole(0, 65535)
 POSITIVE = Number(min=0, min_open=True)
-RATE = Number(min=0, min_open=True, max=10_000)  # as `motionmind.body.motion.FASTEST`
+RATE = Number(min=0, min_open=True, max=10_000)  # as `motionmind.body.rates.MAX_FPS`

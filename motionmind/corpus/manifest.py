@@ -94,7 +94,7 @@ def parse_manifest(manifest: dict[str, Any], schema: type[_Schema], path: Path) 
 
 
 def count_clips(manifest: Mapping[str, Any]) -> int:
-    """Return the number of clips of a built corpus, from its manifest; 0 if that does not say it."""
+    """Return the number of clips of a built corpus, from its manifest; 0 if it states none."""
     with suppress(LookupError, TypeError):
         return int(manifest["arrays"]["clips.order"]["shape"][0])
     return 0

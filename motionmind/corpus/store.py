@@ -221,7 +221,7 @@ def save(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray
         folder: the corpus's folder.
         manifest: plain values for JSON; format, version, folder and the arrays' entries are added.
         arrays: by name.
-        keep: whether a corpus of other movement that this one replaces stays beside it, for `restore`.
+        keep: whether a replaced corpus of other movement stays beside the new one, for `restore`.
 
     Raises:
         CorpusError: the folder cannot be written, or holds other files.
@@ -281,16 +281,16 @@ def _held(folder: Path) -> Iterator[dict[str, Any] | None]:
 
 
 def restore(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
-    """Exchange a user's corpus, at once, for the one that its last change replaced, and return its folder.
+    """Exchange a user's corpus, atomically, with the one that its last change replaced; return its folder.
 
-    Doing it again brings the newer one back.
+    A second call brings the newer one back.
 
     Args:
         name: the name of the corpus.
         folder: the user's home (`home`).
 
     Raises:
-        CorpusError: the user has no such corpus, or none that it replaced, or its folder cannot be written.
+        CorpusError: the user has no such corpus, no replaced one is kept, or the folder cannot be written.
     """
     place = own_place(name, folder)
     manifest = read_manifest(place)
@@ -298,7 +298,7 @@ def restore(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
     try:
         with versions.hold(_place_of(place, old or manifest)) as there:
             if old is None or not there:
-                raise CorpusError(f"no corpus is kept that {name!r} replaced")
+                raise CorpusError(f"{name!r} replaced no corpus that is kept")
             _write_manifest(place, old | {"name": name, _PREVIOUS: _without_previous(manifest)})
     except OSError as error:
         raise CorpusError(f"{place}: cannot be written: {error.strerror or error}") from error
@@ -312,7 +312,7 @@ def _digest(manifest: Mapping[str, Any]) -> str:
 
 
 def _digests_of(folder: Path) -> set[str]:
-    """Return the hashes of the built corpus in a folder and of the one that it replaced, as far as there are any."""
+    """Return the hashes of the built corpus in a folder and of the one that it replaced, if they exist."""
     with suppress(FormatError):
         return {_digest(manifest) for manifest in _manifests(folder)}
     return set()

@@ -217,8 +217,8 @@ def write_motion(
         unit: BVH's unit of length (`write_bvh`), unless `rig` has one; other formats define their own.
         rig: a BVH or glTF file on whose rig a motion of human23 is written as `.bvh` or `.glb`: with the skeleton and
             channels of BVH, or the nodes and skins of glTF; None for the motion's own skeleton.
-        ends: the frames of `rig` that are the motion's first and last posture, to meet them in every bone; None if it
-            begins and ends elsewhere.
+        ends: the frames of `rig` that are the motion's first and last posture, so that every bone meets them; None if
+            the motion begins and ends elsewhere.
 
     Raises:
         MotionMindError: the suffix is unknown, the format cannot hold this motion, or the file cannot be written.

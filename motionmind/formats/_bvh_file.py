@@ -28,7 +28,7 @@ class BvhFile:
     Attributes:
         hierarchy: the lines above MOTION, as they stand in the file.
         joints: the joints in them, parents before children.
-        values: of all joints' channels, in the file's order and units [T, C].
+        values: the values of all joints' channels, in the file's order and units [T, C].
         declared: the header's number of frames.
         frame_time: the header's seconds per frame.
     """

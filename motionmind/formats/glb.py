@@ -279,7 +279,7 @@ def add_clock(buffer: GlbBuffer, motion: Motion, name: str) -> int:
 
 
 def animation(name: str, clock: int, outputs: Sequence[tuple[int, str, int]]) -> dict[str, Any]:
-    """Return an animation from the accessor of its times, and for each channel the node, the path and the accessor."""
+    """Return an animation from the accessor of its times, and each channel's node, path and accessor."""
     return {
         "name": name,
         "samplers": [{"input": clock, "interpolation": "LINEAR", "output": output} for _, _, output in outputs],

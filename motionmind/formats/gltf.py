@@ -86,9 +86,9 @@ class GltfBody:
         joints: the body's nodes [J], each after its parent.
         names: their names, no two alike.
         skin: name of the skin, "" for none.
-        tracks: of the nodes that move the body.
-        others: names of animations that are not read.
-        times: of the frames [T], seconds.
+        tracks: the tracks of the nodes that move the body.
+        others: names of the animations that are not read.
+        times: times of the frames [T], seconds.
         rest_turns: orientations of the joints at rest, without the heading of the nodes above [J, 4].
         rest: their places at rest [J, 3].
     """

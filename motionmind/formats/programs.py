@@ -107,7 +107,7 @@ def note_settings(path: FilePath, motion: Motion, unit: str | float, remedy: str
         path: the written file.
         motion: the movement in it.
         unit: the unit of its lengths.
-        remedy: another way, to append.
+        remedy: text to append, such as another way.
     """
     scale = metres_per_unit(unit)
     settings = [f"set Scale to {scale:.5g}"] if abs(scale - 1.0) > 1e-6 else []

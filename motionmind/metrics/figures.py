@@ -27,8 +27,8 @@ from motionmind.metrics.verbatim import MAX_NGRAM, Phrasebook, learn_phrases
 from motionmind.retarget.retarget import own_skeleton
 from motionmind.synthesis.timeline import usual
 
-# What a viewer notices first: how fast and how smooth it is, whether it moves like the corpus, feet that skate, bodies
-# that lean, bounce, float or intersect, and moves that the corpus never shows. The others explain these.
+# What a viewer notices first: how fast and smooth the movement is, how much it is like the corpus, feet that skate,
+# bodies that lean, bounce, float or intersect, and moves that the corpus never shows. The other figures explain these.
 MAIN_FIGURES = (
     *("speed", "pace", "jerk", "style", "skating", "balance", "bounce", "flight", "crossed_limbs", "attested"),
 )

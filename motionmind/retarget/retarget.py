@@ -108,7 +108,7 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
 
 
 def fit_upright(movement: Movement, joints: Mapping[str, str] | None, up: str | None) -> tuple[Fit, Vertical]:
-    """Fit human23 to a file's skeleton, and find which axis is up; arguments and errors as of `to_human23`."""
+    """Fit human23 to a file's skeleton, and find which axis is up; arguments and errors are as for `to_human23`."""
     fit = fit_human23(movement, joints)
     turned = movement.skeleton.global_rotations(movement.rotations)[..., fit.rotation_sources[0], :]
     return fit, Vertical(up) if up else _vertical(fit, movement, turned)
@@ -120,7 +120,7 @@ def to_y_up_world(vertical: Vertical) -> Floats:
 
 
 def describe_doubts(movement: Movement, fit: Fit, vertical: Vertical) -> Iterator[str]:
-    """Describe what a file does not show of its bones and its vertical."""
+    """Describe what a file leaves unclear about its bones and its vertical."""
     if fit.unclear:
         yield _describe_unclear(movement.skeleton.name, fit.unclear)
     if vertical.doubt:

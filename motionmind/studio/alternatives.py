@@ -180,7 +180,7 @@ def _describe_optimality(tween: Tween) -> str:
 
 
 def _describe_usualness(tween: Tween, own: Floats) -> str:
-    """Describe how usual its path is among the corpus's own moves, and how much of the movement the corpus shows."""
+    """Describe how usual the path is among the corpus's own moves, and how much of the motion the corpus shows."""
     moved = (tween.path[1:] != tween.path[:-1]) & (tween.costs.likelihood > 0.0)
     seen = attestation(tween).replace("_", " ")
     if not moved.any():

@@ -24,7 +24,7 @@ from motionmind.tween.problem import TRANSITION, WAIT, kinds_of
 
 @dataclass(frozen=True, eq=False)
 class CostBreakdown:
-    """The parts of the cost of a path of T moves of L chains: `moves`, `coordination`, `guide` and `per_move` add up.
+    """The parts of a path's cost, T moves of L chains: `moves`, `coordination`, `guide` and `per_move` add up to it.
 
     Attributes:
         moves: nats for each chain's move, bridge or wait [T, L].
@@ -35,7 +35,7 @@ class CostBreakdown:
         likelihood: P(next state | state), as counted in the corpus; 0 where it attests no such move [T, L].
         degrees: the angle between the two states [T, L].
         names: names of the states of each posture [T + 1][L].
-        changes: each chain's move in words: the new state's name, or the direction without one; "" if still [T][L].
+        changes: each chain's move in words: the new state's name, or the direction if it has none; "" if still [T][L].
     """
 
     moves: Floats

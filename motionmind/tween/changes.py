@@ -1,4 +1,4 @@
-"""Words for what a viewer sees of a joint's move: its body part, and the new state's name or the direction."""
+"""Describe joints' moves as a viewer sees them: the body part, and the new state's name or the direction."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from motionmind.discretize.states import StateSpace
 from motionmind.geometry import rotations as rot
 
 WHOLE_BODY = "whole body"
-# Nouns for angles that a body's file names by adjectives.
+# Nouns for angles whose names in a body's file do not follow "toward".
 _NOUNS = {
     **{"tilt": "forward tilt", "back": "backward tilt", "rotation": "outward rotation", "inward": "inward rotation"},
     **{

@@ -143,8 +143,8 @@ class Engine(LearnedCorpus):
     def posture(self, name: str) -> Posture:
         """Return a posture by name, such as "arabesque", "adagio@23", "karate/yoi" or "clip.bvh@240".
 
-        A name without a slash or a dot belongs to the corpus of this engine's name, unless a file or a corpus has that
-        name. All others are as for `find_posture`, also the errors.
+        A name without a slash or a dot belongs to this engine's corpus, found by its name, unless a file or a corpus
+        has that name. Other names, and errors, are as for `find_posture`.
 
         >>> from motionmind import Engine
         >>> engine = Engine.load("ballet")

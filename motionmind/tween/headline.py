@@ -16,13 +16,13 @@ from motionmind.tween.certificate import Bridge
 from motionmind.tween.result import Tween
 
 # By measure: a message with the movement's greatest value, the corpus's limit and the body part; the format of both
-# values, in which they differ if a viewer notices the difference; and their factor.
+# values, fine enough to show a noticeable difference; and their factor.
 _MEASURE_WORDS = {
     "balance": ("leans {0} cm beyond its support, at most {1} cm in the corpus", ".0f", 100.0),
     "bounce": ("bounces: the centre of mass accelerates at {0} m/s^2, at most {1} in the corpus", ".0f", 1.0),
     "flight": ("floats: {0} of gravity is missing in the air, at most {1} in the corpus", ".0%", 1.0),
     "crossed_limbs": ("limbs intersect by {0} cm, at most {1} cm in the corpus", ".0f", 100.0),
-    "sliding": ("feet slide: near the floor one moves in {0} of a second, at most {1} in the corpus", ".0%", 1.0),
+    "sliding": ("feet slide: one moves near the floor for {0} of a second, at most {1} in the corpus", ".0%", 1.0),
     "pace": ("{2} is {0}x as fast as fast movement of the corpus, at most {1}x in the corpus", ".2f", 1.0),
 }
 # Messages for residuals of the solve, and the thresholds of visibility in centimetres and degrees.
@@ -36,7 +36,7 @@ _RESIDUAL_WORDS = {
 def headline(tween: Tween) -> str:
     """Summarise a tween in a line: length, proof of the path, how much of it the motion follows, and what is attested.
 
-    The path of states and the motion that is seen have separate sentences: a proof holds for the path alone.
+    The path and the motion have separate sentences: a proof holds for the path alone.
 
     >>> from motionmind import Engine
     >>> from motionmind.tween.headline import headline
@@ -46,13 +46,13 @@ def headline(tween: Tween) -> str:
     ...     print(sentence)
     5 moves, 2.0 s
     Path proven optimal, all from ballet
-    Motion follows 85% of it; 97% of its own transitions occur in ballet
+    Motion follows 85% of the path; 97% of the motion's transitions occur in ballet
     """
     if tween.moves == 0:
         return "no move: A and B are the same posture"
     length = f"{_count(tween.moves, 'move')}, {tween.motion.times[-1]:.1f} s"
     share = tween.followed[1:-1].mean() if tween.moves > 1 else 1.0  # A and B themselves are exact
-    return f"{length}. {_proof(tween)}, {_origin(tween)}. Motion follows {share:.0%} of it; {attestation(tween)}"
+    return f"{length}. {_proof(tween)}, {_origin(tween)}. Motion follows {share:.0%} of the path; {attestation(tween)}"
 
 
 def beyond(tween: Tween) -> list[str]:
@@ -67,7 +67,7 @@ def beyond(tween: Tween) -> list[str]:
     far = max(followed, key=lambda bridge: bridge.degrees, default=None)
     if far is not None and far.degrees >= NOTICEABLE_BRIDGE_DEG:
         seconds = tween.motion.insertions[0].times[far.move] - tween.motion.times[0]
-        flaws.append(f"{displayed(far.joint)} turns by {far.degrees:.0f} degrees from {seconds:.1f} s, as in no clip")
+        flaws.append(f"{displayed(far.joint)} turns by {far.degrees:.0f} degrees at {seconds:.1f} s, as in no clip")
     return flaws
 
 
@@ -90,10 +90,10 @@ def shown_beyond(name: str, one: Sighting) -> str:
 
 
 def attestation(tween: Tween) -> str:
-    """Describe how much of the motion the corpus attests: "90% of its own transitions occur in ballet"."""
+    """Describe how much of the motion the corpus attests: "90% of the motion's transitions occur in ballet"."""
     if tween.motion_attested is None:
         return "nothing moves"
-    return f"{tween.motion_attested:.0%} of its own transitions occur in {_corpora(tween)}"
+    return f"{tween.motion_attested:.0%} of the motion's transitions occur in {_corpora(tween)}"
 
 
 def _origin(tween: Tween) -> str:

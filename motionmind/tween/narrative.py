@@ -81,7 +81,7 @@ class Explanation(msgspec.Struct, frozen=True):
         cost: cost of the path, nats.
         lower_bound: proven lower bound of the cost, nats.
         gap: gap between the two, as a share of the cost.
-        followed: share of joints' states between A and B that the motion is within the tolerance of.
+        followed: share of the joints' states between A and B that the motion reaches within the tolerance.
         motion_attested: share of the motion's own transitions that the corpus attests; None if nothing moves.
         seconds: length of the motion.
         moved: part of the cost for the joints' moves, nats.
@@ -117,7 +117,7 @@ class Explanation(msgspec.Struct, frozen=True):
         return values
 
     def __str__(self) -> str:
-        """Return the explanation as a page of text: for each move, the body parts that turn farthest, and where to."""
+        """Return the explanation as a page of text: for each move, the body parts that turn farthest, and how."""
         return "\n".join(_page(self))
 
     def details(self) -> str:
@@ -194,8 +194,8 @@ def _page(explanation: Explanation) -> Iterator[str]:
     proof = "optimal" if explanation.status == "optimal" else f"{explanation.status}, gap {explanation.gap:.1%}"
     line = f"{count} move{'s' * (count != 1)} in {explanation.seconds:.2f} s; path {proof}"
     if explanation.motion_attested is not None:
-        line += f"; motion follows {explanation.followed:.0%} of it, "
-        line += f"{explanation.motion_attested:.0%} of its own transitions attested"
+        line += f"; motion follows {explanation.followed:.0%} of the path; "
+        line += f"{explanation.motion_attested:.0%} of the motion's transitions attested"
     yield line
     most = max(1, min(_MAX_PARTS, _PAGE_ROWS // max(count, 1)))
     found = [(move, _part_rows(move, most)) for move in explanation.moves]

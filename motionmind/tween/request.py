@@ -84,8 +84,8 @@ class TweenRequest:
         pin: joints pinned to an end: "A" keeps A's state until the last move, "B" has B's from the first move on.
         hold: joints that keep their state from A to B, such as a standing leg; A and B must agree there.
         avoid: joints, each with a state to avoid between A and B, by number or name.
-        via: postures to pass through in this order, each after any move, or after a given one, counted from 1, as
-            (posture, move).
+        via: postures to pass through in this order, each after any move, or after a given one as (posture, move); the
+            first move is 1.
         unlike: tweens to differ from; all have the same number of moves, as does this one.
         differ: least share of the joints' states between A and B that must differ from each tween in `unlike`, compared
             move by move, from 0 to 1.

@@ -98,8 +98,8 @@ BAD = [
     (f"{TWEEN} --weights heavy", r"'--weights': 'heavy' is not one of 'conditional', 'printed'"),
     (f"{TWEEN} --foo", r"No such option"),
     ("tween A.json", r"Missing argument 'B'\. \(motionmind tween --help shows how\)"),
-    ("tween A.json B.json", r"Missing option '--corpus': neither A nor B .*; there are (.+, )?ballet, hands, "),
-    ("measure clip.bvh", r"Missing option '--corpus'. There are (.+, )?ballet, hands, "),
+    ("tween A.json B.json", r"Missing option '--corpus': neither A nor B .* Corpora: (.+, )?ballet, hands, "),
+    ("measure clip.bvh", r"Missing option '--corpus'. Corpora: (.+, )?ballet, hands, "),
     ("dance", r"No such command 'dance'"),
 ]
 

@@ -58,7 +58,7 @@ def test_alternatives_differ_and_are_near_enough(found: list[tuple[Tween, Accoun
 def test_words_say_what_is_proven(found: list[tuple[Tween, Account]]) -> None:
     for tween, said in found:
         assert (tween.status == "optimal") == ("proven" in said.sure)
-        assert said.usual.endswith(f"; {tween.motion_attested:.0%} of its own transitions occur in ballet")
+        assert said.usual.endswith(f"; {tween.motion_attested:.0%} of the motion's transitions occur in ballet")
         assert "_" not in "".join([said.words, said.differs, said.sure, said.usual, *said.beyond])
         assert f"{tween.motion.times[-1]:.1f} s" in said.words
         assert b"nat" not in msgspec.json.encode([said.words, said.sure, said.usual, said.beyond])

@@ -54,7 +54,8 @@ def tween() -> Tween:
 def test_it_says_length_proof_following_and_attestation(tween: Tween) -> None:
     assert headline(tween) == (
         f"{tween.moves} moves, {tween.motion.times[-1]:.1f} s. Path proven optimal, all from ballet. Motion follows "
-        f"{tween.followed[1:-1].mean():.0%} of it; {tween.motion_attested:.0%} of its own transitions occur in ballet"
+        f"{tween.followed[1:-1].mean():.0%} of the path; {tween.motion_attested:.0%} of the motion's transitions "
+        "occur in ballet"
     )
 
 
@@ -82,7 +83,7 @@ def test_it_says_length_proof_following_and_attestation(tween: Tween) -> None:
             ", all from ballet except 4 transitions of a, b, c and 1 more. ",
         ),
         ({"sources": ()}, ", all from the corpus. "),
-        ({"motion_attested": 0.5}, "; 50% of its own transitions occur in ballet"),
+        ({"motion_attested": 0.5}, "; 50% of the motion's transitions occur in ballet"),
         ({"motion_attested": None}, "; nothing moves"),
         ({"path": np.zeros((1, 3), np.int32)}, "no move: A and B are the same posture"),
     ],
@@ -116,7 +117,7 @@ def test_a_viewer_winces_at_what_the_corpus_never_shows_and_at_far_bridges(
         (
             "sliding",
             Sighting(0.8, 0.4, ""),
-            "feet slide: near the floor one moves in 80% of a second, at most",
+            "feet slide: one moves near the floor for 80% of a second, at most",
         ),
         ("pace", Sighting(3.0, 1.5, "", "left_hip"), "left_hip is 3.00x as fast as fast movement of the corpus"),
     ):
@@ -127,7 +128,7 @@ def test_a_viewer_winces_at_what_the_corpus_never_shows_and_at_far_bridges(
     followed = replace(tween, bridges=(near, far), followed=np.ones_like(tween.followed))
     seconds = tween.motion.insertions[0].times[2]
     assert beyond(replace(followed, bridges=(near,))) == []
-    assert beyond(followed) == [f"left_hip turns by 108 degrees from {seconds:.1f} s, as in no clip"]
+    assert beyond(followed) == [f"left_hip turns by 108 degrees at {seconds:.1f} s, as in no clip"]
     unseen = tween.followed.copy()
     unseen[3, tween.joints.index("left_hip")] = False
     assert beyond(replace(followed, followed=unseen)) == []

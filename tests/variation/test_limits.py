@@ -247,7 +247,7 @@ def test_seams_that_a_viewer_would_wince_at_are_named(
         if seam.insertion
     }
     worst = max(values, key=lambda number: values[number])
-    assert slides.startswith(f"warning   seam {worst}: feet slide: near the floor one moves in {values[worst]:.0%} of")
+    assert slides.startswith(f"warning   seam {worst}: feet slide: one moves near the floor for {values[worst]:.0%} of")
     assert run_of(slides) == sorted(number for number, value in values.items() if value > 1e-3 and number != worst)
 
 
