@@ -44,7 +44,7 @@ def files_under(folder: Path) -> dict[str, bytes]:
 
 
 def built(run: Run, *arguments: object, name: str = "mine") -> Any:
-    """What there is to know of a corpus that is built with these arguments, perhaps in place of an earlier one."""
+    """Build a corpus with these arguments, in place of an earlier one if there is one; return its check."""
     ran = run("corpus", "build", name, *arguments, "--replace")
     assert ran.code == 0, ran.err
     return run("corpus", "check", name, "--json", "--pairs", 50).json

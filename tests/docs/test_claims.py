@@ -1,4 +1,4 @@
-"""What README and the guides claim of their commands, compared with the same commands without the option."""
+"""Check what README and the guides claim of commands, against the same commands without the option."""
 
 from __future__ import annotations
 
@@ -66,18 +66,18 @@ class Claim:
 
 
 def velocities(motion: Motion) -> np.ndarray:
-    """The joints' velocities between frames, radians per second [T - 1, J, 3]."""
+    """Return the joints' velocities between frames, radians per second [T - 1, J, 3]."""
     turns = rot.log(rot.inv_mul(motion.rotations[:-1], motion.rotations[1:]))
     return np.asarray(turns / np.diff(motion.times)[:, None, None])
 
 
 def energy(made: Made) -> float:
-    """The mean square of the joints' velocities."""
+    """Return the mean square of the joints' velocities."""
     return float(np.mean(velocities(made.motion) ** 2))
 
 
 def misfit(made: Made, seconds: tuple[float, float]) -> float:
-    """How far the velocities at A and B are from the recording's at two times, as a share of these."""
+    """Return the difference of the velocities at A and B from the recording's at two times, as a share of these."""
     moving = velocities(CLIP)
     wanted = np.stack([moving[round(30 * seconds[0]) - 1], moving[round(30 * seconds[1])]])
     assert np.degrees(np.linalg.norm(wanted, axis=-1)).max(axis=1).min() > 20.0, "the ends do not move"
@@ -85,7 +85,7 @@ def misfit(made: Made, seconds: tuple[float, float]) -> float:
 
 
 def farthest(one: Made, other: Made) -> float:
-    """The greatest mean angle of the joints between two movements at the same share of their time, degrees."""
+    """Return the greatest mean angle of joints between two movements, at equal shares of their times, degrees."""
     shares = np.linspace(0.0, 1.0, 50)
     frames = [np.rint(shares * (len(made.motion) - 1)).astype(int) for made in (one, other)]
     angles = rot.angle(one.motion.rotations[frames[0]], other.motion.rotations[frames[1]])
@@ -93,12 +93,12 @@ def farthest(one: Made, other: Made) -> float:
 
 
 def differing(one: Made, other: Made) -> float:
-    """The share of joints' states in which two paths differ between A and B."""
+    """Return the share of joints' states in which two paths differ between A and B."""
     return float(np.mean(np.array(one.report.path)[1:-1] != np.array(other.report.path)[1:-1]))
 
 
 def drift(made: Made, joint: str) -> float:
-    """How far a joint gets from its place in A, metres."""
+    """Return a joint's greatest distance from its place in A, metres."""
     motion = made.motion
     places = motion.positions()
     at = places[:, motion.skeleton.names.index(joint)]
@@ -106,19 +106,19 @@ def drift(made: Made, joint: str) -> float:
 
 
 def nearest(made: Made, posture: str) -> float:
-    """How near the movement comes to a posture: the mean angle of its joints, degrees."""
+    """Return the least mean angle of joints between the movement and a posture, degrees."""
     wanted = read_posture(posture).rotations
     return float(np.degrees(rot.angle(made.motion.rotations, wanted).mean(axis=1).min()))
 
 
 def rarity_price(made: Made) -> float:
-    """How much more a move costs the rarer it is: the slope of its cost over -log of its likelihood."""
+    """Return the slope of a move's cost over -log of its likelihood: the price of rarity."""
     rarity = -np.log(made.report.likelihood)  # without a bridge in sight
     return float(np.polyfit(rarity.ravel(), np.ravel(made.report.costs.moves), 1)[0])
 
 
 def passages_of(made: Made) -> set[float]:
-    """The times of the recording that a movement follows, seconds."""
+    """Return the times in the recording of the passages that a movement follows, seconds."""
     return {round(source.seconds, 1) for source in made.report.detail}
 
 
@@ -248,7 +248,7 @@ class Guide:
             yield
 
     def verify(self, claim: Claim) -> bool:
-        """Whether a claim stands in the document and is true of the one command with its options."""
+        """Return whether a claim is in the document, and true of the one command with its options."""
         assert claim.text in self.text
         (line,) = (line for line in self.commands if line.startswith("motionmind tween") and claim.options in line)
         words = shlex.split(line)[1:]
@@ -283,7 +283,7 @@ def run(line: str) -> None:
 
 @pytest.fixture(scope="module")
 def guide(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path], Guide]:
-    """The documents, each set up when it is first asked for."""
+    """Return a function that sets up a document at its first use."""
     return cache(lambda document: Guide(document, tmp_path_factory.mktemp(document.stem)))
 
 

@@ -292,7 +292,7 @@ def test_a_version_made_anew_under_the_number_of_one_that_was_to_go_stays(
 
     def interrupted(descriptor: int, operation: int) -> None:
         monkeypatch.undo()
-        versions.remove_others(mine, lambda: ())  # it is another writer who removes the first, and who makes it anew
+        versions.remove_others(mine, lambda: ())  # another writer removes folder 1 and makes it anew
         assert others.enter_context(versions.new_version(mine)) == mine / "1"
         flock(descriptor, operation)
 
