@@ -85,7 +85,7 @@ def varied(example: Motion, engine: Engine, sample: int) -> Motion:
     starts = trajectory(FLOWS["lorenz"], count=sample + 1, every=2_000)
     piece = Piece.of(example, rate=RATE)
     length = TIMES * len(piece.frames)
-    variation = vary(piece, engine, start=starts[sample], length=length, alternatives=1, node_budget=BUDGET)
+    variation = vary(piece, engine, start=starts[sample], nudge=0.1, length=length, alternatives=1, node_budget=BUDGET)
     made = at_rate(variation.motion())
     return made.slice(0, min(TIMES * len(example), len(made)))  # insertions have made it longer
 

@@ -9,21 +9,20 @@ import click
 
 from motionmind.cli.printing import count, note
 from motionmind.display import displayed
-from motionmind.variation.orders import REFUSED
+from motionmind.variation.orders import DEFAULT_INSERTED_SHARE, REFUSED
 
 if TYPE_CHECKING:
     from motionmind.tween.engine import Engine
     from motionmind.variation.variation import Variation
 
-_MANY_INSERTIONS_SHARE = 0.3  # of the time: above it, a note recommends --inserted
 
-
-def print_review(report: dict[str, Any], names: Sequence[str]) -> None:
+def print_review(report: dict[str, Any], names: Sequence[str], is_chosen: bool = False) -> None:
     """Print the report of a variation: its method, then a line for each stretch of the piece and its seam.
 
     Args:
         report: the report, as plain values.
         names: a name for each of the piece's postures [N].
+        is_chosen: whether `vary` has just chosen the nudge.
     """
     course, counts = report["course"], report["counts"]
     click.echo(
@@ -41,8 +40,13 @@ def print_review(report: dict[str, Any], names: Sequence[str]) -> None:
         f"{counts['attested']} attested, {counts['abrupt']} abrupt, {counts['unjudged']} not judged"
     )
     click.echo(f"chunk length in postures: {counts['mean_chunk']:.3g} on average, {counts['longest_chunk']} at most")
-    if counts["inserted"]:
-        click.echo(f"{counts['inserted_share']:.0%} of the time is inserted")
+    inserted = f"insertions take {counts['inserted_share']:.0%} of the time" if counts["inserted"] else ""
+    if is_chosen:
+        steps = f"{counts['seams']} of {count(counts['postures'] - 1, 'step')} leave{'s' * (counts['seams'] == 1)}"
+        steps = f"{steps} the piece's order"
+        inserted = f"nudge {course['nudge'][0]:.2g}, chosen so that {steps}{'; ' * bool(inserted)}{inserted}"
+    if inserted:
+        click.echo(inserted)
     begins = [0, *(seam["at"] + 1 for seam in report["seams"])]
     ends = [*(seam["at"] for seam in report["seams"]), counts["postures"] - 1]
     if report["limits"]:
@@ -85,7 +89,7 @@ def _format_limits(limits: dict[str, Any], share: float, shortest: int) -> str:
     kept = []
     if limits["inserted"] is not None and share <= limits["inserted"]:
         kept.append(f"at most {limits['inserted']:.0%} inserted")
-    if shortest >= limits["stretch"]:
+    if shortest >= limits["stretch"] > 1:
         kept.append(f"stretches of at least {count(limits['stretch'], 'posture')}")
     return f"limits: {', '.join(kept)}; " if kept else ""
 
@@ -110,26 +114,33 @@ def _format_names(first: str, last: str) -> str:
 
 
 def _format_transition(seam: dict[str, Any]) -> str:
-    """Describe a seam: attested, abrupt, or smoothed by an insertion, and why."""
+    """Describe a seam: attested, abrupt, or what it was and what the insertion makes of it."""
     if seam["corpus"] is None:
         return "not judged"
     if not seam["breaks"]:
         return f"attested by {displayed(seam['corpus'])}"
-    ordered = sorted(seam["breaks"], key=lambda one: -float(one["degrees"]))
-    worst, others = ordered[0], [displayed(one["joint"]) for one in ordered[1:]]
-    faults = ["not attested"] * (not worst["attested"]) + ["too fast"] * worst["fast"]
-    why = f"{displayed(worst['joint'])} {worst['degrees']:.0f} degrees, {' and '.join(faults)}"
+    why = _format_joints(seam["breaks"])
     if not seam["candidates"]:
-        state = "no path found" if seam["failure"] else "not smoothed"
-        return f"abrupt, {state}: {', '.join([why, *others])}"
-    why += f", and {len(others)} more" * bool(others)
-    best = seam["candidates"][seam["chosen"] - 1]
-    tween = (
-        f"{count(best['moves'], 'move')} in {best['seconds']:.2f} s, {best['status']}, {best['attested']:.0%} attested"
-    )
-    bridges = f", {count(len(best['bridges']), 'bridge')}" * bool(best["bridges"])
-    insertion = f"{tween}{bridges}, {seam['chosen']} of {len(seam['candidates'])}"
-    return f"abrupt, was {insertion}: {why}" if seam["decision"] == "discarded" else f"{insertion}: {why}"
+        return f"abrupt, {'no path found' if seam['failure'] else 'not smoothed'}: {why}"
+    best, chosen = seam["candidates"][seam["chosen"] - 1], f"{seam['chosen']} of {len(seam['candidates'])}"
+    first, then = ("abrupt", "discarded") if seam["decision"] == "discarded" else ("was", "now")
+    return f"{first}: {why}; {then}: {_format_insertion(best)}, {chosen}"
+
+
+def _format_joints(joints: Sequence[dict[str, Any]]) -> str:
+    """Describe an abrupt transition: "left_elbow jumps 83 degrees, unattested and too fast, and 4 more joints"."""
+    worst = max(joints, key=lambda one: float(one["degrees"]))
+    faults = ["unattested"] * (not worst["attested"]) + ["too fast"] * worst["fast"]
+    why = f"{displayed(worst['joint'])} jumps {worst['degrees']:.0f} degrees, {' and '.join(faults)}"
+    return why + f", and {count(len(joints) - 1, 'more joint')}" * (len(joints) > 1)
+
+
+def _format_insertion(candidate: dict[str, Any]) -> str:
+    """Describe an insertion: "7 moves in 2.53 s, optimal, 97% attested, 5 bridges"."""
+    share = candidate["attested"]
+    attested = "every transition attested" if share == 1.0 else f"{min(share, 0.99):.0%} attested"
+    parts = [f"{count(candidate['moves'], 'move')} in {candidate['seconds']:.2f} s", candidate["status"], attested]
+    return ", ".join(parts + [count(len(candidate["bridges"]), "bridge")] * bool(candidate["bridges"]))
 
 
 def print_advice(variation: Variation, engine: Engine | None, depart: float | None) -> None:
@@ -140,12 +151,11 @@ def print_advice(variation: Variation, engine: Engine | None, depart: float | No
         engine: the engine that judged it; None if there is none.
         depart: the requested share of steps that leave the piece's order; None if not requested.
     """
-    from motionmind.variation.departure import DEPARTURE_TOLERANCE, departure
+    from motionmind.variation.departure import departure, is_near
 
-    refused = REFUSED[variation.by]
-    reached = departure(variation.first_order)
-    if depart is not None and abs(reached - depart) > DEPARTURE_TOLERANCE:
-        note(f"no nudge found for --depart {depart:.0%}; the nearest share is {reached:.0%}")
+    refused, order = REFUSED[variation.by], variation.first_order
+    if depart is not None and not is_near(order, depart):
+        note(f"no nudge found for --depart {depart:.0%}; the nearest share is {departure(order):.0%}")
     counts = variation.report()["counts"]
     limits = variation.kept.limits if variation.kept else None
     if not variation.seams and limits:
@@ -156,10 +166,27 @@ def print_advice(variation: Variation, engine: Engine | None, depart: float | No
         note("the variation keeps the piece's order" + f": try {tries}" * bool(tries))
     elif engine is None:
         note("without --corpus, no transition is judged or smoothed")
-    share = counts["inserted_share"]
-    if limits is None and share > _MANY_INSERTIONS_SHARE and "inserted" not in refused:
-        note(f"insertions take {share:.0%} of the time: --inserted {_MANY_INSERTIONS_SHARE:g} keeps more of the piece")
-    if limits and limits.inserted is not None and share > limits.inserted:
-        note(f"no order found with at most {limits.inserted:.0%} of the time inserted; this one has {share:.0%}")
+    _print_advice_on_insertions(variation, counts)
     if counts["stays"] > 0.25 * (counts["postures"] - 1):
         note(f"{_format_stillness(counts)}: try another --start, or a larger --skip or --step")
+
+
+def _print_advice_on_insertions(variation: Variation, counts: dict[str, Any]) -> None:
+    """Note why insertions take more of the time than the limit, or than the limit that none set."""
+    from motionmind.variation.limits import MAX_LIMITED_POSTURES
+
+    limits, share = variation.kept.limits if variation.kept else None, counts["inserted_share"]
+    most = limits.inserted if limits and limits.inserted is not None else DEFAULT_INSERTED_SHARE
+    if share <= most or "inserted" in REFUSED[variation.by]:
+        return
+    if limits and limits.inserted is not None:
+        seconds = min(float(seam.insertion.motion.times[-1]) for seam in variation.seams if seam.insertion)
+        found = f"no order of {count(counts['postures'], 'posture')} found with at most {most:.0%} of the time inserted"
+        note(f"{found}; this one has {share:.0%}, and its shortest insertion takes {seconds:.2f} s")
+    elif max(len(variation.piece), len(variation.order)) > MAX_LIMITED_POSTURES:
+        note(
+            f"insertions take {share:.0%} of the time, and --inserted limits up to {MAX_LIMITED_POSTURES:,} postures: "
+            "vary a part, or at a lower --rate"
+        )
+    else:
+        note(f"insertions take {share:.0%} of the time: --inserted {most:g} keeps more of the piece")

@@ -25,7 +25,7 @@ from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError, enumerated
 from motionmind.files import all_or_none, sha256_of
 from motionmind.render import PICTURES
-from motionmind.variation.orders import ORDERS, RANDOM, REFUSED, By
+from motionmind.variation.orders import DEFAULT_INSERTED_SHARE, ORDERS, RANDOM, REFUSED, By
 
 if TYPE_CHECKING:
     from motionmind.corpus.corpus import Facing
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from motionmind.variation.variation import Variation
 
 
-@command("motionmind vary macarena --attractor rossler --inserted 0.3 -o variation.json")
+@command("motionmind vary macarena --attractor rossler -o variation.json")
 @click.argument("source", metavar="PIECE", shell_complete=completion.movement)
 @outputs(f"File to write: {OUTPUT_KINDS}; review reads .json.")
 @option("--report", section=Section.OUTPUT, type=FILE, help="File of the report, as JSON; - prints it.")
@@ -111,8 +111,7 @@ if TYPE_CHECKING:
     section=Section.TRAJECTORY,
     type=Point(),
     metavar="X[,Y,Z]",
-    help="Offset of the variation's initial point from the piece's; 0 reproduces the piece  "
-    "[default: chosen by --depart; 0.1 with --start]",
+    help="Offset of the variation's initial point from the piece's; 0 reproduces the piece  [default: by --depart]",
 )
 @option(
     "--depart",
@@ -120,21 +119,23 @@ if TYPE_CHECKING:
     type=Number(0, 1),
     metavar="SHARE",
     help="Share of steps that leave the piece's order; chooses the smallest nudge within 0.05 of it  "
-    "[default: 0.25, with --stretch 4 0.125, unless --nudge or --start is given]",
+    "[default: 0.25, with --stretch 4 0.125, unless --nudge is given]",
 )
 @option(
     "--inserted",
     section=Section.TRAJECTORY,
     type=Number(0, 1),
     metavar="SHARE",
-    help="Maximum share of inserted time; drops seams with long insertions, or moves them to more similar postures.",
+    help="Maximum share of inserted time; drops seams with long insertions, or moves them to more similar postures; "
+    f"1 is no limit  [default: {DEFAULT_INSERTED_SHARE:g}, unless --nudge or --depart is given]",
 )
 @option(
     "--stretch",
     section=Section.TRAJECTORY,
     type=COUNT,
     metavar="N",
-    help="Minimum postures per stretch of the piece  [default: 4 with --inserted, else 1]",
+    help="Minimum postures per stretch of the piece  [default: 4 with a limit of --inserted, fewer in short pieces; "
+    "else 1]",
 )
 @option(
     "--skip",
@@ -242,12 +243,13 @@ def vary(
             **{name: value for name, value in arguments.items() if name not in refused},
             **request,
         )
-    print_variation(variation, as_json, _write(outputs, report, variation, request["fps"]), home)
+    is_chosen = by == "attractor" and nudge is None
+    print_variation(variation, as_json, _write(outputs, report, variation, request["fps"]), home, is_chosen)
     if engine and not as_json:
         print_seams_beyond(variation, engine)
     depart = arguments["depart"] if by == "attractor" else None  # a control does not depart as its trajectory does
     if by == "attractor" and not variation.kept:  # whose limits come first
-        depart = share_sought(nudge, depart, arguments["start"])
+        depart = share_sought(nudge, depart)
     print_advice(variation, engine, depart)
     if not as_json:
         print_written([path for path, _ in files])
@@ -283,13 +285,18 @@ def load_engine(corpus: str, home: Path | None) -> Engine:
     return Engine.load(corpus, home)
 
 
-def print_variation(variation: Variation, as_json: bool, motion_sha256: str | None, home: Path | None) -> None:
-    """Print a variation's report as a table, or as JSON with the hash of the written file, if any."""
+def print_variation(
+    variation: Variation, as_json: bool, motion_sha256: str | None, home: Path | None, is_chosen: bool = False
+) -> None:
+    """Print a variation's report as a table, or as JSON with the hash of the written file, if any.
+
+    The table says whether the nudge `is_chosen` for the piece.
+    """
     report = variation.report()
     if as_json:
         click.echo(json.dumps(report | {"motion_sha256": motion_sha256}))
     else:
-        print_review(report, names_in(variation, home))
+        print_review(report, names_in(variation, home), is_chosen)
 
 
 def print_seams_beyond(variation: Variation, engine: Engine) -> None:

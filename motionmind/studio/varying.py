@@ -25,8 +25,8 @@ from motionmind.errors import MotionMindError, suggestion
 from motionmind.studio.edits import Block
 from motionmind.variation.departure import departure, find_nudge
 from motionmind.variation.limits import Limits, check_departure, check_limits, keep_within
+from motionmind.variation.nudge import N_SKIPPED_POINTS
 from motionmind.variation.stretches import cheapest_order
-from motionmind.variation.variation import N_SKIPPED_POINTS
 
 MAX_UNITS = 4_000  # of a piece: with a minimum stretch above 1, memory grows with their square
 STEPS_PER_PLACE = N_SKIPPED_POINTS + 1  # of a trajectory
@@ -111,7 +111,7 @@ class Estimates(NamedTuple):
     durations: Floats
 
 
-Insertions = Callable[[Sequence[Unit]], Estimates]
+Insertions = Callable[[Sequence[Unit]], Estimates | None]  # None: insertions cannot be limited
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,10 +288,10 @@ class _Course:
         return self.found[nudge]
 
     def within(self, limits: Limits, nudge: float, insertions: Estimates) -> Ints:
-        """Return the unit at each place [L], with insertions within limits."""
+        """Return the unit at each place [L], with insertions within limits if another order than the piece's is."""
         sites, points = self.piece[::STEPS_PER_PLACE], self.follow(nudge)[::STEPS_PER_PLACE]
         itinerary = Itinerary(sites, points, reorder(sites, points))
-        kept, _ = keep_within(limits, itinerary, insertions.durations, insertions.seconds, None)
+        kept, _ = keep_within(limits, itinerary, insertions.durations, insertions.seconds, None, leaves=True)
         return np.array(kept.order)
 
 

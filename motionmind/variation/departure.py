@@ -26,12 +26,23 @@ def departure(order: Ints) -> float:
     return float(np.mean(departs(order))) if len(order) > 1 else 0.0
 
 
-def share_sought(nudge: object | None, depart: float | None, start: object | None, stretch: int = 1) -> float | None:
-    """Return the share of departing steps for which `vary` seeks a nudge; None if its arguments determine the nudge.
+def is_near(order: Ints, share: float) -> bool:
+    """Return whether an order [L] departs in a share of its steps, within 0.05 or half a step."""
+    half_step = 0.5 / max(len(order) - 1, 1) + 1e-9  # 1e-9 absorbs rounding
+    return abs(departure(order) - share) <= max(DEPARTURE_TOLERANCE, half_step)
+
+
+def share_sought(nudge: object | None, depart: float | None, stretch: int = 1) -> float | None:
+    """Return the share of departing steps for which `vary` seeks a nudge; None if a nudge is given.
 
     The default is a quarter, or less if the stretches must be twice `stretch` on average.
     """
-    return min(0.25, 0.5 / stretch) if nudge is None and depart is None and start is None else depart
+    return min(0.25, 0.5 / stretch) if nudge is None and depart is None else depart
+
+
+def nudges_from(nudge: float, every: int = 1) -> list[float]:
+    """Return the nudges that `find_nudge` tries, from one of them on, smallest first."""
+    return [one for one in _NUDGES[::every].tolist() if one >= nudge]
 
 
 def find_nudge(order: Callable[[float], Ints], share: float, every: int = 1) -> float:
@@ -43,7 +54,8 @@ def find_nudge(order: Callable[[float], Ints], share: float, every: int = 1) -> 
         every: try only every n-th nudge; there are ten nudges per power of ten.
 
     Returns:
-        The smallest nudge whose share is within 0.05; if there is none, the nudge with the nearest share.
+        The smallest nudge whose share is within 0.05 or half a step (`is_near`); if there is none, the nudge with the
+        nearest share.
 
     Raises:
         MotionMindError: the share is not from 0 to 1, or no nudge gives an order.
@@ -51,15 +63,15 @@ def find_nudge(order: Callable[[float], Ints], share: float, every: int = 1) -> 
     if not 0.0 <= share <= 1.0:
         raise MotionMindError(f"the share of steps that depart must be from 0 to 1, not {share}")
     nearest, off = float(_NUDGES[0]), np.inf
-    for nudge in map(float, _NUDGES[::every]):
+    for nudge in nudges_from(nearest, every):
         try:
-            found = abs(departure(order(nudge)) - share)
+            found = order(nudge)
         except MotionMindError:
             if off == np.inf:  # the nudge is not the cause
                 raise
             break
-        if found < off:
-            nearest, off = nudge, found
-        if off <= DEPARTURE_TOLERANCE:
-            break
+        if is_near(found, share):
+            return nudge
+        if abs(departure(found) - share) < off:
+            nearest, off = nudge, abs(departure(found) - share)
     return nearest

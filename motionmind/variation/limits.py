@@ -25,7 +25,7 @@ from motionmind.variation.departure import DEPARTURE_TOLERANCE, departs
 from motionmind.variation.seams import Index, Transition
 from motionmind.variation.stretches import cheapest_order
 
-_MAX_POSTURES = 4_000  # of a piece, and of its variation: arrays hold the square of them
+MAX_LIMITED_POSTURES = 4_000  # of a piece, and of its variation: arrays hold the square of them
 _MAX_ROUNDS = 12  # of smoothing; then only use seams that are smoothed already
 
 Smoothing = Callable[[Sequence[tuple[int, int]]], tuple[Transition, ...]]  # smooths seams; fewer if interrupted
@@ -60,7 +60,7 @@ def check_limits(inserted: float | None, stretch: int | None, count: int, length
 
     Args:
         inserted: see `Limits`.
-        stretch: see `Limits`; None for 4, or as many as there are, if insertions are limited.
+        stretch: see `Limits`; None for 4 if insertions are limited, or for a fifth of fewer than 20 postures.
         count: postures of the piece.
         length: postures of the variation.
 
@@ -71,16 +71,16 @@ def check_limits(inserted: float | None, stretch: int | None, count: int, length
         return None
     if inserted is not None and not 0.0 <= check_number("inserted", inserted) <= 1.0:
         raise MotionMindError(f"the share of inserted time must be from 0 to 1, not {inserted}")
-    if max(count, length) > _MAX_POSTURES:
+    if max(count, length) > MAX_LIMITED_POSTURES:
         raise MotionMindError(
-            f"inserted and stretch are for pieces and variations of up to {_MAX_POSTURES:,} postures, not of "
+            f"inserted and stretch are for pieces and variations of up to {MAX_LIMITED_POSTURES:,} postures, not of "
             f"{max(count, length):,}: vary a part"
         )
     most = min(count, length)
     if stretch is not None and check_whole("stretch", stretch, 1) > most:
         raise MotionMindError(f"stretch must be at most {most}, the postures of piece and variation, not {stretch}")
     share = None if inserted is None else float(inserted)
-    return Limits(share, min(4, most) if stretch is None else int(stretch))
+    return Limits(share, min(4, max(most // 5, 1)) if stretch is None else int(stretch))
 
 
 def check_departure(depart: float | None, limits: Limits | None) -> None:
@@ -105,30 +105,37 @@ def inserted_share(inserted: Floats, durations: Floats) -> float:
 
 @dataclass(eq=False)
 class _Seeker:
-    """A search for an order within limits; actual lengths replace the estimates in `seconds` [N, N]."""
+    """A search for an order within limits; actual lengths replace the estimates in `seconds` [N, N].
+
+    With `leaves`, an order that leaves the piece's comes before the limit of insertions.
+    """
 
     course: Itinerary
     durations: Floats
     limits: Limits
     seconds: Singles
+    leaves: bool
 
     def order(self) -> Ints:
-        """Return the order [L] at the smallest price that meets the limit, by the present `seconds`."""
-        at_no_price = self._cheapest(0.0)
-        if self._holds(at_no_price):
-            return at_no_price
+        """Return the order [L] at the smallest price that meets the limit, by the present `seconds`.
+
+        If that is the piece's own order, return with `leaves` the one at the next smaller price.
+        """
+        beyond = self._cheapest(0.0)
+        if self._holds(beyond):
+            return beyond
         low, high = np.log((1e-6, 1e4))  # price of a second, in the trajectory's extents
-        best = self._cheapest(float(np.exp(high)))
-        if not self._holds(best):
-            return best  # no other inserts less
+        within = self._cheapest(float(np.exp(high)))
+        if not self._holds(within):
+            return within  # no other inserts less
         for _ in range(20):
             middle = 0.5 * (low + high)
             order = self._cheapest(float(np.exp(middle)))
             if self._holds(order):
-                best, high = order, middle
+                within, high = order, middle
             else:
-                low = middle
-        return best
+                beyond, low = order, middle
+        return beyond if self.leaves and not departs(within).any() else within
 
     def _cheapest(self, price: float) -> Ints:
         return cheapest_order(self.course, self.seconds, price, self.limits.stretch)
@@ -136,15 +143,21 @@ class _Seeker:
     def _holds(self, order: Ints) -> bool:
         if self.limits.inserted is None:
             return True
-        return inserted_share(self._inserted(order), self.durations[order[:-1]]) <= self.limits.inserted
+        return self.share(order) <= self.limits.inserted
 
-    def _inserted(self, order: Ints) -> Floats:
-        """Return the seconds inserted at each step of an order [L - 1]."""
-        return np.where(departs(order), self.seconds[order[:-1], order[1:]], 0.0)
+    def share(self, order: Ints) -> float:
+        """Return the share of the time for insertions in an order [L]."""
+        inserted = np.where(departs(order), self.seconds[order[:-1], order[1:]], 0.0)
+        return inserted_share(inserted, self.durations[order[:-1]])
 
 
 def keep_within(
-    limits: Limits, course: Itinerary, durations: Floats, seconds: Singles, smooth: Smoothing | None
+    limits: Limits,
+    course: Itinerary,
+    durations: Floats,
+    seconds: Singles,
+    smooth: Smoothing | None,
+    leaves: bool = False,
 ) -> tuple[Kept, tuple[Transition, ...]]:
     """Find the order of a variation within limits, and smooth its seams.
 
@@ -154,6 +167,7 @@ def keep_within(
         durations: seconds from each of the piece's postures to the next [N].
         seconds: estimated seconds of the insertion from each posture to each other [N, N].
         smooth: smooths seams; None without a corpus.
+        leaves: whether to exceed the share of insertions rather than keep the piece's order.
 
     Returns:
         The order, and its judged and smoothed seams.
@@ -161,7 +175,7 @@ def keep_within(
     Raises:
         MotionMindError: there is no order with such stretches.
     """
-    seeker = _Seeker(course, durations, limits, seconds.copy())
+    seeker = _Seeker(course, durations, limits, seconds.copy(), leaves)
     smoothed: dict[tuple[int, int], Transition] = {}
     order = seeker.order()
     for number in range(_MAX_ROUNDS + 1):
@@ -182,6 +196,13 @@ def keep_within(
         order = seeker.order()
     kept = Kept(tuple(order.tolist()), limits)
     return kept, tuple(smoothed[pair] for pair in _seams_of(order) if pair in smoothed)
+
+
+def estimate_order(limits: Limits, course: Itinerary, durations: Floats, seconds: Singles) -> tuple[Ints, float]:
+    """Return the order [L] with which `keep_within` begins if it `leaves`, and its estimated share of insertions."""
+    seeker = _Seeker(course, durations, limits, seconds, leaves=True)
+    order = seeker.order()
+    return order, seeker.share(order)
 
 
 def _seams_of(order: Ints) -> list[tuple[int, int]]:

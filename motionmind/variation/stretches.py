@@ -12,6 +12,8 @@ from their mean. A seam leads to one of the sites nearest to its point.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from motionmind._typing import Bools, Ints, Singles
@@ -40,32 +42,39 @@ def cheapest_order(course: Itinerary, seconds: Singles, charge: float, stretch: 
     Raises:
         MotionMindError: there are no such stretches.
     """
-    count, length = len(course.sites), len(course.points)
-    middle = course.sites - course.sites.mean(axis=0)
-    scale = max(float(np.sqrt(np.sum(middle**2) / count)), np.finfo(float).tiny)
-    away = np.empty((length, count), dtype=np.float32)
-    for n, point in enumerate(course.points):
-        far = np.sqrt(np.sum((course.sites - point) ** 2, axis=1))
-        away[n] = (far - far[course.indices[n]]) / scale
-    landings = np.argsort(away, axis=1, kind="stable")[:, :_N_LANDINGS]
-    stays = np.concatenate([[False], np.diff(course.indices) == 0])
-    order = _follow(away, landings, stays, seconds, charge, stretch)
+    away, landings, stays = _measure(course)
+    order = _follow(away, landings, stays, np.ascontiguousarray(seconds.T), charge, stretch)
     if not len(order):
         raise MotionMindError(
-            f"there is no variation of {length} postures in stretches of {stretch} at least: the piece has {count}"
+            f"there is no variation of {away.shape[0]} postures in stretches of {stretch} at least: the piece has "
+            f"{away.shape[1]}"
         )
     return order
 
 
+@lru_cache(maxsize=1)  # a search for a price asks again and again
+def _measure(course: Itinerary) -> tuple[Singles, Ints, Bools]:
+    """Return the distances, landings and stays of a trajectory, as `_follow` takes them."""
+    middle = course.sites - course.sites.mean(axis=0)
+    scale = max(float(np.sqrt(np.sum(middle**2) / len(middle))), np.finfo(float).tiny)
+    away = np.empty((len(course.points), len(course.sites)), dtype=np.float32)
+    for n, point in enumerate(course.points):
+        far = np.sqrt(np.sum((course.sites - point) ** 2, axis=1))
+        away[n] = (far - far[course.indices[n]]) / scale
+    landings = np.argsort(away, axis=1, kind="stable")[:, :_N_LANDINGS].copy()
+    return away, landings, np.concatenate([[False], np.diff(course.indices) == 0])
+
+
 @jit
-def _follow(away: Singles, landings: Ints, stays: Bools, seconds: Singles, charge: float, stretch: int) -> Ints:
+def _follow(away: Singles, landings: Ints, stays: Bools, into: Singles, charge: float, stretch: int) -> Ints:
     """Return the cheapest order [L]; empty [0] if there is none.
 
     Args:
         away: distance of each posture's site from each point [L, N].
         landings: postures to which a seam may lead at each point [L, K].
         stays: whether an order may stay in its posture at a point [L].
-        seconds, charge, stretch: as in `cheapest_order`.
+        into: seconds of the insertion to each posture from each other [N, N]; the inner loop reads a row.
+        charge, stretch: as in `cheapest_order`.
     """
     length, count = away.shape
     tried = landings.shape[1]
@@ -81,8 +90,8 @@ def _follow(away: Singles, landings: Ints, stays: Bools, seconds: Singles, charg
                 landed[n, j] = 0.0
                 continue
             for i in range(count):
-                if i != k and i + 1 != k:
-                    cost = best[i] + charge * seconds[i, k]
+                if best[i] < landed[n, j] and i != k and i + 1 != k:
+                    cost = best[i] + charge * into[k, i]
                     if cost < landed[n, j]:
                         landed[n, j], left[n, j] = cost, i
         after[:] = np.inf

@@ -2,34 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, Unpack
 
 import msgspec
 import numpy as np
-from numpy.typing import ArrayLike
 
 from motionmind._cells import html_of
 from motionmind._typing import Ints
 from motionmind.arguments import as_integers, check_flag, check_function, check_items, check_options, check_type
 from motionmind.body.motion import Motion
-from motionmind.chaos.flows import FLOWS, Flow
-from motionmind.chaos.reorder import Itinerary, itinerary
-from motionmind.chaos.trajectories import largest_exponent
+from motionmind.chaos.flows import Flow
+from motionmind.chaos.reorder import Itinerary
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.search.solve import Watch
 from motionmind.tween.engine import Engine
 from motionmind.tween.request import SeamOptions, SmoothOptions
-from motionmind.variation.arguments import check_number, check_numbers, check_whole
+from motionmind.variation.arguments import check_number, check_whole
 from motionmind.variation.controls import Control, control_of
 from motionmind.variation.course import Course
-from motionmind.variation.departure import find_nudge, share_sought
 from motionmind.variation.insertion_times import estimate_insertions
-from motionmind.variation.limits import Kept, Limits, Smoothing, check_departure, check_limits, keep_within
-from motionmind.variation.orders import By, check_taken
+from motionmind.variation.limits import (
+    MAX_LIMITED_POSTURES,
+    Kept,
+    Smoothing,
+    check_limits,
+    estimate_order,
+    keep_within,
+)
+from motionmind.variation.nudge import MAX_LENGTH, find_course
+from motionmind.variation.orders import DEFAULT_INSERTED_SHARE, By, check_taken
 from motionmind.variation.piece import Arrangement, Piece
 from motionmind.variation.report import report_of
 from motionmind.variation.review import (
@@ -51,10 +56,6 @@ from motionmind.variation.seams import (
     TransitionTest,
     judge_and_smooth,
 )
-from motionmind.variation.stretches import cheapest_order
-
-N_SKIPPED_POINTS = 10  # default number of points between two postures
-MAX_LENGTH = 1_000_000  # postures of a variation
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,8 +345,8 @@ def vary(
         nudge: the offset of the variation's trajectory from the piece's at its beginning: a number for the flow's first
             coordinate, or one for each [d]. None to seek it by `depart`.
         depart: the share of departing steps, in place of a nudge: the smallest nudge of the first coordinate within
-            0.05 of it, or else the nearest. None for 0.25, or half of what `stretch` allows if that is less; or, with a
-            `start`, for a nudge of 0.1.
+            0.05 of it, or half a step, or else the nearest. None for 0.25, or half of what `stretch` allows if that is
+            less.
         start: the start of the piece's trajectory, before its transient [d]; None for the flow's own.
         skip: points of the trajectories to skip between two postures; None for 10.
         step: the step of the integration, in the flow's units of time; None for the flow's own.
@@ -353,8 +354,10 @@ def vary(
         length: postures of the variation; None for as many as in the piece.
         inserted: the greatest share of the time for insertions. To meet it, seams with long insertions disappear or
             move to where the piece resembles itself more (see `motionmind.variation.limits`); if no order meets it, the
-            order that inserts least is taken. None for no limit.
-        stretch: the least number of postures in each stretch of the piece; None for 4 if insertions are limited, or 1.
+            order that inserts least is taken. 1 is no limit. None for 0.3 with an engine, unless `nudge` or `depart` is
+            given or there are more than 4,000 postures; this default gives way where all else is the piece itself.
+        stretch: the least number of postures in each stretch of the piece; None for 4 if insertions are limited (for a
+            fifth of the postures if they are fewer than 20), or 1.
         alternatives: see `Variation.smooth`, as for `whole_body`, `on_progress` and `watch`.
         options: fields of `TweenRequest` and `SearchOptions`, for the tweens that smooth seams.
 
@@ -383,12 +386,22 @@ def vary(
     check_taken(by, trajectory | {"length": length, "inserted": inserted, "stretch": stretch})
     piece = piece if isinstance(piece, Piece) else Piece.of(piece)
     length = check_whole("length", len(piece) if length is None else length, 1, MAX_LENGTH)
-    limits = check_limits(inserted, stretch, len(piece), length)
     if inserted is not None and engine is None:
         raise MotionMindError("inserted needs a corpus, which makes the insertions")
+    is_default = engine is not None and control is None and inserted is nudge is depart is None
+    is_default &= max(len(piece), length) <= MAX_LIMITED_POSTURES
+    if is_default:
+        inserted = DEFAULT_INSERTED_SHARE
+    limits = check_limits(inserted, stretch, len(piece), length)
+    seconds = np.zeros((len(piece), len(piece)) if limits else (0, 0), dtype=np.float32)
+    if engine is not None and limits is not None and limits.inserted is not None:
+        seconds = estimate_insertions(piece, TransitionTest(engine, whole_body))
     found: Itinerary | None = None
     if control is None or control.needs_trajectory:
-        course, found = _order_postures(len(piece), length, limits, **trajectory)
+        within = None
+        if is_default and limits is not None:
+            within = partial(estimate_order, limits, durations=piece.durations, seconds=seconds)
+        course, found = find_course(len(piece), length, limits, within, **trajectory)
         variation = Variation(piece, course, found.indices)
     else:
         piece, order = control.of_piece(piece)
@@ -407,10 +420,9 @@ def vary(
             **options,
         )
     if found is not None and limits is not None:
-        seconds = np.zeros((len(piece), len(piece)), dtype=np.float32)
-        if engine is not None and limits.inserted is not None:
-            seconds = estimate_insertions(piece, TransitionTest(engine, whole_body))
-        kept, transitions = keep_within(limits, found, piece.durations, seconds, None if control else smooth)
+        kept, transitions = keep_within(
+            limits, found, piece.durations, seconds, None if control else smooth, leaves=is_default
+        )
         variation = replace(variation, kept=kept, transitions=transitions)
         if control is None:
             return variation
@@ -427,53 +439,3 @@ def _in_order_of(control: Control, variation: Variation, found: Itinerary) -> Va
         order = control.of_trajectory(found, np.array(kept.order))
         kept = Kept(tuple(order.tolist()), kept.limits)
     return replace(variation, order=control.of_trajectory(found, variation.order), kept=kept, control=control)
-
-
-def _order_postures(
-    count: int,
-    length: int,
-    limits: Limits | None,
-    *,
-    flow: Flow | None,
-    nudge: float | Sequence[float] | None,
-    depart: float | None,
-    start: Sequence[float] | None,
-    skip: int | None,
-    step: float | None,
-    transient: int | None,
-) -> tuple[Course, Itinerary]:
-    """Check the arguments of `vary` for a trajectory; return its course, and the reordering of `count` postures."""
-    flow = FLOWS["lorenz"] if flow is None else flow
-    check_type("flow", flow, Flow, wanted="a Flow, such as find_flow('lorenz') gives")
-    skip = check_whole("skip", N_SKIPPED_POINTS if skip is None else skip, 0, MAX_LENGTH)
-    step = check_number("step", flow.step if step is None else step)
-    transient = check_whole("transient", flow.transient if transient is None else transient, 0, 1_000_000_000)
-    if nudge is not None and depart is not None:
-        raise MotionMindError("give nudge or depart, not both")
-    check_departure(depart, limits)
-    depart = share_sought(nudge, depart, start, limits.stretch if limits else 1)
-    start = check_numbers("start", flow.start if start is None else start)
-
-    def reorder(nudge: ArrayLike) -> Itinerary:
-        """Return the reordering by a nudge."""
-        return itinerary(flow, count, length, nudge=nudge, start=start, every=skip + 1, step=step, transient=transient)
-
-    if nudge is None:
-        nudge = 0.1 if depart is None else _seek_nudge(reorder, check_number("depart", depart), limits)
-    offset = check_numbers("nudge", nudge)
-    if np.ndim(nudge) == 0:
-        offset += (0.0,) * (len(flow.start) - 1)
-    # With the flow's own step at least: tiny steps do not reach the attractor in so many.
-    exponent = largest_exponent(flow, start, steps=200_000, step=max(step, flow.step))
-    course = Course(flow.name, dict(flow.parameters), start, offset, skip, step, transient, round(exponent, 4))
-    return course, reorder(offset)
-
-
-def _seek_nudge(reorder: Callable[[float], Itinerary], depart: float, limits: Limits | None) -> float:
-    """Return the nudge for a share of departing steps, in stretches within the limits."""
-    if limits is None:
-        return find_nudge(lambda nudge: reorder(nudge).indices, depart)
-    first = reorder(0.0)
-    free = np.zeros((len(first.sites), len(first.sites)), dtype=np.float32)
-    stretch = limits.stretch
-    return find_nudge(lambda nudge: cheapest_order(reorder(nudge), free, 0.0, stretch), depart, every=5)

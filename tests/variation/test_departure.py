@@ -105,10 +105,9 @@ def test_a_trajectory_that_is_given_gives_the_same_piece_as_ever_byte_for_byte(f
     order = np.concatenate([np.arange(first, first + count) for first, count in OF_OLD[flow]])
     nudged = vary(piece, flow=find_flow(flow), nudge=0.1)
     np.testing.assert_array_equal(nudged.order[: len(order)], order)
-    started = vary(piece, flow=find_flow(flow), start=find_flow(flow).start)  # to name a start is to take its own nudge
-    for options in ({"nudge": 0.1}, {"start": find_flow(flow).start}):
-        judged = vary(piece, engine, flow=find_flow(flow), watch=lambda _: True, **options)  # type: ignore[arg-type]
-        np.testing.assert_array_equal(judged.postures, nudged.order)
+    started = vary(piece, flow=find_flow(flow), start=find_flow(flow).start, nudge=0.1)
+    judged = vary(piece, engine, flow=find_flow(flow), watch=lambda _: True, nudge=0.1)
+    np.testing.assert_array_equal(judged.postures, nudged.order)
     for name, one in (("nudged", nudged), ("started", started)):
         write_variation(tmp_path / f"{name}.json", one)
     assert (tmp_path / "nudged.json").read_bytes() == (tmp_path / "started.json").read_bytes()

@@ -89,6 +89,24 @@ def test_the_table_names_postures_and_does_without_the_corpus(run: Run, file: Pa
     assert f" adagio@{first.end}" in run("review", file).out
 
 
+def test_a_seam_tells_the_cut_as_it_was_apart_from_the_insertion_as_it_is(run: Run, file: Path) -> None:
+    seams = [seam for seam in run("review", file, "--json").json["seams"] if seam["candidates"]]
+    run("review", file, "--discard", seams[0]["number"])
+    rows = {
+        int(line[:4]): line for line in run("review", file, "--list").out.splitlines() if line[:4].strip().isdigit()
+    }
+    for seam in seams:
+        worst = max(seam["breaks"], key=lambda one: one["degrees"])
+        first, then = ("abrupt", "discarded") if seam is seams[0] else ("was", "now")
+        cut, insertion = rows[seam["number"]].split(f"{first}: ")[1].split(f"; {then}: ")
+        assert cut.startswith(f"{worst['joint']} jumps {worst['degrees']:.0f} degrees, ")
+        assert ("unattested" in cut, "too fast" in cut) == (not worst["attested"], worst["fast"])
+        best = seam["candidates"][0]
+        assert insertion.startswith(f"{best['moves']} moves in {best['seconds']:.2f} s, {best['status']}, ")
+        assert ("every transition attested" in insertion) == (best["attested"] == 1.0)
+        assert insertion.endswith(f", 1 of {len(seam['candidates'])}")
+
+
 # --- the sheet --------------------------------------------------------------------------------------------------------
 
 

@@ -59,7 +59,7 @@ def kata(karate: Engine) -> Piece:
 
 @pytest.fixture(scope="module")
 def smoothed(kata: Piece, karate: Engine) -> Variation:
-    return vary(kata, karate, flow=FLOWS["rossler"], alternatives=2)
+    return vary(kata, karate, flow=FLOWS["rossler"], depart=0.25, alternatives=2)
 
 
 @pytest.fixture(scope="module")
@@ -200,7 +200,9 @@ def test_pieces_of_one_and_two_postures(kata: Piece, karate: Engine) -> None:
 
 def test_the_same_asked_twice_is_the_same_to_the_byte(kata: Piece, karate: Engine, tmp_path: Path) -> None:
     for name in ("a.json", "b.json"):
-        write_variation(tmp_path / name, vary(kata, karate, flow=FLOWS["rossler"], alternatives=2, length=12))
+        write_variation(
+            tmp_path / name, vary(kata, karate, flow=FLOWS["rossler"], alternatives=2, length=12, nudge=3.0)
+        )
     assert inserted(read_variation(tmp_path / "a.json"))
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
 
@@ -389,7 +391,8 @@ def test_an_insertion_turns_the_body_the_near_way_round(
     half a turn it may go either way, as the corpus does, and where it spins as it leaves or arrives."""
     variation = smoothed
     if facing == "stage":
-        variation = vary(Piece(kata.motion, kata.frames, "stage"), karate, flow=FLOWS["rossler"], alternatives=1)
+        staged = Piece(kata.motion, kata.frames, "stage")
+        variation = vary(staged, karate, flow=FLOWS["rossler"], depart=0.25, alternatives=1)
     motion, frames = variation.arrange()
     headings, turns = np.degrees(rot.heading(motion.rotations[:, 0])), []
     for seam in variation.seams:
@@ -494,7 +497,7 @@ def test_a_search_that_is_ended_leaves_the_rest_to_be_smoothed(
     def ended(_: Progress) -> bool:
         return True
 
-    some = vary(kata, karate, flow=FLOWS["rossler"], alternatives=2, watch=ended)
+    some = vary(kata, karate, flow=FLOWS["rossler"], depart=0.25, alternatives=2, watch=ended)
     pending = [seam for seam in some.seams if seam.transition and seam.transition.is_pending]
     assert pending
     assert not any(seam.transition and seam.transition.failure for seam in some.seams)
