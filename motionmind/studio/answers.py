@@ -212,7 +212,7 @@ class Map(_Answer):
 
 
 class Variation(_Answer):
-    """A variation of the piece."""
+    """A variation of the piece; `unlimited` says why insertions could not be limited as requested, if so."""
 
     piece: PieceView
     original: list[PartView]
@@ -228,6 +228,7 @@ class Variation(_Answer):
     jumps: list[int]
     about: dict[str, Any]
     basis: str
+    unlimited: str
 
 
 class FactsView(_Answer):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import msgspec
 import numpy as np
@@ -43,6 +44,17 @@ if TYPE_CHECKING:
     from motionmind.studio.studio import Studio
 
 _MAX_ESTIMATED_UNITS = 800  # estimates between all pairs of them take 1.5 s
+
+
+class _Estimated(NamedTuple):
+    """The latest estimates, which every turn of a dial needs again; `held` keeps the ids in `asked` from reuse."""
+
+    asked: list[Any]
+    held: tuple[Any, ...]
+    estimates: Estimates
+
+
+_latest: WeakKeyDictionary[Studio, _Estimated] = WeakKeyDictionary()
 
 
 class Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -120,6 +132,17 @@ async def propose(studio: Studio, wish: Wish) -> dict[str, Any]:
     staying = (locked | set(wish.stay)) - {one.block.id for one in asked}
     total, standing = standing_in(state, clocks.__getitem__)
     kept = (*asked, *(one for one in standing if one.block.id in staying))
+    unlimited = ""
+
+    def insertions(units: Sequence[Unit]) -> Estimates | None:
+        """Return the estimates; None, and note why, if there can be none."""
+        nonlocal unlimited
+        try:
+            return _estimates(studio, units, clocks.__getitem__)
+        except MotionMindError as error:
+            unlimited = f"Insertions are not limited: {error}."
+            return None
+
     # In a thread: a long piece first takes some seconds, and the server must answer meanwhile.
     found = await run_in_threadpool(
         vary_blocks,
@@ -129,9 +152,9 @@ async def propose(studio: Studio, wish: Wish) -> dict[str, Any]:
         present=state.blocks,
         total=total,
         used=state.used,
-        insertions=None if wish.inserted is None else lambda units: _estimates(studio, units, clocks.__getitem__),
+        insertions=None if wish.inserted is None else insertions,
     )
-    return _shown(studio, state, base, found, locked, wish)
+    return _shown(studio, state, base, found, locked, wish) | {"unlimited": unlimited}
 
 
 def _estimates(studio: Studio, units: Sequence[Unit], clocks: Clocks) -> Estimates:
@@ -141,12 +164,14 @@ def _estimates(studio: Studio, units: Sequence[Unit], clocks: Clocks) -> Estimat
     from motionmind.variation.seams import TransitionTest
 
     if len(units) > _MAX_ESTIMATED_UNITS:
-        raise MotionMindError(
-            f"insertions can be limited in up to {_MAX_ESTIMATED_UNITS} postures, not {len(units):,}: vary a part"
-        )
-    test = TransitionTest(studio.engine(studio.project.state.corpus))
+        raise MotionMindError(f"the piece has {len(units):,} postures, more than {_MAX_ESTIMATED_UNITS}")
+    engine = studio.engine(studio.project.state.corpus)
     keys = ["~" * unit.mirrored + unit.source for unit in units]
     motions = [studio.project.movements.get(key) for key in keys]
+    asked = [id(engine), *map(id, motions), *units]
+    if (latest := _latest.get(studio)) and latest.asked == asked:
+        return latest.estimates
+    test = TransitionTest(engine)
     for motion in motions:
         test.check_skeleton(motion.posture(0))
     firsts = [unit.first for unit in units]
@@ -161,7 +186,9 @@ def _estimates(studio: Studio, units: Sequence[Unit], clocks: Clocks) -> Estimat
         np.stack([motion.root[first] for motion, first in zip(motions, firsts, strict=True)]),
         np.append(0.0, np.cumsum(durations[:-1])),
     )
-    return Estimates(estimate_insertions(Piece(postures, np.arange(len(units))), test), durations)
+    estimates = Estimates(estimate_insertions(Piece(postures, np.arange(len(units))), test), durations)
+    _latest[studio] = _Estimated(asked, (engine, *motions), estimates)
+    return estimates
 
 
 def _shown(

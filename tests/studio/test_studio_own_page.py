@@ -332,4 +332,4 @@ def test_a_recording_leaves_questions(served: Served, open_page: Open, shared_da
     card.get_by_test_id("put").click()
     until(page, "studio.store.state.piece.blocks[0]?.frames === 886")
     page.get_by_test_id("open-vary").click()
-    page.get_by_test_id("tile-3").wait_for()  # at five postures a second
+    page.get_by_test_id("tile-2").wait_for()  # at five postures a second

@@ -59,6 +59,17 @@ def test_a_variation_becomes_the_piece_and_is_taken_back(served: Served) -> None
     assert served.post("/api/undo", {"window": "w1"})["piece"]["blocks"] == piece["blocks"]
 
 
+def test_insertions_are_limited_where_they_can_be_estimated(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    wish = {"depart": 0.2, "stretch": 4}
+    free, limited = (served.post("/api/vary", wish | {"inserted": share}) for share in (None, 0.3))
+    assert 0.0 < limited["departs"] < free["departs"]
+    assert (free["unlimited"], limited["unlimited"]) == ("", "")
+    monkeypatch.setattr("motionmind.studio.varied._MAX_ESTIMATED_UNITS", 60)
+    found = served.post("/api/vary", wish | {"inserted": 0.3})
+    assert found["unlimited"] == "Insertions are not limited: the piece has 67 postures, more than 60."
+    assert found["departs"] == free["departs"]
+
+
 def test_an_order_is_taken_only_by_the_piece_that_it_was_proposed_for(served: Served) -> None:
     found = served.post("/api/vary", {"depart": 0.2})
     blocks = [

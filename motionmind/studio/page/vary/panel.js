@@ -16,7 +16,7 @@ const EDIT_DELAY_MS = 150; // from an edit of the piece to its new variation
 const MAX_RETRIES = 5; // if another window edits the piece meanwhile
 const INSERTED = [
   [0.5, "half the time"],
-  [0.33, "a third"],
+  [0.3, "three tenths"],
   [0.2, "a fifth"],
   [0.1, "a tenth"],
 ];
@@ -93,6 +93,7 @@ export function Panel({ studio }) {
         ${INSERTED.map(([share, words]) => html`<option value=${share}>${words}</option>`)}
       </select>
     </label>
+    ${proposal?.unlimited && html`<p class="hint" role="status" data-testid="unlimited">${proposal.unlimited}</p>`}
     <div class="row">
       <button class="button primary" data-testid="vary" disabled=${!proposal || isPiece} title="Make this order the piece" onClick=${vary}>Vary</button>
       <button class="button" data-testid="another" disabled=${!proposal} title="Start elsewhere on the attractor" onClick=${() => varying.another()}>Another</button>

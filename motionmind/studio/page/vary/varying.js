@@ -21,11 +21,12 @@ import { points } from "./chart.js";
  * @property {number[]} jumps postures of the variation that do not follow
  * @property {object} about the edit's description of it
  * @property {string} basis hash of the piece that it varies
+ * @property {string} unlimited why insertions could not be limited as wished; "" if they could
  */
 
-/** The first wish. @returns {Wish} */
+/** The first wish: the defaults of `motionmind vary`. @returns {Wish} */
 function firstWish() {
-  return { flow: "lorenz", depart: 0.2, nudge: null, start: null, stretch: 2, inserted: null, kept: [], stay: [] };
+  return { flow: "lorenz", depart: 0.12, nudge: null, start: null, stretch: 4, inserted: 0.3, kept: [], stay: [] };
 }
 
 /** Fires "change" when the wish or the proposal has changed. */
