@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -374,3 +375,122 @@ def exported(motion: Motion, rig: str, zero: Mapping[str, Floats]) -> Motion:
             tips[i] = rot.mul_vec(alignment[body.index(joint)], body.tips[body.index(joint)])
     skeleton = Skeleton("file", tuple(names), tuple(parents), offsets, tips)
     return Motion(skeleton, skeleton.local_rotations(turns), motion.root, motion.times)
+
+
+# What each rig calls human23's joints; {0} is "left", {1} "Left", {2} "l", {3} "L".
+SIDED = {
+    "CMU, BVH": "UpLeg Leg Foot ToeBase Shoulder Arm ForeArm Hand HandIndex1",
+    "Mixamo": "UpLeg Leg Foot ToeBase Shoulder Arm ForeArm Hand HandMiddle1",
+    "CMU, ASF": "femur tibia foot toes clavicle humerus radius hand fingers",
+    "Biovision": "Hip Knee Ankle Toe Collar Shoulder Elbow Wrist -",
+    "Poser": "Thigh Shin Foot Toe Collar Shldr ForeArm Hand Mid1",
+    "Bandai-Namco": "UpperLeg LowerLeg Foot Toes Shoulder UpperArm LowerArm Hand -",
+}
+CENTRE = {
+    "CMU, BVH": "Hips Spine Spine1 Neck1 Head",
+    "Mixamo": "mixamorig:Hips mixamorig:Spine mixamorig:Spine1 mixamorig:Neck mixamorig:Head",
+    "CMU, ASF": "root upperback thorax upperneck head",
+    "Biovision": "Hips Chest Chest2 Neck Head",
+    "Poser": "hip abdomen chest neck head",
+    "Bandai-Namco": "Hips Spine Chest Neck Head",
+}
+PATTERN = {
+    "CMU, BVH": "{1}{j}",
+    "Mixamo": "mixamorig:{1}{j}",
+    "CMU, ASF": "{2}{j}",
+    "Biovision": "{1}{j}",
+    "Poser": "{2}{j}",
+    "Bandai-Namco": "{j}_{3}",
+}
+LIMB_JOINTS = ("hip", "knee", "ankle", "toes", "clavicle", "shoulder", "elbow", "wrist", "fingers")
+
+
+def rig_names(rig: str) -> dict[str, str]:
+    """human23's joint -> the rig's name for it; without those it lacks."""
+    names = dict(zip(("pelvis", "lumbar", "thorax", "cervical", "atlantal"), CENTRE[rig].split(), strict=True))
+    for side, _ in SIDES:
+        for joint, word in zip(LIMB_JOINTS, SIDED[rig].split(), strict=True):
+            if word != "-":
+                names[f"{side}_{joint}"] = PATTERN[rig].format(side, side.title(), side[0], side[0].upper(), j=word)
+    return names
+
+
+def disguise(
+    motion: Motion,
+    names: Mapping[str, str],
+    zero: Mapping[str, Floats],
+    frames: Mapping[str, Floats] | None = None,
+    world: Floats = rot.IDENTITY,
+) -> Motion:
+    """The movement on a skeleton with other names, zero pose, axes and vertical.
+
+    `zero` are human23's local rotations in the file's zero pose; `frames` where human23's axes lie in the joints'
+    own frames, where that is not given by `zero`. Joints of human23 without a name must be leaves.
+    """
+    body = motion.skeleton
+    local = np.array([zero.get(name, rot.IDENTITY) for name in body.names])
+    alignment = rot.mul(world, body.global_rotations(local))
+    for name, frame in (frames or {}).items():
+        alignment[body.index(name)] = frame
+    turned = rot.mul_inv(rot.mul(world, body.global_rotations(motion.rotations)), alignment)
+    kept = [i for i, name in enumerate(body.names) if name in names]
+    skeleton = Skeleton(
+        "file",
+        tuple(names[body.names[i]] for i in kept),
+        tuple(kept.index(body.parents[i]) if i else -1 for i in kept),
+        np.array([rot.mul_vec(alignment[body.parents[i]], body.offsets[i]) if i else np.zeros(3) for i in kept]),
+        np.array([rot.mul_vec(alignment[i], body.tips[i]) for i in kept]),
+    )
+    rotations = skeleton.local_rotations(turned[:, kept])
+    plan = tuple(insertion.renamed(names) for insertion in motion.insertions)
+    return Motion(skeleton, rotations, rot.mul_vec(world, motion.root), motion.times, "x", plan)
+
+
+@cache
+def stroll(bends: float = 1.0, frames: int = 120) -> Motion:
+    """A body that steps on the spot: knees, elbows and toes bend as hinges do, all else sways; without toes' tips down.
+
+    `bends` is the share of the hinges' usual bends.
+    """
+    rng = np.random.default_rng(7)
+    phase = np.linspace(0.0, 8.0 * np.pi, frames)
+    sway = 0.1 * np.sin(
+        phase[:, None, None] * rng.uniform(0.5, 2.0, (len(BODY), 3)) + rng.uniform(0, 6, (len(BODY), 3))
+    )
+    angles = dict(zip(BODY.names, np.moveaxis(sway, 1, 0), strict=True))
+    for side, sign in SIDES:
+        lift = bends * np.maximum(0.0, sign * np.sin(phase))
+        angles[f"{side}_hip"] = angles[f"{side}_hip"] * [1.0, 0.5, 0.5] - np.outer(0.7 * lift, [1.0, 0.0, 0.0])
+        angles[f"{side}_knee"] = np.outer(0.05 * bends + 1.2 * lift, [1.0, 0.0, 0.0])
+        angles[f"{side}_ankle"] = np.outer(-0.5 * lift, [1.0, 0.0, 0.0])
+        angles[f"{side}_toes"] = np.outer(-0.3 * lift, [1.0, 0.0, 0.0])
+        angles[f"{side}_shoulder"] = angles[f"{side}_shoulder"] + [0.0, 0.0, -sign * 1.2]
+        angles[f"{side}_elbow"] = np.outer(-sign * (0.3 * bends + 0.5 * lift), [0.0, 1.0, 0.0])
+    turns = rot.exp(np.stack([angles[name] for name in BODY.names], axis=1))
+    low = BODY.positions_and_tips(turns, np.zeros((frames, 3)))[..., 1].min(axis=1)
+    return Motion(BODY, turns, np.stack([0.0 * low, -low, 0.0 * low], axis=1), np.arange(frames) / 30.0)
+
+
+def along_bones(axis: str, roll: float, world: tuple[str, ...] = ()) -> dict[str, Floats]:
+    """Where human23's axes lie in joints whose own axis is along their bones, turned about them by `roll` degrees."""
+    first = {BODY.names[parent]: child for child, parent in reversed([*enumerate(BODY.parents)]) if parent >= 0}
+    first |= {"pelvis": BODY.index("lumbar"), "thorax": BODY.index("cervical")}
+    sign = -1.0 if axis[0] == "-" else 1.0
+    along = sign * np.eye(3)["xyz".index(axis[-1])]
+    out = {}
+    for i, name in enumerate(BODY.names):
+        bone = BODY.offsets[first[name]] if name in first else BODY.tips[i]
+        out[name] = rot.mul(rot.from_axis_angle(along, np.radians(roll)), rot.between(bone, along))
+    return out | dict.fromkeys(world, rot.IDENTITY)
+
+
+def lacking(rig: str) -> tuple[str, ...]:
+    """The joints of human23, without their side, that a program's rig lacks."""
+    return tuple({name.split("_")[-1] for name in BODY.names} - {joint.split("_")[-1] for _, _, joint in export(rig)})
+
+
+def with_still(motion: Motion, joints: tuple[str, ...]) -> Motion:
+    """The movement with some joints at rest, given without their side."""
+    rotations = motion.rotations.copy()
+    rotations[:, [i for i, name in enumerate(motion.skeleton.names) if name.endswith(joints or ("-",))]] = rot.IDENTITY
+    return replace(motion, rotations=rotations)
