@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -178,6 +180,73 @@ def test_a_motion_shorter_than_a_step_keeps_its_first_posture() -> None:
 def test_a_rate_that_is_none_is_refused(rate: float, frames: int) -> None:
     with pytest.raises(MotionMindError, match="a rate must be a positive number of postures a second"):
         some_motion(frames).resample(rate)
+    with pytest.raises(MotionMindError, match="a rate must be a positive number of postures a second"):
+        some_motion(frames).stretch_to(rate)
+
+
+# --- stretching -------------------------------------------------------------------------------------------------------
+
+RATES = st.one_of(st.floats(0.5, 500.0), st.sampled_from([23.976, 24.0, 29.97, 30.0, 60.0]))
+
+
+@given(RATES, st.integers(2, 40), st.floats(1.0, 240.0), st.floats(-50.0, 50.0), st.integers(0, 9))
+def test_stretched_motion_has_both_ends_and_even_frames(
+    rate: float, frames: int, own: float, start: float, seed: int
+) -> None:
+    motion = some_motion(frames, own, seed, start)
+    found = motion.stretch_to(rate)
+    span = float(motion.times[-1] - motion.times[0])
+    assert found.times[0] == motion.times[0]
+    np.testing.assert_allclose(found.times - start, np.arange(len(found)) / rate, atol=1e-9)
+    lasts = (len(found) - 1) / rate
+    assert len(found) == 2 if span * rate < 0.5 else abs(lasts - span) <= 0.5 / rate + 1e-9
+    for frame in (0, -1):
+        assert rot.angle(found.rotations[frame], motion.rotations[frame]).max() < 1e-9
+        np.testing.assert_allclose(found.root[frame], motion.root[frame], atol=1e-9)
+    assert (found.name, found.skeleton) == (motion.name, motion.skeleton)
+
+
+@given(RATES, st.integers(2, 40), st.integers(0, 9))
+def test_stretched_motion_passes_the_same_postures_at_the_same_share_of_its_time(
+    rate: float, frames: int, seed: int
+) -> None:
+    motion = some_motion(frames, 30.0, seed, start=3.0)
+    found = motion.stretch_to(rate)
+    at = motion.at(np.linspace(motion.times[0], motion.times[-1], len(found)))
+    assert rot.angle(found.rotations, at.rotations).max() < 1e-9
+    np.testing.assert_allclose(found.root, at.root, atol=1e-9)
+
+
+@given(st.integers(2, 40), RATES)
+def test_motion_of_whole_steps_is_not_stretched(frames: int, rate: float) -> None:
+    motion = some_motion(frames, rate)
+    found = motion.stretch_to(rate)
+    np.testing.assert_allclose(found.times, motion.times, atol=1e-9)
+    assert rot.angle(found.rotations, motion.rotations).max() < 1e-9
+    again = found.stretch_to(rate)
+    np.testing.assert_allclose(again.root, found.root, atol=1e-9)
+
+
+@given(RATES, st.integers(4, 40))
+def test_insertions_stretch_with_their_motion(rate: float, frames: int) -> None:
+    plain = some_motion(frames, 30.0, start=2.0)
+    motion = replace(plain, insertions=(Insertion(plain.times[[1, 2, -1]], (("elbow", 1),)),))
+    found = motion.stretch_to(rate)
+    (one,) = found.insertions
+    shares = [(each.insertions[0].times - each.times[0]) / np.ptp(each.times) for each in (motion, found)]
+    np.testing.assert_allclose(*shares, atol=1e-9)
+    assert one.bridged == (("elbow", 1),)
+
+
+@given(st.integers(2, 6), st.integers(1, 4))
+def test_stretched_keyframes_are_keyframes_no_more(frames: int, every: int) -> None:
+    motion = replace(some_motion(frames), keyframed=True)
+    assert not motion.stretch_to(30.0 / every).keyframed
+
+
+def test_one_frame_is_not_stretched() -> None:
+    motion = some_motion(1)
+    assert motion.stretch_to(24.0) is motion
 
 
 # --- the door ---------------------------------------------------------------------------------------------------------
