@@ -10,10 +10,12 @@ import numpy as np
 
 from motionmind.body.motion import Motion
 from motionmind.files import FilePath
+from motionmind.geometry import rotations as rot
 from motionmind.retarget.armature import Armature, Pose
 
 # Lengths of bones differ by less in takes of one person, where joints move a little against their parents.
 _SAME_BONE_M = 5e-3
+_SAME_AXES_RAD = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +46,17 @@ class RigFile(ABC):
         """
 
     def is_like(self, other: RigFile) -> bool:
-        """Return whether another file has the same bones, of the same lengths."""
+        """Return whether another file has the same bones, of the same lengths and axes."""
         if (self.suffix, self.names, self.armature.parents) != (other.suffix, other.names, other.armature.parents):
             return False
-        ours, theirs = (one.armature.motion.skeleton for one in (self, other))
-        return ours.names == theirs.names and bool(np.all(np.abs(ours.offsets - theirs.offsets) < _SAME_BONE_M))
+        ours, theirs = self.armature, other.armature
+        ours_body, theirs_body = ours.motion.skeleton, theirs.motion.skeleton
+        return (
+            ours_body.names == theirs_body.names
+            and bool(np.all(np.abs(ours_body.offsets - theirs_body.offsets) < _SAME_BONE_M))
+            and bool(np.all(rot.angle(ours.rest, theirs.rest) < _SAME_AXES_RAD))
+            and np.allclose(ours.scales, theirs.scales, rtol=1e-3)
+        )
 
     def with_ends_of(self, start: RigFile | None, end: RigFile | None) -> Self:
         """Return this rig with the first pose of one file and the last of another, as far as they have its bones."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
-from motionmind.errors import MotionMindError
+from motionmind.errors import FormatError
 from motionmind.files import FilePath, name_of, write_atomically
 from motionmind.formats._bvh_file import assemble, read_file
 from motionmind.formats._bvh_hierarchy import BvhJoint
@@ -19,6 +19,8 @@ from motionmind.formats.bvh import frame_lines
 from motionmind.formats.units import guess_unit, metres_per_unit
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.armature import Armature, Pose
+
+_LOCKED_COS = 1e-9  # of the middle angle, as in `to_euler`
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,34 +43,43 @@ class BvhRigFile(RigFile):
     def with_ends_of(self, start: RigFile | None, end: RigFile | None) -> Self:
         """Return this rig with the first pose of one file and the last of another."""
         rig = super().with_ends_of(start, end)
-        known = isinstance(start, BvhRigFile) and rig.armature.is_known[0]
-        return replace(rig, first=start.first) if known and isinstance(start, BvhRigFile) else rig
+        if not (isinstance(start, BvhRigFile) and rig.armature.is_known[0]):
+            return rig
+        channels, theirs = ([joint.channels for joint in one.bvh_joints] for one in (self, start))
+        return replace(rig, first=start.first) if channels == theirs else rig
 
     def write(self, path: FilePath, pose: Pose, motion: Motion) -> None:
         """Write the rig in another pose: rotations agree to 1e-6 rad and positions to 1e-8 m.
 
-        Angles continue from those in the file's frame, without jumps.
+        Angles continue from those in the file's frame, without jumps. Joints with fewer than three rotation channels
+        come as near as these let them; the joints below keep their orientations.
 
         Raises:
-            MotionMindError: the times are not even, a joint has rotation channels about one axis twice, or the file
-                cannot be written.
+            MotionMindError: the times are not even, or the file cannot be written.
         """
         scale = 1.0 / self.unit
+        wanted, _, _ = self.armature.global_frames(pose)
+        held = wanted.copy()
         columns: list[Floats] = []
         is_angle: list[bool] = []
         for joint, one in enumerate(self.bvh_joints):
-            angles = iter(self._angles(joint, len(columns), pose.rotations[:, joint]).T)
+            above = held[:, one.parent] if one.parent >= 0 else np.tile(rot.IDENTITY, (len(motion), 1))
+            order = _order(one)
+            angles = self._angles(joint, len(columns), rot.inv_mul(above, wanted[:, joint]))
+            if len(order) < 3:
+                held[:, joint] = rot.mul(above, rot.from_euler(order, angles)) if order else above
+            turns = iter(np.degrees(angles).T)
             place = pose.translations[:, joint] * scale
             if self.adds and joint:
                 place = place - np.array(one.offset)
             for channel in one.channels:
                 is_angle.append(channel.endswith("ROTATION"))
-                columns.append(next(angles) if is_angle[-1] else place[:, "XYZ".index(channel[0])])
+                columns.append(next(turns) if is_angle[-1] else place[:, "XYZ".index(channel[0])])
         lines = [*self.hierarchy, "MOTION", *frame_lines(motion, np.stack(columns, axis=1), np.array(is_angle), scale)]
         write_atomically(path, ("\n".join(lines) + "\n").encode())
 
     def _angles(self, joint: int, column: int, turns: Floats) -> Floats:
-        """Return the values of a joint's rotation channels [T, channels], degrees.
+        """Return the values of a joint's rotation channels [T, channels], radians.
 
         Args:
             joint: the joint.
@@ -77,28 +88,41 @@ class BvhRigFile(RigFile):
         """
         one = self.bvh_joints[joint]
         at = [column + i for i, channel in enumerate(one.channels) if channel.endswith("ROTATION")]
-        axes = "".join(one.channels[i - column][0] for i in at)
-        if len(set(axes)) < len(axes):
-            raise MotionMindError(f"{self.path}: {one.name} turns about one axis twice, which cannot be written")
-        order = axes + "".join(axis for axis in "XYZ" if axis not in axes)
+        order = _order(one)
         first = np.zeros(3)
         first[: len(at)] = np.radians(self.first[at])
-        return np.degrees(_continue_angles(rot.to_euler(order, turns), first))[:, : len(at)]
+        whole = order + "".join(axis for axis in "XYZ" if axis not in order)
+        return _continue_angles(rot.to_euler(whole, turns), first, whole)[:, : len(at)]
 
 
-def _continue_angles(angles: Floats, first: Floats) -> Floats:
+def _order(joint: BvhJoint) -> str:
+    """Return the axes of a joint's rotation channels, in their order."""
+    return "".join(channel[0] for channel in joint.channels if channel.endswith("ROTATION"))
+
+
+def _continue_angles(angles: Floats, first: Floats, order: str) -> Floats:
     """Return the same rotations by Euler angles [T, 3], each nearest to the one before; the first nearest to `first`.
 
     Two triples of angles within a turn give the same rotation: the second has the outer ones half a turn further, and
-    the middle one mirrored at a right angle.
+    the middle one mirrored at a right angle. At gimbal lock only the sum of the outer ones counts, or their difference.
     """
     other = np.stack([angles[:, 0] + np.pi, np.pi - angles[:, 1], angles[:, 2] + np.pi], axis=-1)
     both = np.stack([angles, other], axis=1)
+    sides = np.sign(angles[:, 1]) * (1.0 if order in "XYZXY" else -1.0)
+    locked = np.cos(angles[:, 1]) < _LOCKED_COS
     out = np.empty_like(angles)
     for frame, pair in enumerate(both):
-        near = pair - 2.0 * np.pi * np.round((pair - first) / (2.0 * np.pi))
+        if locked[frame]:
+            off = _nearest_turn(pair[0, 0] + sides[frame] * (pair[0, 2] - first[2]) - first[0])
+            pair[0, [0, 2]] = first[0] + 0.5 * off, first[2] + 0.5 * sides[frame] * off
+        near = first + _nearest_turn(pair - first)
         first = out[frame] = near[int(np.abs(near - first).sum(axis=-1).argmin())]
     return out
+
+
+def _nearest_turn(angles: Floats) -> Floats:
+    """Return angles plus whole turns, between half a turn back and half a turn on."""
+    return np.asarray(angles - 2.0 * np.pi * np.round(angles / (2.0 * np.pi)))
 
 
 def read_bvh_rig(
@@ -111,8 +135,15 @@ def read_bvh_rig(
         motion: its movement, as `read_bvh` returns it with the same unit.
         frames: those before and after the movement to come; None if they are not of this file.
         unit: as for `read_bvh`.
+
+    Raises:
+        FormatError: a joint has two rotation channels about one axis.
     """
     file = read_file(path)
+    for joint in file.joints:
+        if len(set(order := _order(joint))) < len(order):
+            fault = f"{joint.name} turns about one axis twice ({order}), which cannot be written: choose another --rig"
+            raise FormatError(fault, path=path, line=joint.line)
     placed, adds = resolve_places(assemble(file.joints, file.values, name_of(path)))
     scale = metres_per_unit(unit) if unit is not None else guess_unit(normalise(placed).skeleton)[1]
     first, last = frames or (0, 0)

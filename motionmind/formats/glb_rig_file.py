@@ -6,17 +6,17 @@ first, where viewers and importers look; the file's own follow it.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
-from copy import deepcopy
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
 
+import msgspec
 import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
 from motionmind.files import FilePath, name_of, write_atomically
+from motionmind.formats import _json
 from motionmind.formats._gltf import Gltf, read_chunks, read_container, to_trs
 from motionmind.formats._gltf_poses import PATH_TYPES, lineage
 from motionmind.formats._json import MARKS_KEY
@@ -25,26 +25,60 @@ from motionmind.formats.glb import GlbBuffer, add_clock, animation, container, c
 from motionmind.formats.gltf import GltfBody, find_body
 from motionmind.formats.units import metres_per_unit
 from motionmind.geometry import rotations as rot
-from motionmind.retarget.armature import Armature, Pose
+from motionmind.retarget.armature import Armature, Pose, ease
 
 _SINGLE_PRECISION_M, _SINGLE_PRECISION_RAD = 1e-6, 1e-6
-_IMAGE_TYPES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp"}
+_IMAGE_TYPES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp", b"\xabKTX": "image/ktx2"}
+
+
+class _Image(msgspec.Struct):
+    """A picture; its other members stay as they are."""
+
+    uri: str | None = None
+
+
+class _Pictures(msgspec.Struct):
+    """The pictures of a file."""
+
+    images: list[_Image] = []
 
 
 @dataclass(frozen=True, eq=False)
 class GlbRigFile(RigFile):
     """The rig of a glTF file.
 
+    The bones are the joints of the body, and the nodes above them.
+
     Attributes:
         gltf: the file.
         nodes: the node of each bone [N].
         body: the nodes that are joints of the body.
+        props: {node, path: values before and after the movement to come [2, 3 or 4]} of all else that the file's
+            animation moves, such as a sword, and of scales.
     """
 
     gltf: Gltf
     nodes: list[int]
     body: frozenset[int]
+    props: Mapping[tuple[int, str], Floats]
     suffix: ClassVar[str] = ".glb"
+
+    def with_ends_of(self, start: RigFile | None, end: RigFile | None) -> Self:
+        """Return this rig with the first pose of one file and the last of another; props need the same nodes."""
+        rig = super().with_ends_of(start, end)
+        first, last = (
+            one.props if known and isinstance(one, GlbRigFile) and self._has_nodes_of(one) else self.props
+            for one, known in zip((start, end), rig.armature.is_known, strict=True)
+        )
+        props = {
+            key: np.stack([first.get(key, values)[0], last.get(key, values)[1]]) for key, values in self.props.items()
+        }
+        return replace(rig, props=props)
+
+    def _has_nodes_of(self, other: GlbRigFile) -> bool:
+        """Return whether another file has the same nodes."""
+        ours, theirs = ([node.name for node in one.gltf.document.nodes] for one in (self, other))
+        return ours == theirs
 
     def write(self, path: FilePath, pose: Pose, motion: Motion) -> None:
         """Write the rig with a new animation; a pose of one frame becomes the nodes' own.
@@ -54,11 +88,12 @@ class GlbRigFile(RigFile):
                 cannot be read, or the file cannot be written.
         """
         text, _ = read_chunks(self.path)
-        document: dict[str, Any] = json.loads(text.decode("utf-8-sig"))
+        document: dict[str, Any] = _json.decode(text, dict, self.path)
+        _json.decode(text, _Pictures, self.path)  # refuses damaged ones
         name = motion.name or name_of(path)
         buffer = _take_buffers(self.gltf, document)
-        places = pose.translations / self.unit
-        channels = list(self._channels(Pose(pose.rotations, places)))
+        _take_pictures(self.gltf, document, buffer)
+        channels = [*self._channels(pose), *self._prop_channels(motion)]
         for node in {node for node, _, _ in channels}:
             _set_trs(document["nodes"][node], self.gltf, node)
         if len(motion) == 1:
@@ -71,20 +106,33 @@ class GlbRigFile(RigFile):
         top = document["nodes"][self.nodes[int(self.armature.joints[0])]]
         if isinstance(top.setdefault("extras", {}), dict):
             top["extras"][MARKS_KEY] = encode_marks(path, self.armature.motion_of(pose, motion))
-        document |= {"accessors": buffer.accessors, "bufferViews": buffer.views}
-        document["buffers"] = [{"byteLength": len(buffer.data)}, *document["buffers"][1:]]
+        if buffer.data:
+            document |= {"accessors": buffer.accessors, "bufferViews": buffer.views}
+            document["buffers"][0] = {"byteLength": len(buffer.data)}
+        else:
+            del document["buffers"]
         write_atomically(path, container(document, bytes(buffer.data), name))
 
     def _channels(self, pose: Pose) -> Iterator[tuple[int, str, Floats]]:
-        """Yield the node, the path and the values [T, 3 or 4] of all that turns or moves; of joints all turns."""
+        """Yield the node, the path and the values [T, 3 or 4] of bones that turn or move; of joints all turns."""
         for bone, node in enumerate(self.nodes):
             place, turn, _ = to_trs(self.gltf.document.nodes[node])
             turns = continuous(pose.rotations[:, [bone]])[:, 0]
             if node in self.body or np.any(rot.angle(turns, turn) > _SINGLE_PRECISION_RAD):
                 yield node, "rotation", turns
-            places = pose.translations[:, bone]
+            places = pose.translations[:, bone] / self.unit
             if np.any(np.abs(places - place) > _SINGLE_PRECISION_M / self.unit):
                 yield node, "translation", places
+
+    def _prop_channels(self, motion: Motion) -> Iterator[tuple[int, str, Floats]]:
+        """Yield the node, the path and the values [T, 3 or 4] of props that differ from their nodes."""
+        share = ease(motion.times)[:, None]
+        for (node, path), (first, last) in self.props.items():
+            turns = path == "rotation"
+            values = rot.slerp(first, last, share[:, 0]) if turns else first + share * (last - first)
+            still = dict(zip(PATH_TYPES, to_trs(self.gltf.document.nodes[node]), strict=True))[path]
+            if not np.allclose(values, still, rtol=0.0, atol=_SINGLE_PRECISION_M):
+                yield node, path, values
 
 
 def read_glb_rig(
@@ -101,23 +149,33 @@ def read_glb_rig(
     gltf = read_container(path)
     body = find_body(gltf)
     rows = gltf.document.nodes
-    nodes = lineage(body.parents, set(range(len(rows))))
+    nodes = lineage(body.parents, body.joints)
     number = {node: bone for bone, node in enumerate(nodes)}
     scale = 1.0 if unit is None else metres_per_unit(unit)
     known = [body.names.index(name) for name in motion.skeleton.names]
+    times = body.times[list(frames or (0, 0))]
+    props = {
+        (node, path): track.at(times)
+        for (node, path), track in body.tracks.items()
+        if (path == "scale" or node not in number) and not rows[node].matrix  # nothing may move a matrix (3.11)
+    }
     is_known = frames is not None
+    scales = [
+        body.tracks[node, "scale"].at(body.times[:1])[0] if (node, "scale") in props else to_trs(rows[node])[2]
+        for node in nodes
+    ]
     armature = Armature(
         motion,
-        tuple(number[body.parents[node]] if body.parents[node] >= 0 else -1 for node in nodes),
-        np.array([to_trs(rows[node])[2] for node in nodes]),
+        tuple(number.get(body.parents[node], -1) for node in nodes),
+        np.array(scales),
         np.ones(len(nodes), dtype=bool),
         np.array([number[body.joints[joint]] for joint in known]),
         body.rest_turns[known],
-        _pose_at(body, nodes, body.times[list(frames or (0, 0))], scale),
+        _pose_at(body, nodes, times, scale),
         (is_known, is_known),
     )
     names = tuple(rows[node].name for node in nodes)
-    return GlbRigFile(path, names, armature, scale, gltf, nodes, frozenset(body.joints))
+    return GlbRigFile(path, names, armature, scale, gltf, nodes, frozenset(body.joints), props)
 
 
 def _pose_at(body: GltfBody, nodes: list[int], times: Floats, scale: float) -> Pose:
@@ -138,7 +196,11 @@ def _set_trs(node: dict[str, Any], gltf: Gltf, index: int) -> None:
 
 
 def _take_buffers(gltf: Gltf, document: dict[str, Any]) -> GlbBuffer:
-    """Return one buffer with all that a file's buffers and pictures hold, beside it or in it; change the document."""
+    """Return one buffer with all that a file's buffers hold, beside it or in it; change the document.
+
+    Raises:
+        FormatError: a view is in no buffer, or a buffer cannot be read.
+    """
     data, starts = bytearray(), {}
     buffers = document.get("buffers", [])
     for index, one in enumerate(buffers):
@@ -147,19 +209,27 @@ def _take_buffers(gltf: Gltf, document: dict[str, Any]) -> GlbBuffer:
             starts[index] = len(data)
             data += gltf.buffer(index)
     kept = [index for index in range(len(buffers)) if index not in starts]
-    views = deepcopy(document.get("bufferViews", []))
+    views = document.get("bufferViews", [])
     for view in views:
         for one in (view, *view.get("extensions", {}).values()):
-            if (index := one.get("buffer")) is not None:
-                one["buffer"] = 0 if index in starts else 1 + kept.index(index)
-                one["byteOffset"] = one.get("byteOffset", 0) + starts.get(index, 0)
+            held, offset = (one.get("buffer"), one.get("byteOffset", 0)) if isinstance(one, dict) else (None, 0)
+            if isinstance(held, int) and isinstance(offset, int):
+                gltf.member(buffers, held, "buffer view: buffer")
+                one["buffer"] = 0 if held in starts else 1 + kept.index(held)
+                one["byteOffset"] = offset + starts.get(held, 0)
     document["buffers"] = [{}, *(buffers[index] for index in kept)]
-    buffer = GlbBuffer(bytes(data), views, document.get("accessors", []))
+    return GlbBuffer(bytes(data), views, document.get("accessors", []))
+
+
+def _take_pictures(gltf: Gltf, document: dict[str, Any], buffer: GlbBuffer) -> None:
+    """Append pictures that lie beside a file, or in its text, to its buffer; change the document."""
     for image in document.get("images", []):
-        if "uri" in image:
-            picture = gltf.fetch(image.pop("uri"))
-            image["mimeType"] = next((kind for magic, kind in _IMAGE_TYPES.items() if picture.startswith(magic)), "")
-            padded = picture + b"\0" * (-len(picture) % 4)
-            image["bufferView"] = buffer.view(np.frombuffer(padded, dtype=np.uint8))
-            buffer.views[-1]["byteLength"] = len(picture)
-    return buffer
+        if (uri := image.pop("uri", None)) is None:
+            continue
+        picture = gltf.fetch(uri)
+        kinds = (kind for magic, kind in _IMAGE_TYPES.items() if picture.startswith(magic))
+        if (kind := next(kinds, None)) is None and "mimeType" not in image:
+            raise gltf.fault(f"picture {uri[:40]!r} is neither PNG, JPEG, WebP nor KTX 2")
+        image["mimeType"] = kind or image["mimeType"]
+        image["bufferView"] = buffer.view(np.frombuffer(picture + b"\0" * (-len(picture) % 4), dtype=np.uint8))
+        buffer.views[-1]["byteLength"] = len(picture)

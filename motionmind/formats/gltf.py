@@ -86,9 +86,9 @@ class GltfBody:
         joints: the body's nodes [J], each after its parent.
         names: their names, no two alike.
         skin: name of the skin, "" for none.
-        tracks: the tracks of the nodes that move the body.
+        tracks: the tracks of all nodes that the animation of the body moves.
         others: names of the animations that are not read.
-        times: times of the frames [T], seconds.
+        times: times of the frames [T], seconds: the keys of the joints and of the nodes above them.
         rest_turns: orientations of the joints at rest, without the heading of the nodes above [J, 4].
         rest: their places at rest [J, 3].
     """
@@ -115,8 +115,8 @@ def find_body(gltf: Gltf) -> GltfBody:
     joints, skin_name = _find_joints(gltf, parents, names, skins, {node for node, path in tracks if path == "rotation"})
     for node, name in enumerate(gltf.document.nodes):
         names.setdefault(node, name.name or f"node {node}")
-    tracks = {key: track for key, track in tracks.items() if key[0] in set(lineage(parents, joints))}
-    times = _clock(tracks, len(joints), str(gltf.path))
+    movers = set(lineage(parents, joints))
+    times = _clock({key: track for key, track in tracks.items() if key[0] in movers}, len(joints), str(gltf.path))
     called = _distinct([names[node] for node in joints])
     rest_turns, rest = rest_pose(gltf, parents, joints, None if is_person else called)
     heading = heading_of(gltf, parents, joints[0])

@@ -67,6 +67,19 @@ def read_rig(
     return replace(rig, armature=replace(rig.armature, mapping=joints, up=up))
 
 
+def retarget_to_rig(motion: Motion, rig: RigFile) -> Motion:
+    """Return a motion on the joints of a rig.
+
+    Args:
+        motion: the motion, on the rig's own joints, or on a body that maps to human23.
+        rig: the rig.
+
+    Raises:
+        SkeletonError: the rig's or the motion's joints do not map to human23.
+    """
+    return rig.armature.motion_of(animate(rig.armature, motion), motion)
+
+
 def write_on_rig(path: FilePath, motion: Motion, rig: RigFile) -> Motion:
     """Write a motion on the rig of a file; return it on the rig's joints.
 
@@ -75,21 +88,21 @@ def write_on_rig(path: FilePath, motion: Motion, rig: RigFile) -> Motion:
 
     Args:
         path: the file to write, .bvh or .glb.
-        motion: the motion, on human23, or on the rig's own joints.
+        motion: the motion, on the rig's own joints, or on a body that maps to human23.
         rig: the rig.
 
     Raises:
-        SkeletonError: the rig's joints do not map to human23.
+        SkeletonError: the rig's or the motion's joints do not map to human23.
         MotionMindError: the file is neither BVH nor GLB, cannot hold the motion, or cannot be written.
     """
     if Path(path).suffix.lower() not in (".bvh", ".glb"):
         raise MotionMindError(f"{path}: only .bvh and .glb are written on a rig")
-    pose = animate(rig.armature, motion)
-    on_rig = rig.armature.motion_of(pose, motion)
     if Path(path).suffix.lower() != rig.suffix:
+        on_rig = retarget_to_rig(motion, rig)
         write_motion(path, on_rig)
         return on_rig
+    pose = animate(rig.armature, motion)
     rig.write(path, pose, motion)
     if rig.suffix == ".bvh":
         note_settings(path, motion, rig.unit)
-    return on_rig
+    return rig.armature.motion_of(pose, motion)

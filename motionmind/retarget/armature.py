@@ -20,7 +20,7 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.joint_mapping import is_human44, joint_mapping
-from motionmind.retarget.retarget import fit_upright, rests_along_z, to_y_up_world
+from motionmind.retarget.retarget import fit_upright, rests_along_z, to_human23, to_y_up_world
 from motionmind.retarget.vertical import Z_UP_TO_Y_UP
 
 
@@ -125,16 +125,18 @@ def animate(armature: Armature, motion: Motion) -> Pose:
 
     Args:
         armature: the bones.
-        motion: the motion, y up: on human23, or on the skeleton of the armature's own motion.
+        motion: the motion, y up: on the skeleton of the armature's own motion, or on one that maps to human23.
 
     Returns:
         The pose of the bones in each frame of the motion.
 
     Raises:
-        SkeletonError: the rig does not map to human23, or its zero pose does not show how the body stands.
+        SkeletonError: the rig or the motion does not map to human23, or a zero pose does not show how the body stands.
     """
+    if not _is_own(armature, motion.skeleton):
+        motion = to_human23(motion, up="y")
     binding = _bind(armature, motion.skeleton)
-    share = _ease(motion.times)
+    share = ease(motion.times)
     ends_turned, _, sizes = armature.global_frames(armature.ends)
     turned = _turn_bones(armature, binding, motion, ends_turned, share)
     above = [max(parent, 0) for parent in armature.parents]
@@ -143,10 +145,17 @@ def animate(armature: Armature, motion: Motion) -> Pose:
     rotations[:, roots] = turned[:, roots]
     first, last = armature.ends.translations
     pose = Pose(rot.normalise(rotations), first + share[:, None, None] * (last - first))
-    root = motion.root if any(armature.is_known) else _scale_root(motion, binding.body)
-    pelvis = rot.mul_vec(rot.inv(binding.upright), root)
+    pelvis = rot.mul_vec(rot.inv(binding.upright), _scale_root(motion, binding.body))
     _move_pelvis(armature, pose, turned, sizes, int(armature.joints[binding.pelvis]), pelvis, share)
     return pose
+
+
+def ease(times: Floats) -> Floats:
+    """Return the share [T] of the movement's end in each frame: 0 to 1, level at both ends."""
+    if len(times) == 1:
+        return np.zeros(1)
+    share = (times - times[0]) / (times[-1] - times[0])
+    return np.asarray(share * share * (3.0 - 2.0 * share))
 
 
 def from_human23(motion: Motion, like: Posture, joints: Mapping[str, str] | None = None) -> Motion:
@@ -189,10 +198,15 @@ def _rig_names(rig: Skeleton, body: Skeleton, joints: Mapping[str, str] | None) 
     return {mapping[name]: name for name in reversed(rig.names) if name in mapping}
 
 
+def _is_own(armature: Armature, body: Skeleton) -> bool:
+    """Return whether a body has the joints of an armature's own motion, by which it is then moved."""
+    return armature.mapping is None and body.difference(armature.motion.skeleton) is None
+
+
 def _bind(armature: Armature, body: Skeleton) -> _Binding:
     """Bind the joints of a body to those of a file's skeleton."""
     skeleton, joints, up = armature.motion.skeleton, armature.mapping, armature.up
-    is_same = joints is None and body.difference(skeleton) is None
+    is_same = _is_own(armature, body)
     lies = is_same and (human23().difference(skeleton) is None or is_human44(skeleton)) and rests_along_z(skeleton)
     if is_same and not (lies and not is_human44(skeleton)):
         turn = Z_UP_TO_Y_UP if up == "z" or (lies and up is None) else rot.IDENTITY
@@ -227,14 +241,6 @@ def _leg_length(body: Skeleton) -> float:
     """Return the length of a person's legs, of all bones of another body, metres."""
     legs = [joint for joint, name in enumerate(body.names) if name.endswith(("_knee", "_ankle"))]
     return float(rot.norm(body.offsets[legs or slice(None)]).sum())
-
-
-def _ease(times: Floats) -> Floats:
-    """Return the share [T] of the movement's end in each frame: 0 to 1, level at both ends."""
-    if len(times) == 1:
-        return np.zeros(1)
-    share = (times - times[0]) / (times[-1] - times[0])
-    return np.asarray(share * share * (3.0 - 2.0 * share))
 
 
 def _turn_bones(armature: Armature, binding: _Binding, motion: Motion, ends_turned: Floats, share: Floats) -> Floats:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-import shutil
 import struct
-import subprocess
 import time
 from collections import Counter
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from gltf_files import validated
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -491,24 +490,9 @@ def test_tween(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.C
 
 # --- other people's programs ----------------------------------------------------------------------------------------
 
-VALIDATE = """
-const validator = require("gltf-validator"), fs = require("fs");
-validator.validateBytes(new Uint8Array(fs.readFileSync(process.argv[1]))).then(
-  (report) => console.log(JSON.stringify(report.issues)));
-"""
-
-
-@cache
-def _fails(*command: str) -> bool:
-    return subprocess.run(command, check=False, capture_output=True).returncode != 0
-
 
 @pytest.mark.parametrize("body", BODIES)
 @pytest.mark.parametrize("frames", [1, 5])
 def test_the_validator_finds_nothing(tmp_path: Path, body: str, frames: int) -> None:
-    node = shutil.which("node")
-    if node is None or _fails(node, "-e", 'require("gltf-validator")'):
-        pytest.skip("Khronos' gltf-validator is not here (install it for node, and set NODE_PATH)")
     written(tmp_path, wandering(BODIES[body], frames))
-    ran = subprocess.run([node, "-e", VALIDATE, str(tmp_path / "a.glb")], capture_output=True, text=True, check=True)
-    assert json.loads(ran.stdout)["messages"] == []
+    assert validated(tmp_path / "a.glb") == []
