@@ -137,6 +137,8 @@ def convert(
     suffix = output.suffix.lower()
     if out_unit and suffix != ".bvh":
         raise MotionMindError(f"--out-unit {out_unit}: only BVH needs a unit, and {output} is not BVH")
+    if out_unit and rig and rig.suffix.lower() == suffix:
+        raise MotionMindError(f"--out-unit {out_unit}: {output} gets the unit of {rig}")
     taker = check_delivery([output], program, rig)
     on = read_rig(rig) if rig else None
     motion = read_part(named, None, home, raw=True, **options)

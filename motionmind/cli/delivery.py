@@ -18,7 +18,7 @@ from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
-    from motionmind.body.motion import Motion
+    from motionmind.body.motion import Motion, Posture
     from motionmind.formats._rig_file import RigFile
     from motionmind.formats.programs import Program
     from motionmind.names.spelling import PostureName
@@ -59,19 +59,21 @@ class Delivery:
         """Write a motion, note what the file cannot hold of it and of `source`, and return the motion as written."""
         from motionmind.formats import lossy_fields, write_motion
         from motionmind.formats.programs import write_for
-        from motionmind.formats.rig_files import write_on_rig
+        from motionmind.formats.rig_files import retarget_to_rig, write_on_rig
 
         if not takes_delivery(path):
             write(path, motion, source)
             return motion
         motion = evened(path, motion.stretch_to(self.fps) if self.fps else motion)
         note_licences(path, motion)
-        if self.rig:
+        if self.rig and self.rig.suffix == path.suffix.lower():
             motion = write_on_rig(path, motion, self.rig)
-        elif self.program:
-            write_for(path, motion, self.program, unit=self.unit)
         else:
-            write_motion(path, motion, unit=self.unit or "cm")
+            motion = retarget_to_rig(motion, self.rig) if self.rig else motion
+            if self.program:
+                write_for(path, motion, self.program, unit=self.unit)
+            else:
+                write_motion(path, motion, unit=self.unit or "cm")
         note_lossy_fields(path, lossy_fields(motion, path, source))
         return motion
 
@@ -111,6 +113,7 @@ def check_delivery(outputs: Sequence[Path], program: str | None, rig: Path | Non
 def find_rig(
     rig: Path | None,
     ends: Sequence[PostureName],
+    a: Posture,
     *,
     joints: Path | None,
     unit: str | None,
@@ -122,12 +125,16 @@ def find_rig(
     Args:
         rig: the file of --rig; None without it.
         ends: the names of A and B.
+        a: the posture A.
         joints: the value of --joints.
         unit: the value of --unit.
         source_fps: the value of --source-fps.
         up: the value of --up.
+
+    Raises:
+        MotionMindError: the rig cannot be read or written on, or the body of A does not map to it.
     """
-    from motionmind.formats.rig_files import RIG_SUFFIXES, read_rig
+    from motionmind.formats.rig_files import RIG_SUFFIXES, read_rig, retarget_to_rig
     from motionmind.names.finding import frame_of
 
     mapping = read_mapping(joints)
@@ -145,6 +152,11 @@ def find_rig(
         return read_rig(path, (frame, frame), motion=motion, unit=unit, joints=mapping, up=up)
 
     first, last = map(find_end, ends)
-    if rig is None:
-        return first.with_ends_of(first, last) if first and last and first.is_like(last) else None
-    return read_rig(rig, motion=read_once(rig), unit=unit, joints=mapping, up=up).with_ends_of(first, last)
+    if rig is not None:
+        found = read_rig(rig, motion=read_once(rig), unit=unit, joints=mapping, up=up)
+    elif first and last and first.is_like(last):
+        found = first
+    else:
+        return None
+    retarget_to_rig(a.as_motion(), found)  # refuses other bodies before the search
+    return found.with_ends_of(first, last)

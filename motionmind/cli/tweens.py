@@ -134,7 +134,7 @@ def tween(
         end, request["after"] = read_end(named[1], "after", home, read)
         on = None
         if any(map(takes_delivery, outputs)):
-            on = find_rig(rig, named, joints=joints, unit=unit, source_fps=source_fps, up=up)
+            on = find_rig(rig, named, start, joints=joints, unit=unit, source_fps=source_fps, up=up)
         engine = Engine.load(corpus, home)
         with _diagnosing(files), Interruption() as interruption:
             results = _find_tweens(engine, (start, end), request, files.count, interruption)
