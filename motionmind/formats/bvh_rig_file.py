@@ -20,7 +20,7 @@ from motionmind.formats.units import guess_unit, metres_per_unit
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.armature import Armature, Pose
 
-_LOCKED_COS = 1e-9  # of the middle angle, as in `to_euler`
+_MIN_COS_UNLOCKED = 1e-9  # of the middle angle, as in `to_euler`
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +109,7 @@ def _continue_angles(angles: Floats, first: Floats, order: str) -> Floats:
     other = np.stack([angles[:, 0] + np.pi, np.pi - angles[:, 1], angles[:, 2] + np.pi], axis=-1)
     both = np.stack([angles, other], axis=1)
     sides = np.sign(angles[:, 1]) * (1.0 if order in "XYZXY" else -1.0)
-    locked = np.cos(angles[:, 1]) < _LOCKED_COS
+    locked = np.cos(angles[:, 1]) < _MIN_COS_UNLOCKED
     out = np.empty_like(angles)
     for frame, pair in enumerate(both):
         if locked[frame]:
