@@ -360,7 +360,7 @@ def test_a_stranger_from_a_file_is_mirrored(run: Run) -> None:
         ("corpus build mine walk.json --mix theirs:nan", "the weight of corpus 'theirs' must be from 1e-06"),
         ("corpus build mine walk.json --mix theirs --mix theirs:2", "--mix theirs:2: theirs is given twice"),
         ("corpus build mine walk.json --mix nobody:0.3", "no corpus 'nobody'; there are ballet, "),
-        ("corpus build theirs walk.json --mix theirs:0.3", "corpus 'theirs' cannot be mixed into itself"),
+        ("corpus build theirs walk.json --mix theirs:0.3 --replace", "corpus 'theirs' cannot be mixed into itself"),
         ("corpus build mine walk.json --mix theirs", "are of different rates .frame by frame, 5 postures a second"),
         ("corpus build mine walk.json --mix theirs --rate 10", "has 5 postures a second; 10 cannot be made of them"),
         (
