@@ -19,6 +19,8 @@ import numpy as np
 import pytest
 from bundled_clips import ballet_clip
 from command_line import Run
+from plain_bvh import write_plain
+from program_rigs import disguise, rig_names, spread
 
 from motionmind._typing import Floats
 from motionmind.body.human import human23, human44
@@ -232,3 +234,115 @@ def test_what_blender_exports_is_read(tmp_path: Path) -> None:
         np.testing.assert_allclose(found.root, motion.root, atol=1e-5)
         np.testing.assert_allclose(found.skeleton.tips, motion.skeleton.tips, atol=1e-4)
         assert np.array_equal(found.bridged(), motion.bridged()) == marks
+
+
+ANIMATE = """
+import json, math, random, sys
+import bpy
+import addon_utils
+from mathutils import Quaternion
+
+folder, bvh = sys.argv[1:]
+
+def skin(armature):
+    bpy.ops.mesh.primitive_cube_add(size=0.2, location=(0, 0, 1))
+    mesh = bpy.context.object
+    mesh.parent = armature
+    mesh.modifiers.new("armature", "ARMATURE").object = armature
+    for bone in armature.data.bones:
+        mesh.vertex_groups.new(name=bone.name).add(list(range(8)), 0.1, "REPLACE")
+
+def export(name, armature):
+    skin(armature)
+    bpy.ops.export_scene.gltf(filepath=f"{folder}/{name}.glb")
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.export_anim.bvh(filepath=f"{folder}/{name}.bvh", frame_start=0, frame_end=40, root_transform_only=True)
+
+def empty():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.scene.render.fps = RATE
+
+empty()
+addon_utils.enable("rigify")
+bpy.ops.object.armature_human_metarig_add()
+rig = bpy.context.object
+random.seed(1)
+for bone in rig.pose.bones:
+    axis = [random.uniform(-1, 1) for _ in range(3)]
+    bone.rotation_mode = "QUATERNION"
+    for frame in range(0, 41, 2):
+        bone.rotation_quaternion = Quaternion(axis, 0.35 * math.sin(0.15 * frame + len(bone.name)))
+        bone.keyframe_insert("rotation_quaternion", frame=frame)
+        if bone.parent is None:
+            bone.location = (0.01 * frame, 0.02 * math.sin(0.2 * frame), 0)
+            bone.keyframe_insert("location", frame=frame)
+export("rigify", rig)
+empty()
+bpy.ops.import_anim.bvh(filepath=bvh, global_scale=0.01, frame_start=0)
+export("mixamo", bpy.context.object)
+""".replace("RATE", str(RATE))
+
+COMPARE = """
+import json, math, sys
+import bpy
+
+def load(file):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.scene.render.fps = RATE
+    if file.endswith(".bvh"):
+        bpy.ops.import_anim.bvh(filepath=file)
+    else:
+        bpy.ops.import_scene.gltf(filepath=file)
+    (armature,) = [thing for thing in bpy.data.objects if thing.type == "ARMATURE"]
+    return armature, armature.animation_data.action.frame_range
+
+def pose(armature, frame):
+    bpy.context.scene.frame_set(round(frame))
+    bpy.context.view_layer.update()
+    return {bone.name: (armature.matrix_world @ bone.matrix).copy() for bone in armature.pose.bones}
+
+found = []
+for source, frames, result in json.loads(sys.argv[1]):
+    armature, (start, _) = load(source)
+    wanted = [pose(armature, start + frame) for frame in frames]
+    armature, ends = load(result)
+    meshes = [thing.name for thing in bpy.data.objects for one in thing.modifiers if one.type == "ARMATURE"]
+    degrees, metres, names = 0.0, 0.0, set()
+    for bones, end in zip(wanted, ends):
+        there = pose(armature, end)
+        names = {bones.keys() == there.keys(), *names}
+        for name, matrix in bones.items():
+            angle = matrix.to_quaternion().rotation_difference(there[name].to_quaternion()).angle
+            degrees = max(degrees, math.degrees(min(angle, 2 * math.pi - angle)))
+            metres = max(metres, (matrix.translation - there[name].translation).length)
+    found.append({"same": names == {True}, "degrees": degrees, "metres": metres, "ends": list(ends), "meshes": meshes})
+print("\\n" + json.dumps(found))
+""".replace("RATE", str(RATE))
+
+
+@pytest.mark.skipif(not PYTHON, reason="Blender's module bpy is not here (pip install bpy, or set BLENDER_PYTHON)")
+def test_rigs_that_blender_exports_come_back_with_both_ends_in_every_bone(tmp_path: Path, run: Run) -> None:
+    dance = disguise(ballet_clip("adagio").resample(RATE).slice(0, 60), rig_names("Mixamo"), spread())
+    write_plain(tmp_path / "dance.bvh", dance)
+    made = subprocess.run(
+        [str(PYTHON), "-c", ANIMATE, str(tmp_path), str(tmp_path / "dance.bvh")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert made.returncode == 0, made.stderr
+    jobs = []
+    for name in ("rigify.glb", "rigify.bvh", "mixamo.glb", "mixamo.bvh"):
+        out = f"out-{name}"
+        ends = (f"{name}@4", f"{name}@30")
+        ran = run("tween", *ends, "--corpus", "ballet", "--moves", "2..6", "--for", "blender", "-o", out)
+        assert ran.code == 0, ran.err
+        jobs.append((str(tmp_path / name), (4, 30), str(tmp_path / out)))
+    ran = subprocess.run([str(PYTHON), "-c", COMPARE, json.dumps(jobs)], capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr
+    for (file, _, _), shown in zip(jobs, json.loads(ran.stdout.splitlines()[-1]), strict=True):
+        assert shown["same"], file
+        assert shown["degrees"] < 0.01, (file, shown)
+        assert shown["metres"] < 1e-4, (file, shown)
+        np.testing.assert_allclose(shown["ends"], np.round(shown["ends"]), atol=1e-3)  # keys are on whole frames
+        assert bool(shown["meshes"]) == file.endswith("glb")
