@@ -52,14 +52,14 @@ class GlbRigFile(RigFile):
     Attributes:
         gltf: the file.
         nodes: the node of each bone [N].
-        body: the nodes that are joints of the body.
+        body_nodes: the nodes that are joints of the body.
         props: {node, path: values before and after the movement to come [2, 3 or 4]} of all else that the file's
             animation moves, such as a sword, and of scales.
     """
 
     gltf: Gltf
     nodes: list[int]
-    body: frozenset[int]
+    body_nodes: frozenset[int]
     props: Mapping[tuple[int, str], Floats]
     suffix: ClassVar[str] = ".glb"
 
@@ -118,7 +118,7 @@ class GlbRigFile(RigFile):
         for bone, node in enumerate(self.nodes):
             place, turn, _ = to_trs(self.gltf.document.nodes[node])
             turns = continuous(pose.rotations[:, [bone]])[:, 0]
-            if node in self.body or np.any(rot.angle(turns, turn) > _SINGLE_PRECISION_RAD):
+            if node in self.body_nodes or np.any(rot.angle(turns, turn) > _SINGLE_PRECISION_RAD):
                 yield node, "rotation", turns
             places = pose.translations[:, bone] / self.unit
             if np.any(np.abs(places - place) > _SINGLE_PRECISION_M / self.unit):
