@@ -52,14 +52,14 @@ def between(own: Motion) -> Motion:
 class Written:
     """A file, and movement between two of its frames that was written on its rig, beside it."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, unit: str | float | None = None) -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MotionMindWarning)
-            source = read_motion(path)
+            source = read_motion(path, unit=unit)
             self.motion = between(own_skeleton(source))
             self.out = path.with_name("out.glb")
-            write_on_rig(self.out, self.motion, read_rig(path, (A, B), motion=source))
-            self.back = own_skeleton(read_motion(self.out))
+            write_on_rig(self.out, self.motion, read_rig(path, (A, B), motion=source, unit=unit))
+            self.back = own_skeleton(read_motion(self.out, unit=unit))
         self.source, self.result = PlainGltf(path), PlainGltf(self.out)
 
     def check(self, *, starts: float = 0.0) -> None:
@@ -263,6 +263,11 @@ def test_characters_keep_all_that_they_have_and_both_ends(build: Callable[[File]
     written.check()
     assert len(written.result.json["animations"]) == 1 + len(written.source.json["animations"])
     assert written.result.json["animations"][0]["name"] == "between"
+
+
+def test_other_units_than_metres(file: File) -> None:
+    """As exports in centimetres without a node that says so."""
+    Written(file.write(), unit=0.5).check()
 
 
 def test_scales_that_are_animated(file: File) -> None:

@@ -84,6 +84,12 @@ class Tween:
         off = np.degrees(rot.angle(*since)).max(axis=0)
         assert off.max() < 1e-3, (np.array([*bones])[off >= 1e-3], off.max())
 
+    def check_path(self, hips: str, per_metre: float = 100.0, upright: Floats = rot.IDENTITY) -> None:
+        """Check that the hips are where the motion's root is, in every frame."""
+        _, places = self.result.world(range(FRAMES), adds=self.adds)
+        wanted = rot.mul_vec(rot.inv(upright), self.motion.root)
+        np.testing.assert_allclose(places[:, self.result.names.index(hips)] / per_metre, wanted, atol=1e-5)
+
     def check_rows(self, mapping: dict[str, str]) -> None:
         """Check that bones in a row for one joint, bent alike at A and B, turn as one."""
         turns, _ = self.result.world(range(FRAMES), adds=self.adds)
@@ -216,6 +222,7 @@ def test_z_up(tmp_path: Path) -> None:
     found = tween(write_plain(tmp_path / "in.bvh", z_up), (10, 77))
     found.check_ends()
     found.check_turns({name: joint for joint, name in MIXAMO.items()}, Z_UP_TO_Y_UP)
+    found.check_path(MIXAMO["pelvis"], upright=Z_UP_TO_Y_UP)
 
 
 # --- dialects of BVH ------------------------------------------------------------------------------------------------
@@ -274,6 +281,7 @@ def test_dialects(dialect: str, tmp_path: Path) -> None:
     found = tween(write_plain(tmp_path / "in.bvh", motion, **how), (10, 77))
     found.check_ends()
     found.check_turns({name: joint for joint, name in MIXAMO.items()})
+    found.check_path(MIXAMO["pelvis"], how.get("per_metre", 100.0))
 
 
 def test_positions_that_add_to_offsets(tmp_path: Path) -> None:
@@ -331,7 +339,7 @@ def test_gimbal_lock_keeps_the_file_s_angles(tmp_path: Path) -> None:
 @given(
     st.sampled_from(ORDERS),
     st.integers(0, 999),
-    st.lists(st.sampled_from([0.0, 1e-12, 1e-6, 0.3, 1.5, np.pi]), min_size=2, max_size=9),
+    st.lists(st.sampled_from([0.0, 1e-12, 1e-6, 0.3, 1.5, np.pi, -0.3, -1.2]), min_size=2, max_size=9),
     st.sampled_from([1.0, -1.0]),
 )
 def test_angles_continue_from_those_given(order: str, seed: int, off: list[float], side: float) -> None:
@@ -389,7 +397,13 @@ def test_joints_that_human23_lacks_stay_as_in_frame_0_if_the_ends_are_not_the_ri
 
 
 def test_joints_that_human23_lacks_leave_one_known_pose_for_none(tmp_path: Path) -> None:
+    """The first frame is the file's, whole turns of its angles included."""
     source = write_plain(tmp_path / "in.bvh", with_tail(STANDING))
+    rows = source.read_text("utf-8").split("\n")
+    at = rows.index("Frames: 120") + 2 + 50
+    values = rows[at].split()
+    rows[at] = " ".join([*values[:3], str(float(values[3]) + 360.0), *values[4:]])
+    source.write_text("\n".join(rows), "utf-8")
     rig = read_rig(source).with_ends_of(read_rig(source, (50, 50)), None)
     write_on_rig(tmp_path / "out.bvh", between(stepping(), 50, 30), rig)
     tail = local_turns(PlainBvh(tmp_path / "out.bvh"), "a tail")
