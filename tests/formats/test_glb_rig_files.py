@@ -273,7 +273,10 @@ def test_other_units_than_metres(file: File) -> None:
 def test_scales_that_are_animated(file: File) -> None:
     """Between the ends the body's size changes, which moves its joints but turns none."""
     with_scales_of_joints(file)
+    above = hang(file, "Armature", child=0)
+    track(file, above, "scale", np.full((len(DANCE), 3), 0.5))
     written = Written(file.write())
+    np.testing.assert_allclose(written.back.root, written.motion.root, atol=1e-5)
     for frame, seconds in ((A, 0.0), (B, float(written.motion.times[-1]))):
         assert furthest(written.source.world(frame / RATE), written.result.world(seconds)) < 1e-5
     turns = [one.skeleton.global_rotations(one.rotations) for one in (written.back, written.motion)]
@@ -409,10 +412,16 @@ def rig_of(tmp_path: Path, name: str, *builds: Callable[[File], None]) -> RigFil
     return read_rig(file.write(), (A, A))
 
 
+def under_a_node(file: File) -> None:
+    hang(file, "Armature", child=0)
+
+
 def test_a_mesh_or_a_prop_more_is_the_same_rig_but_other_axes_are_not(tmp_path: Path) -> None:
     one = rig_of(tmp_path, "one.glb")
     assert one.is_like(rig_of(tmp_path, "armed.glb", with_a_sword))
-    assert not one.is_like(rig_of(tmp_path, "small.glb", in_centimetres_under_a_small_node))
+    large = rig_of(tmp_path, "large.glb", under_a_node)
+    assert large.is_like(rig_of(tmp_path, "again.glb", under_a_node))
+    assert not large.is_like(rig_of(tmp_path, "small.glb", in_centimetres_under_a_small_node))
     other = File(tmp_path / "axes.glb", DANCE)
     reframed(renamed(other), seed=2)
     assert not one.is_like(read_rig(other.write(), (A, A)))

@@ -411,6 +411,20 @@ def test_joints_that_human23_lacks_leave_one_known_pose_for_none(tmp_path: Path)
     np.testing.assert_allclose(PlainBvh(tmp_path / "out.bvh").values[0], PlainBvh(source).values[50], atol=1e-5)
 
 
+def test_a_known_end_is_exact_wherever_the_movement_ends(tmp_path: Path) -> None:
+    source = write_plain(tmp_path / "in.bvh", with_tail(STANDING))
+    moves = between(stepping(), 50, 80)
+    moves = replace(moves, root=moves.root + np.array([0.3, 0.2, -0.1]))
+    for known, at in (((read_rig(source, (30, 30)), None), 0), ((None, read_rig(source, (30, 30))), -1)):
+        write_on_rig(tmp_path / "out.bvh", moves, read_rig(source).with_ends_of(*known))
+        (turns, places), (wanted_turns, wanted) = (
+            PlainBvh(tmp_path / "out.bvh").world([at]),
+            PlainBvh(source).world([30]),
+        )
+        assert degrees_between(turns, wanted_turns) < PRINTED_DEG
+        np.testing.assert_allclose(places, wanted, atol=1e-4)
+
+
 # --- ends in other files --------------------------------------------------------------------------------------------
 
 
