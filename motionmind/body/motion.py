@@ -310,8 +310,8 @@ class Motion:
         >>> import numpy as np
         >>> from motionmind import Motion, human23
         >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (2, 23, 1))
-        >>> Motion(human23(), at_rest, np.zeros((2, 3)), np.array([0.0, 2.7])).stretch_to(24.0).times[-1] * 24.0
-        65.0
+        >>> len(Motion(human23(), at_rest, np.zeros((2, 3)), np.array([0.0, 2.7])).stretch_to(24.0))
+        66
         """
         _check_rate(rate)
         if len(self) == 1:
