@@ -1,4 +1,4 @@
-"""The rig of a file, as a file of the same kind with other movement needs it."""
+"""The rig of a file: its bones, and what another file of its kind needs to hold other movement on them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SAME_AXES_RAD = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class RigFile(ABC):
-    """The bones of a file, and all else that a file of its kind with other movement keeps.
+    """The bones of a file, and what a new file of its kind repeats.
 
     Attributes:
         path: the file.

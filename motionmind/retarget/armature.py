@@ -1,10 +1,10 @@
 """Brings movement onto the bones of a file: the inverse of `motionmind.retarget.retarget`.
 
-A file has more bones than human23 has joints: twists, fingers, props, four vertebrae where human23 has two. Bones that
-human23 moves take its orientations, through the same alignments by which it took theirs. All others go with the bone
-above them, from their pose at the start of the movement to their pose at its end. Where the file's own postures at the
-ends are known, each bone is turned by what retargeting lost there, in shares that change smoothly from one end to the
-other, so that the ends are the file's, in every bone.
+A file may have more bones than human23 has joints: twists, fingers, props, four vertebrae where human23 has two. Bones
+with a counterpart take its orientation, through the alignments of `to_human23`. Other bones turn with the bone above,
+and blend from their pose at the start of the movement to their pose at its end. Where the file's own postures at the
+ends are known, each bone also turns by what retargeting lost there. This correction blends smoothly from one end to the
+other, so both ends are exact in every bone.
 """
 
 from __future__ import annotations
@@ -225,7 +225,7 @@ def _bind(armature: Armature, body: Skeleton) -> _Binding:
 def _scale_root(motion: Motion, body: Skeleton) -> Floats:
     """Return the root's places [T, 3], metres, for a body of other proportions.
 
-    The way is as much longer as its legs are, and its lowest points are on average at the height of the motion's.
+    Lengths scale with the legs; the median height of the lowest point scales, too.
     """
     lengths = [_leg_length(one) for one in (body, motion.skeleton)]
     size = lengths[0] / lengths[1] if lengths[1] > 0.0 else 1.0
@@ -298,20 +298,20 @@ def _move_pelvis(
         places: of the pelvis in the world [T, 3], metres.
         share: of the movement's end in each frame [T].
     """
-    mover, rise = pelvis, np.zeros_like(places)  # from the moving bone to the pelvis
-    while mover >= 0 and not armature.movable[mover]:
-        above = armature.parents[mover]
+    carrier, rise = pelvis, np.zeros_like(places)  # from the moving bone to the pelvis
+    while carrier >= 0 and not armature.movable[carrier]:
+        above = armature.parents[carrier]
         if above >= 0:
-            rise += rot.mul_vec(turned[:, above], sizes[above] * pose.translations[:, mover])
-        mover = above
-    if mover < 0:
+            rise += rot.mul_vec(turned[:, above], sizes[above] * pose.translations[:, carrier])
+        carrier = above
+    if carrier < 0:
         return
-    found, above = places - rise, armature.parents[mover]
+    found, above = places - rise, armature.parents[carrier]
     if above >= 0:
         _, base, _ = armature.global_frames(pose)
         found = rot.mul_vec(rot.inv(turned[:, above]), found - base[:, above]) / sizes[above]
     lost = [
-        given[mover] - found[end] if known else np.zeros(3)
+        given[carrier] - found[end] if known else np.zeros(3)
         for end, given, known in zip((0, -1), armature.ends.translations, armature.is_known, strict=True)
     ]
-    pose.translations[:, mover] = found + lost[0] + share[:, None] * (lost[1] - lost[0])
+    pose.translations[:, carrier] = found + lost[0] + share[:, None] * (lost[1] - lost[0])
