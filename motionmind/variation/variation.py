@@ -386,13 +386,13 @@ def vary(
     check_taken(by, trajectory | {"length": length, "inserted": inserted, "stretch": stretch})
     piece = piece if isinstance(piece, Piece) else Piece.of(piece)
     length = check_whole("length", len(piece) if length is None else length, 1, MAX_LENGTH)
-    if inserted is not None and engine is None:
-        raise MotionMindError("inserted needs a corpus, which makes the insertions")
     is_default = engine is not None and control is None and inserted is nudge is depart is None
     is_default &= max(len(piece), length) <= MAX_LIMITED_POSTURES
     if is_default:
         inserted = DEFAULT_INSERTED_SHARE
     limits = check_limits(inserted, stretch, len(piece), length)
+    if inserted is not None and engine is None:
+        raise MotionMindError("inserted needs a corpus, which makes the insertions")
     seconds = np.zeros((len(piece), len(piece)) if limits else (0, 0), dtype=np.float32)
     if engine is not None and limits is not None and limits.inserted is not None:
         seconds = estimate_insertions(piece, TransitionTest(engine, whole_body))
