@@ -119,9 +119,11 @@ class Interruption:
 
 def print_tween(result: Tween, files: Sequence[Path], *, with_details: bool = False) -> None:
     """Print the summary of a tween and the files written; with details, costs, states and distances from the corpus."""
-    from motionmind.tween.headline import headline
+    from motionmind.tween.headline import headline, reached_share
 
     click.echo(headline(result))
+    if reached_share(result) < 0.5:
+        note("the proof says little about a motion that leaves its path so far; a corpus nearer to A and B may help")
     _print_seen(result)
     for one in result.what_if:
         click.echo(f"without   {format_what_if(one)}")

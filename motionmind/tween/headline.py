@@ -46,13 +46,18 @@ def headline(tween: Tween) -> str:
     ...     print(sentence)
     5 moves, 2.0 s
     Path proven optimal, all from ballet
-    Motion follows 85% of the path; 97% of the motion's transitions occur in ballet
+    Motion reaches 85% of the path's joint states; 97% of the motion's transitions occur in ballet
     """
     if tween.moves == 0:
         return "no move: A and B are the same posture"
     length = f"{_count(tween.moves, 'move')}, {tween.motion.times[-1]:.1f} s"
-    share = tween.followed[1:-1].mean() if tween.moves > 1 else 1.0  # A and B themselves are exact
-    return f"{length}. {_proof(tween)}, {_origin(tween)}. Motion follows {share:.0%} of the path; {attestation(tween)}"
+    reached = f"Motion reaches {reached_share(tween):.0%} of the path's joint states"
+    return f"{length}. {_proof(tween)}, {_origin(tween)}. {reached}; {attestation(tween)}"
+
+
+def reached_share(tween: Tween) -> float:
+    """Return the share of joint states between A and B, which are exact, that the motion comes near; 1 for none."""
+    return float(tween.followed[1:-1].mean()) if tween.moves > 1 else 1.0
 
 
 def beyond(tween: Tween) -> list[str]:

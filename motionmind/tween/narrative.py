@@ -194,7 +194,7 @@ def _page(explanation: Explanation) -> Iterator[str]:
     proof = "optimal" if explanation.status == "optimal" else f"{explanation.status}, gap {explanation.gap:.1%}"
     line = f"{count} move{'s' * (count != 1)} in {explanation.seconds:.2f} s; path {proof}"
     if explanation.motion_attested is not None:
-        line += f"; motion follows {explanation.followed:.0%} of the path; "
+        line += f"; motion reaches {explanation.followed:.0%} of the path's joint states; "
         line += f"{explanation.motion_attested:.0%} of the motion's transitions attested"
     yield line
     most = max(1, min(_MAX_PARTS, _PAGE_ROWS // max(count, 1)))

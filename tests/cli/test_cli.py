@@ -79,7 +79,7 @@ def test_a_tween_is_summarised_in_a_line_and_a_missing_output_reported(run: Run)
     ran = run("tween", ARABESQUE, FIFTH, "--corpus", "ballet")
     summary, *rest = ran.out.splitlines()
     proof = r"Path proven optimal, all from ballet"
-    motion = r"Motion follows \d+% of the path; \d+% of the motion's transitions occur in ballet"
+    motion = r"Motion reaches \d+% of the path's joint states; \d+% of the motion's transitions occur in ballet"
     assert re.fullmatch(rf"7 moves, \d\.\d s\. {proof}\. {motion}", summary)
     assert rest == ["feet      the left foot stays in place", "written   nothing (-o FILE writes the result)"]
 

@@ -123,7 +123,7 @@ def test_the_command_line_prints_a_table_and_says_where_there_are_no_more(run: R
     printed = run(*asked, "--details").out.splitlines()
     lines = [line for line in printed if line.split()[0] not in ("feet", "warning")]
     assert [line.split()[0] for line in lines] == ["1", "2", "3", "moves", "1", "2", "3", "written"]
-    assert ". Path proven optimal, all from ballet. Motion follows " in lines[0]
+    assert ". Path proven optimal, all from ballet. Motion reaches " in lines[0]
     assert printed[1] == "    feet      the left foot stays in place"
     assert " among paths that differ this much" in lines[1]
     assert "; follows " not in lines[0]

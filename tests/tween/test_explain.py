@@ -212,7 +212,10 @@ def test_a_page_shows_what_turns_farthest_and_nothing_that_is_still(insects: Eng
     told = explain(between(insects, 12, 7, moves=moves))
     first, *lines = str(told).splitlines()
     assert first.startswith(f"{moves} move")
-    assert f"; motion follows {told.followed:.0%} of the path; {told.motion_attested:.0%} of the motion's" in first
+    assert (
+        f"; motion reaches {told.followed:.0%} of the path's joint states; {told.motion_attested:.0%} of the motion's"
+        in first
+    )
     assert len(lines) <= max(30 + moves, 2 * moves)
     shown = "\n".join(lines)
     for move in told.moves:

@@ -53,9 +53,9 @@ def tween() -> Tween:
 
 def test_it_says_length_proof_following_and_attestation(tween: Tween) -> None:
     assert headline(tween) == (
-        f"{tween.moves} moves, {tween.motion.times[-1]:.1f} s. Path proven optimal, all from ballet. Motion follows "
-        f"{tween.followed[1:-1].mean():.0%} of the path; {tween.motion_attested:.0%} of the motion's transitions "
-        "occur in ballet"
+        f"{tween.moves} moves, {tween.motion.times[-1]:.1f} s. Path proven optimal, all from ballet. Motion reaches "
+        f"{tween.followed[1:-1].mean():.0%} of the path's joint states; {tween.motion_attested:.0%} of the motion's "
+        "transitions occur in ballet"
     )
 
 
