@@ -89,5 +89,5 @@ def _cells(name: str, figure: Figure) -> tuple[str, ...]:
     value, low, high = (float(f"{number:.3g}") for number in (figure.value, figure.low, figure.high))
     place = "below" if value < low else "above" if value > high else ""
     shown = f"{value:g} {figure.unit}".rstrip() if is_known else "-"
-    least, most = ("-" if math.isnan(number) else f"{number:g}" for number in (low, high))
-    return name.replace("_", " "), shown, place, f"{least} to {most}", figure.about
+    usual = "-" if math.isnan(low) or math.isnan(high) else f"{low:g}" if low == high else f"{low:g} to {high:g}"
+    return name.replace("_", " "), shown, place, usual, figure.about
