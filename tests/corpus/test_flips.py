@@ -258,7 +258,7 @@ def test_an_explanation_says_what_was_reconstructed() -> None:
     told = explain(engine.tween(a, b, moves=1))  # as recorded, but for the ankle at B
     marked = [one.joint for one in told.moves[0].joints if one.source and one.source.reconstructed]
     assert marked == ["left_ankle"]
-    assert str(told).count(" s, reconstructed)") == 1
+    assert told.details().count(" s, reconstructed)") == 1
 
 
 def test_what_was_mended_is_saved_and_summarised(tmp_path: Path) -> None:
