@@ -17,7 +17,7 @@ from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 from motionmind.names.finding import open_collection
 from motionmind.names.postures import find_posture
-from motionmind.names.spelling import parse_frames, parse_source
+from motionmind.names.spelling import parse_posture, parse_source
 from motionmind.render.seam_sheet import seam_sheet
 from motionmind.tween.engine import Engine
 from motionmind.variation.piece import Piece
@@ -81,8 +81,9 @@ def test_the_table_names_postures_and_does_without_the_corpus(run: Run, file: Pa
     listed = run("review", file, "--list").out
     (line,) = [line for line in listed.splitlines() if line.startswith("   1  ")]
     assert f" {names[first.end]}" in line
-    for frames in re.findall(r"\S+@\S+\.\.\S+", listed):
-        parse_frames(frames)  # a name that commands take
+    for clip, start, end in re.findall(r"(\S+)@(\d+)\.\.(\d+)", listed):
+        for frame in (start, end):
+            parse_posture(f"ballet/{clip}@{frame}")  # a name that commands take
     assert re.search(r"[a-z] to [a-z]", listed)  # from a posture of one name to one of another
     gone = tuple(msgspec.structs.replace(one, corpus="gone") for one in variation.transitions)
     write_variation(file, replace(variation, transitions=gone))
