@@ -19,13 +19,14 @@ from motionmind.geometry import rotations as rot
 WHOLE_BODY = "whole body"
 # Nouns for angles whose names in a body's file do not follow "toward".
 _NOUNS = {
-    **{"tilt": "forward tilt", "back": "backward tilt", "rotation": "outward rotation", "inward": "inward rotation"},
-    **{
-        "plantar": "plantar flexion",
-        "dorsal": "dorsiflexion",
-        "radial": "radial deviation",
-        "ulnar": "ulnar deviation",
-    },
+    "tilt": "forward tilt",
+    "back": "backward tilt",
+    "rotation": "outward rotation",
+    "inward": "inward rotation",
+    "plantar": "plantar flexion",
+    "dorsal": "dorsiflexion",
+    "radial": "radial deviation",
+    "ulnar": "ulnar deviation",
 }
 
 
