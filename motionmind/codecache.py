@@ -12,9 +12,7 @@ import os
 import pickle
 import re
 import shutil
-import stat
 import sys
-import tempfile
 import time
 import zipfile
 import zlib
@@ -30,6 +28,7 @@ from numba.core import codegen, compiler, serialize
 from numba.core.registry import cpu_target
 
 from motionmind.files import make_folder, replace_file
+from motionmind.private_folders import is_fixed, is_private, read_own, temporary_folder
 
 _HERE = Path(__file__).parent
 _HASH_BYTES = 32
@@ -135,7 +134,7 @@ class Kept:
         if file is None:
             return None
         try:
-            data = file.read_bytes()
+            data = read_own(file)
         except OSError:
             shipped = self._shipped_code(signature)
             with suppress(Exception):  # damaged: compile again
@@ -158,7 +157,7 @@ class Kept:
             return
         data = _dumps((_symbols(compiled.library), *compiled._reduce()))
         try:
-            replace_file(file, hashlib.sha256(data).digest() + data)
+            replace_file(file, hashlib.sha256(data).digest() + data, 0o600)
         except OSError as error:
             _warn(f"cannot cache compiled code in {file.parents[1]} ({error.strerror}): each run compiles again")
 
@@ -338,9 +337,8 @@ def _folder(source: Path) -> Path | None:
     own = os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("motionmind", appauthor=False)
     for temporary in (False, True):
         with suppress(OSError, ValueError):
-            place = (_temporary() if temporary else Path(own)) / "compiled"
+            place = _make_private((temporary_folder() if temporary else Path(own)) / "compiled")
             folder = place / name
-            _make_private(place)
             is_new = not folder.is_dir()
             make_folder(folder)
             if os.access(folder, os.W_OK):
@@ -352,25 +350,26 @@ def _folder(source: Path) -> Path | None:
     return None
 
 
-def _make_private(place: Path) -> None:
-    """Make a folder that only its owner can write to, since loading compiled code runs it.
+@cache
+def _make_private(place: Path) -> Path:
+    """Make a folder that only this user can write to, since loading compiled code runs it; return its real path.
 
-    If others could write to an existing folder, remove its content.
+    If others could write to an existing folder of the user, remove its content.
 
     Raises:
-        OSError: the folder belongs to another user or cannot be made.
+        OSError: it belongs to another user, others could replace it, or it cannot be made.
     """
-    make_folder(place.parent)
-    with suppress(FileExistsError):
-        place.mkdir(mode=0o700)
-    if not hasattr(os, "getuid"):
-        return
-    found = place.lstat()
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid not in (os.getuid(), 0):
-        raise PermissionError(f"{place} belongs to another user")
-    if found.st_mode & 0o022 and found.st_uid == os.getuid():
-        shutil.rmtree(place)
-        place.mkdir(mode=0o700)
+    place = Path(os.path.realpath(place.parent)) / place.name
+    if is_fixed(place):
+        make_folder(place.parent)
+        with suppress(FileExistsError):
+            place.mkdir(mode=0o700)
+        if not is_private(place) and place.lstat().st_uid == os.getuid():
+            shutil.rmtree(place)
+            place.mkdir(mode=0o700)
+        if is_private(place):
+            return place
+    raise PermissionError(f"{place}: others could replace what is in it")
 
 
 def _remove_unused(place: Path) -> None:
@@ -382,15 +381,3 @@ def _remove_unused(place: Path) -> None:
                     shutil.rmtree(found, ignore_errors=True)
                 else:
                     found.unlink()
-
-
-@cache
-def _temporary() -> Path:
-    """Return a private folder among the system's temporary files; OSError if none can be made."""
-    user = os.getuid() if hasattr(os, "getuid") else 0
-    folder = Path(tempfile.gettempdir()) / f"motionmind-{user}"
-    folder.mkdir(mode=0o700, exist_ok=True)
-    found = folder.lstat()
-    if stat.S_ISDIR(found.st_mode) and found.st_uid in (user, 0) and not found.st_mode & 0o022:
-        return folder
-    return Path(tempfile.mkdtemp(prefix="motionmind-"))

@@ -31,7 +31,7 @@ def displayed(name: str, most: int = _MAX_NAME_CHARS) -> str:
     'left\\\\u001b[31m hip'
     """
     # Shorten before escaping, so that long names cost no time, and again after it.
-    return _shortened(escaped(_shortened(name, most)).replace("\n", "\\u000a").replace("\t", "\\u0009"), most)
+    return _shortened(_unbroken(escaped(_shortened(name, most))), most)
 
 
 def displayed_path(path: str | os.PathLike[str]) -> str:
@@ -48,9 +48,23 @@ def printable(text: str) -> str:
     return _LONG_LINES.sub(lambda line: _shortened(line[0], _MAX_LINE_CHARS), short)
 
 
+def one_line(text: str) -> str:
+    """Return a message as `printable` does, with newlines and tabs escaped, too.
+
+    >>> from motionmind.display import one_line
+    >>> one_line("a\\nb.bvh: cannot be read")
+    'a\\\\u000ab.bvh: cannot be read'
+    """
+    return _unbroken(printable(text))
+
+
 def escaped(text: str) -> str:
     """Escape unsafe characters as JSON does, which leaves JSON equivalent; keep newlines and tabs."""
     return _UNSAFE.sub(lambda one: f"\\u{ord(one[0]):04x}", text)
+
+
+def _unbroken(text: str) -> str:
+    return text.replace("\n", "\\u000a").replace("\t", "\\u0009")
 
 
 def _shortened(text: str, most: int) -> str:

@@ -1,6 +1,7 @@
 """MotionMind's errors and its warning, and helpers that word their messages.
 
-Every message says what was wrong, where (file, line, joint, frame), and what would be right.
+Every message says what was wrong, where (file, line, joint, frame), and what would be right. Messages quote names from
+files; each is escaped where the error is made, so that it is one line and safe to log.
 """
 
 from __future__ import annotations
@@ -10,11 +11,16 @@ from difflib import get_close_matches
 from itertools import islice
 from typing import Any
 
+from motionmind.display import one_line, printable
+
 _MAX_WORD_CHARS = 64  # of words to compare
 
 
 class MotionMindError(Exception):
     """Root of all errors caused by bad input; the command line prints it in one line and exits with code 2.
+
+    Args:
+        message: the fault; control characters in it are escaped, and long words shortened.
 
     >>> from motionmind import Engine, MotionMindError
     >>> try:
@@ -23,6 +29,9 @@ class MotionMindError(Exception):
     ...     print(str(error).partition(";")[0])
     no corpus 'opera'
     """
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(one_line(message))
 
 
 class WrongTypeError(MotionMindError, TypeError):
@@ -51,7 +60,7 @@ class FormatError(MotionMindError):
 
     def __init__(self, message: str, *, path: object | None = None, line: int | None = None) -> None:
         where = "" if path is None else f"{path}: " if line is None else f"{path}:{line}: "
-        super().__init__(f"{where}{message}")
+        super().__init__(f"{where}{message}".replace("\n", "\\n"))  # one line, whatever names a message quotes
 
 
 class SkeletonError(MotionMindError):
@@ -90,7 +99,7 @@ class NoPathError(MotionMindError):
     """
 
     def __init__(self, message: str, diagnosis: dict[str, Any] | None = None) -> None:
-        super().__init__(message)
+        Exception.__init__(self, printable(message))  # which keeps the lines of the diagnosis
         self.diagnosis = diagnosis
 
 
@@ -109,6 +118,9 @@ class MotionMindWarning(UserWarning):
     Traceback (most recent call last):
     motionmind.errors.FormatError: nowhere.bvh: cannot be read: there is no such file or folder
     """
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(one_line(message))
 
 
 def quoted(text: str, most: int = 40) -> str:

@@ -125,6 +125,23 @@ def parse_toml(text: str) -> dict[str, Any]:
     return tomllib.loads(text)
 
 
+def format_toml_string(text: str) -> str:
+    """Return a text as a basic string of TOML.
+
+    Raises:
+        MotionMindError: the text has a surrogate, as names of files that are not UTF-8 do.
+
+    Examples:
+        >>> from motionmind.files import format_toml_string
+        >>> print(format_toml_string('the "hero"'))
+        "the \\"hero\\""
+    """
+    if any("\ud800" <= c <= "\udfff" for c in text):
+        raise MotionMindError(f"{text!r:.300}: cannot be written in TOML, which is UTF-8; rename the file")
+    escapes = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
+    return '"' + "".join(escapes.get(c, c if c.isprintable() else f"\\U{ord(c):08X}") for c in text) + '"'
+
+
 def write_atomically(path: FilePath, data: bytes) -> None:
     """Write `data` to `path` atomically: a reader finds either the old file or the new one, never a part.
 
@@ -230,6 +247,29 @@ def replace_file(target: Path, data: bytes, mode: int | None = None) -> None:
     sync_folder(target.parent)
 
 
+def create_file(target: Path, data: bytes) -> None:
+    """Write a new file atomically; FileExistsError if there is one, another OSError if that fails."""
+    temporary = _write_beside(target, data, None)
+    try:
+        try:
+            os.link(temporary, target)  # unlike a move, it never replaces a file
+        except FileExistsError:
+            raise
+        except OSError:  # some file systems have no links
+            if os.path.lexists(target):
+                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST)) from None
+            _move(temporary, target)
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+    try:
+        sync_folder(target.parent)
+    except BaseException:
+        with suppress(OSError):
+            target.unlink()
+        raise
+
+
 def _write_beside(target: Path, data: bytes, mode: int | None) -> Path:
     """Write and flush a temporary file in the folder of `target`, and return its path; leave nothing if that fails."""
     _remove_leftovers(target.parent)
@@ -310,27 +350,6 @@ def _remove_leftovers(folder: Path) -> None:
                     # The process may run on another machine that shares the folder, or reuse the number of a dead one.
                     if age > _DAY_S or (age > 60.0 and parts[1] and not _runs(int(parts[1]))):
                         Path(entry.path).unlink()
-
-
-def make_room(purpose: str) -> Path:
-    """Make a private folder among the system's temporary ones.
-
-    Remove folders of the same purpose, a word, that dead processes left more than a day ago.
-    """
-    import shutil
-    import tempfile
-
-    room = Path(tempfile.mkdtemp(prefix=f"motionmind-{purpose}-{os.getpid()}-"))
-    with suppress(OSError):
-        own, rooms = room.stat().st_uid, re.compile(rf"motionmind-{purpose}-(\d+)-\w+")
-        for entry in os.scandir(room.parent):
-            if (parts := rooms.fullmatch(entry.name)) and not _runs(int(parts[1])):
-                with suppress(OSError):
-                    found = entry.stat(follow_symlinks=False)
-                    # The process may run in another container that shares the folder.
-                    if stat.S_ISDIR(found.st_mode) and found.st_uid == own and time.time() - found.st_mtime > _DAY_S:
-                        shutil.rmtree(entry.path)
-    return room
 
 
 def _runs(process: int) -> bool:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any, TypeVar, cast
 
 import numba
@@ -43,7 +45,32 @@ def jit(function: _F) -> _F:
     """
     compiled: Any = numba.njit(error_model="numpy", nogil=True)(function)
     compiled._cache = Kept(function)
+    compile_for = compiled._compile_for_args
+
+    def callable_for(*args: Any) -> Any:
+        return function if _interprets.get() else compile_for(*args)
+
+    compiled._compile_for_args = callable_for  # which Numba asks what to call for arguments of new types
     return cast(_F, compiled)
+
+
+_interprets: ContextVar[bool] = ContextVar("interprets", default=False)
+
+
+@contextmanager
+def interpreted(is_wanted: bool = True) -> Iterator[None]:
+    """Call functions as Python in the context, unless they are compiled by now: a few small calls need no compiler.
+
+    The results are the same bytes.
+
+    Args:
+        is_wanted: False for work within such a context that is too long for Python.
+    """
+    token = _interprets.set(is_wanted)
+    try:
+        yield
+    finally:
+        _interprets.reset(token)
 
 
 def either(function: _F) -> _F:

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from motionmind import codecache as door
-from motionmind.jit import either, jit, pointer
+from motionmind.jit import either, interpreted, jit, pointer
 
 DAY = 86400.0  # seconds
 
@@ -64,12 +64,14 @@ def test_compiled_code_that_others_could_have_written_is_removed_and_another_own
     assert state(source) == folder
     assert (folder / "f-1.nbc").exists()
     folder.parent.chmod(0o777)
+    door._make_private.cache_clear()
     assert state(source) == folder
     assert not (folder / "f-1.nbc").exists()
     assert folder.parent.stat().st_mode & 0o777 == 0o700
     if os.getuid() == 0:
         os.chown(folder.parent, 12345, 12345)
-        monkeypatch.setattr(door, "_temporary", lambda: tmp_path / "elsewhere")
+        door._make_private.cache_clear()
+        monkeypatch.setattr(door, "temporary_folder", lambda: tmp_path / "elsewhere")
         assert state(source) == tmp_path / "elsewhere/compiled" / folder.name
 
 
@@ -183,3 +185,27 @@ def test_what_cannot_be_compiled_is_no_pointer() -> None:
 
     with pytest.raises(NumbaError):
         pointer(lambda x: {"x": x}, types.float64(types.float64), keep=False)
+
+
+@jit
+def _tripled(x: float) -> float:
+    return 3.0 * x
+
+
+@jit
+def _tripled_and_one(x: float) -> float:
+    return _tripled(x) + 1.0
+
+
+def test_within_the_context_nothing_is_compiled_but_what_is_compiled_is_used() -> None:
+    signatures = [_tripled.signatures, _tripled_and_one.signatures]  # type: ignore[attr-defined]
+    with interpreted():
+        assert _tripled_and_one(2.0) == 7.0
+        assert signatures == [[], []]
+        with interpreted(False):
+            assert _tripled(2.0) == 6.0
+        assert len(_tripled.signatures) == 1  # type: ignore[attr-defined]
+        assert _tripled_and_one(2.0) == 7.0
+        assert _tripled_and_one.signatures == []  # type: ignore[attr-defined]
+    assert _tripled_and_one(2.0) == 7.0
+    assert len(_tripled_and_one.signatures) == 1  # type: ignore[attr-defined]
