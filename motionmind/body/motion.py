@@ -26,7 +26,7 @@ from motionmind.arguments import (
     check_type,
 )
 from motionmind.body.frozen import freeze_checked
-from motionmind.body.rates import MAX_FPS, check_size
+from motionmind.body.rates import FILM_FPS, MAX_FPS, check_size
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.tables import data_frame, data_set
 from motionmind.credits.credit import Credit, add_up, check_shares
@@ -142,6 +142,8 @@ class Motion:
             and for movement between keyframes.
         recorded: credits of the movement that the engine did not make, in shares that sum to 1; empty if only its name
             is known.
+        rate: frames per second that a file states, or that somebody chose; 0 if only `times` show it. Files that record
+            a rate have it from here if there is one frame.
 
     >>> import numpy as np
     >>> from motionmind import Motion, Posture, human23
@@ -160,10 +162,14 @@ class Motion:
     insertions: tuple[Insertion, ...] = ()
     keyframed: bool = False
     recorded: tuple[Credit, ...] = ()
+    rate: float = 0.0
 
     def __post_init__(self) -> None:
         check_type("skeleton", self.skeleton, Skeleton)
         check_text("name", self.name)
+        check_real("rate", self.rate)
+        if not 0.0 <= self.rate < np.inf:
+            raise MotionMindError(f"rate must be a number of frames a second, 0 if unknown, not {self.rate}")
         check_items("insertions", self.insertions, "insertions", Insertion)
         check_flag("keyframed", self.keyframed)
         check_items("recorded", self.recorded, "credits", Credit)
@@ -220,6 +226,8 @@ class Motion:
             times=self.times[start:stop],
             insertions=(),
         )
+        if len(part) == 1 and not part.rate and self.fps >= FILM_FPS:
+            part = replace(part, rate=self.fps)
         first, last = part.times[0], part.times[-1]
         kept = tuple(one for one in self.insertions if one.times[-1] >= first and one.times[0] <= last)
         return replace(part, insertions=kept) if kept else part
@@ -293,7 +301,7 @@ class Motion:
         span = self.times[-1] - self.times[0]
         steps = np.floor(span * rate + 1e-3)
         self._check_size(steps + 1.0)
-        return self.at(self.times[0] + np.arange(steps + 1) / rate)
+        return replace(self.at(self.times[0] + np.arange(steps + 1) / rate), rate=rate)
 
     def stretch_to(self, rate: float) -> Motion:
         """Return the motion at `rate` postures a second, stretched so that the last frame is the last posture.
@@ -315,14 +323,14 @@ class Motion:
         """
         _check_rate(rate)
         if len(self) == 1:
-            return self
+            return replace(self, rate=rate)
         start, span = self.times[0], self.times[-1] - self.times[0]
         steps = max(1.0, float(np.round(span * rate)))
         self._check_size(steps + 1.0)
         stretch = steps / (span * rate)
         sampled = self.at(start + span * np.arange(steps + 1) / steps)
         insertions = tuple(replace(one, times=start + stretch * (one.times - start)) for one in self.insertions)
-        return replace(sampled, times=start + np.arange(steps + 1) / rate, insertions=insertions)
+        return replace(sampled, times=start + np.arange(steps + 1) / rate, insertions=insertions, rate=rate)
 
     def _check_size(self, frames: float) -> None:
         """Check the size of a result of `frames` frames; always allow up to twice as many as this motion has."""
@@ -339,7 +347,9 @@ class Motion:
         self._check_size(len(times))
         if len(self) == 1:
             frames = np.zeros(len(times), dtype=int)
-            return replace(self, rotations=self.rotations[frames], root=self.root[frames], times=times, keyframed=False)
+            return replace(
+                self, rotations=self.rotations[frames], root=self.root[frames], times=times, keyframed=False, rate=0.0
+            )
         after = np.clip(np.searchsorted(self.times, times, side="right"), 1, len(self) - 1)
         before = after - 1
         share = ((times - self.times[before]) / (self.times[after] - self.times[before])).clip(0.0, 1.0)
@@ -354,6 +364,7 @@ class Motion:
             root=self.root[before] + share[:, None] * (self.root[after] - self.root[before]),
             times=times,
             keyframed=False,
+            rate=0.0,
         )
 
     def positions(self) -> Floats:

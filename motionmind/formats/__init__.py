@@ -5,9 +5,10 @@
 | `.json` | posture or motion | posture or motion |
 | `.bvh` | motion | motion, posture as one frame |
 | `.amc` | motion, with the `.asf` beside it | |
-| `.npz` | motion on SMPL's joints (AMASS) | motion of people, posture as one frame |
+| `.npz` | motion on SMPL's joints (AMASS), or SOMA's (Kimodo) | motion of people, posture as one frame |
 | `.pkl` | motion on SMPL's joints (AIST++) | |
-| `.npy` | motion on SMPL's joints (FineDance) | |
+| `.npy` | motion on SMPL's joints (FineDance), or their places (HumanML3D, MDM) | |
+| `.pt` | motion on SMPL's joints (GVHMR) | |
 | `.txt` | the notation of the papers | the notation of the papers |
 | `.glb` | motion, or posture without animation | the same |
 | `.gltf`, `.vrm` | as `.glb` | |
@@ -20,6 +21,7 @@ what a format cannot hold.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from numbers import Real
 from pathlib import Path
 
@@ -27,20 +29,17 @@ from motionmind.arguments import check_integer, check_path, check_real, check_ty
 from motionmind.body.human import SHORTEST_PERSON_M, TALLEST_PERSON_M
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
+from motionmind.clip_names import CLIP_SUFFIXES, GLTF_SUFFIXES, split_clip
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.files import FilePath
 from motionmind.formats.added import MotionReader, MotionWriter, added_suffixes, read_added, write_added
 from motionmind.formats.lossy import WRITABLE, lossy_fields
+from motionmind.formats.refused import way_out
 from motionmind.retarget.vertical import check_up, to_y_up
 
 __all__ = ["MotionReader", "MotionWriter", "lossy_fields"]
 
-_GLTF = (".glb", ".gltf", ".vrm", ".vrma")
-_READABLE = (".json", ".bvh", ".amc", ".txt", ".npz", ".pkl", ".npy", *_GLTF)
-_REFUSED = {
-    ".c3d": "C3D holds markers on the skin, not joints: solve a skeleton from them, and export that as BVH",
-    ".fbx": "FBX is not read: open it in Blender (File, Import, FBX) and export glTF (.glb), or BVH",
-}
+_READABLE = (".json", ".bvh", ".amc", ".txt", ".npz", ".pkl", ".npy", ".pt", *GLTF_SUFFIXES)
 
 
 def read_motion(
@@ -55,14 +54,16 @@ def read_motion(
     """Read a motion from a file of any readable format; a posture becomes a motion of one frame at time 0.
 
     Args:
-        path: the file; its suffix determines the format.
+        path: the file; its suffix determines the format. Of a glTF file with several clips, "hero.glb#Walk" is the one
+            named so; without a name it is the first that moves, with a warning. "duo.bvh#Hips" is the body with this
+            ROOT in a BVH file with several, "results.npy#2" MDM's second sample.
         unit: BVH's unit of length (`read_bvh`); None guesses it from the skeleton. Also glTF's, and that of the body's
             place in `.npz`, if it is not the metre.
             Other formats define their own.
         asf: AMC's skeleton (`read_amc`); None finds it beside the file.
-        fps: frames per second: of AMC (default 120), which does not record them, of AIST++ and FineDance (default 60
-            and 30), and of BVH, `.npz` and the papers' notation in place of the file's. Frames of JSON and glTF have
-            times of their own.
+        fps: frames per second: of AMC (default 120), which does not record them, of AIST++, FineDance, GVHMR and
+            HumanML3D (default 60, 30, 30 and 20), and of BVH, `.npz` and the papers' notation in place of the file's.
+            Frames of JSON and glTF have times of their own.
         skeleton: the body of the papers' notation, which names joints only; None infers it from their names.
         up: "y" or "z", the vertical in the file: with "z" the movement is turned, so that y is up. None leaves it as it
             is, for `to_human23` to find; but of `.npz`, where it takes z, unless people stand along y.
@@ -90,12 +91,13 @@ def read_motion(
     check_real("fps", fps, or_none=True)
     check_type("skeleton", skeleton, Skeleton, or_none=True)
     check_up(up)
+    named, (path, clip) = path, split_clip(path)
     # Formats are imported here, so a program loads only those it uses.
     match _suffix(path, _READABLE, "read"):
         case ".bvh":
             from motionmind.formats.bvh import read_bvh
 
-            motion = read_bvh(path, unit=unit, fps=fps)
+            motion = read_bvh(path, clip=clip, unit=unit, fps=fps)
         case ".amc":
             from motionmind.formats.asf_amc import read_amc
 
@@ -104,18 +106,53 @@ def read_motion(
             from motionmind.formats.papers import read_papers
 
             motion = read_papers(path, skeleton=skeleton, rate=fps)
-        case ".npz" | ".pkl" | ".npy" as suffix:
-            motion = _read_smpl(path, suffix, fps, up, unit)
+        case ".npz" | ".pkl" | ".npy" | ".pt" as suffix:
+            motion = _read_smpl(path, suffix, clip, fps, up, unit)
         case ".json":
             motion = _read_json(path)
         case ".glb" | ".gltf" | ".vrm" | ".vrma":
             from motionmind.formats.gltf import read_gltf
 
-            motion = read_gltf(path, unit=unit)
+            motion = read_gltf(path, clip=clip, unit=unit)
         case _:
             motion = read_added(path, fps)
-    _question_height(path, motion.skeleton)
+    _question_height(named, motion.skeleton)
     return to_y_up(motion) if up == "z" and Path(path).suffix.lower() != ".npz" else motion
+
+
+def read_clips(
+    path: FilePath,
+    *,
+    unit: str | float | None = None,
+    asf: FilePath | None = None,
+    fps: float | None = None,
+    up: str | None = None,
+) -> Iterator[Motion]:
+    """Read all clips of a glTF file, bodies of BVH or samples of MDM, or the only motion of any other file.
+
+    If there are several, each has a name of the form "stem#clip"; poses are motions of one frame. Arguments as for
+    `read_motion`.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in CLIP_SUFFIXES or split_clip(path)[1] is not None:
+        yield read_motion(path, unit=unit, asf=asf, fps=fps, up=up)
+        return
+    if suffix == ".bvh":
+        from motionmind.formats.bvh import read_bvh_clips
+
+        motions = read_bvh_clips(path, unit=unit, fps=fps)
+    elif suffix == ".npy":
+        from motionmind.formats.smpl_data import read_npy_clips
+
+        motions = read_npy_clips(path, fps=fps)
+    else:
+        from motionmind.formats.gltf import read_gltf_clips
+
+        motions = iter(read_gltf_clips(path, unit=unit))
+    for number, motion in enumerate(motions):
+        if number == 0 or suffix == ".bvh":  # the others are of one body
+            _question_height(path, motion.skeleton)
+        yield to_y_up(motion) if up == "z" else motion
 
 
 def _question_height(path: FilePath, skeleton: Skeleton) -> None:
@@ -131,14 +168,18 @@ def _question_height(path: FilePath, skeleton: Skeleton) -> None:
         warnings.warn(message, MotionMindWarning, stacklevel=3)
 
 
-def _read_smpl(path: FilePath, suffix: str, fps: float | None, up: str | None, unit: str | float | None) -> Motion:
+def _read_smpl(
+    path: FilePath, suffix: str, clip: str | None, fps: float | None, up: str | None, unit: str | float | None
+) -> Motion:
     """Read a motion on SMPL's joints, by the format of the suffix."""
     from motionmind.formats.npz import read_npz
-    from motionmind.formats.smpl_data import read_aist, read_finedance
+    from motionmind.formats.smpl_data import read_aist, read_gvhmr, read_npy
 
     if suffix == ".npz":
         return read_npz(path, fps=fps, up=up, unit=unit)
-    return {".pkl": read_aist, ".npy": read_finedance}[suffix](path, fps=fps)
+    if suffix == ".npy":
+        return read_npy(path, fps=fps, clip=clip)
+    return {".pkl": read_aist, ".pt": read_gvhmr}[suffix](path, fps=fps)
 
 
 def _read_json(path: FilePath) -> Motion:
@@ -297,6 +338,6 @@ def _suffix(path: FilePath, known: tuple[str, ...], verb: str) -> str:
     suffix = Path(path).suffix.lower()
     if suffix not in known and suffix not in (others := added_suffixes()):
         message = f"suffix {suffix!r} is unknown; files that can be {verb} end in {', '.join((*known, *others))}"
-        message = _REFUSED.get(suffix, message) if verb == "read" else message
+        message = (way_out(suffix) if verb == "read" else None) or message
         raise FormatError(message, path=path) if verb == "read" else MotionMindError(f"{path}: {message}")
     return suffix

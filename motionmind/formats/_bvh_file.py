@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import islice, takewhile
+from pathlib import Path
 
 import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.rates import check_size
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import FormatError, quoted
-from motionmind.files import FilePath
+from motionmind.clip_names import distinct_names, find_name
+from motionmind.errors import FormatError, enumerated, quoted
+from motionmind.files import FilePath, name_of
 from motionmind.formats._bvh_hierarchy import BvhJoint, is_comment, read_hierarchy
 from motionmind.formats._bvh_rig import Placed
 from motionmind.formats.text import MAX_NUMBER, read_lines, to_number, to_numbers
@@ -19,6 +22,8 @@ from motionmind.geometry import rotations as rot
 
 _FRAMES = re.compile(r"\s*Frames\s*:?\s*(\S*)\s*", re.IGNORECASE)
 _FRAME_TIME = re.compile(r"\s*Frame\s*Time\s*:?\s*(\S*)\s*", re.IGNORECASE)
+
+_MAX_HEAD_LINES = 100_000  # above MOTION
 
 
 @dataclass(frozen=True)
@@ -28,9 +33,10 @@ class BvhFile:
     Attributes:
         hierarchy: the lines above MOTION, as they stand in the file.
         joints: the joints in them, parents before children.
-        values: the values of all joints' channels, in the file's order and units [T, C].
+        values: the values of these joints' channels, in the file's order and units [T, C].
         declared: the header's number of frames.
         frame_time: the header's seconds per frame.
+        rows: the lines of the frames, as they stand in the file, each with its number.
     """
 
     hierarchy: list[str]
@@ -38,10 +44,58 @@ class BvhFile:
     values: Floats
     declared: int
     frame_time: float
+    rows: list[tuple[int, str]]
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """The bodies' names: those of their roots, made distinct (`distinct_names`)."""
+        return distinct_names([joint.name for joint in self.joints if joint.parent < 0])
+
+    def body(self, number: int) -> BvhFile:
+        """Return the file with the hierarchy and values of one of its bodies, counted from 0, and no rows."""
+        roots = [i for i, joint in enumerate(self.joints) if joint.parent < 0]
+        start, end = roots[number], [*roots, len(self.joints)][number + 1]
+        columns = np.cumsum([0, *(len(joint.channels) for joint in self.joints)])
+        joints = [replace(joint, parent=max(joint.parent - start, -1)) for joint in self.joints[start:end]]
+        starts = [*(self.joints[root].line - 1 for root in roots), len(self.hierarchy)]
+        own = self.hierarchy[: starts[0]] + self.hierarchy[starts[number] : starts[number + 1]]
+        return replace(
+            self, hierarchy=own, joints=joints, values=self.values[:, columns[start] : columns[end]], rows=[]
+        )
+
+
+def count_bodies(path: FilePath) -> int:
+    """Count the ROOTs of a BVH file without reading its frames; 0 if it cannot be read."""
+    try:
+        with Path(path).open("rb") as file:
+            head = iter(file.readline, b"")
+            lines = takewhile(lambda line: line.strip().upper() != b"MOTION", islice(head, _MAX_HEAD_LINES))
+            return sum(line.split(None, 1)[:1] == [b"ROOT"] for line in lines)
+    except OSError:
+        return 0
+
+
+def read_body(path: FilePath, clip: str | None) -> BvhFile:
+    """Read one body of a BVH file: the only one, or the one of this name or this number from 1.
+
+    Raises:
+        FormatError: as `read_file`, or the file has several bodies and none is chosen, or it has no such body.
+    """
+    file = read_file(path)
+    names = file.bodies
+    if clip is None and len(names) == 1:
+        return file
+    listed = enumerated([quoted(name) for name in names])
+    if clip is None:
+        fault = f"it has {len(names)} bodies, {listed}: choose one, as {quoted(f'{name_of(path)}.bvh#{names[0]}')}"
+        raise FormatError(fault, path=path)
+    if (found := find_name(names, clip)) is None:
+        raise FormatError(f"no body {quoted(clip)}; it has {listed}", path=path)
+    return file.body(found)
 
 
 def read_file(path: FilePath) -> BvhFile:
-    """Read a BVH file.
+    """Read a BVH file, with all its bodies.
 
     Raises:
         FormatError: the file does not exist, or is not a complete BVH; the message names file and line.
@@ -55,9 +109,12 @@ def read_file(path: FilePath) -> BvhFile:
     if channels == 0:
         raise FormatError("no joint has CHANNELS: nothing can move", path=path, line=start + 1)
     declared, frame_time, first = _read_motion_header(lines, start + 1, path)
-    values = _read_frames(lines, first, channels, declared, path)
+    rows = [(n, line) for n, line in enumerate(lines[first:], start=first + 1) if line.strip() and not is_comment(line)]
+    if not rows:
+        raise FormatError("no frames after the header", path=path, line=len(lines))
+    values = _read_frames(rows, channels, declared, path)
     check_size(len(values), max(len(joints) - channels, 1), str(path))  # the file holds the rest
-    return BvhFile(lines[:start], joints, values, declared, frame_time)
+    return BvhFile(lines[:start], joints, values, declared, frame_time, rows)
 
 
 def _read_motion_header(lines: list[str], start: int, path: FilePath) -> tuple[int, float, int]:
@@ -90,11 +147,8 @@ def _read_motion_header(lines: list[str], start: int, path: FilePath) -> tuple[i
     raise FormatError(f"no line '{missing}: ...' between MOTION and the frames", path=path, line=start)
 
 
-def _read_frames(lines: list[str], first: int, channels: int, declared: int, path: FilePath) -> Floats:
+def _read_frames(rows: list[tuple[int, str]], channels: int, declared: int, path: FilePath) -> Floats:
     """Read channel values [T, C], one frame per line; frames may wrap over lines if their total count is right."""
-    rows = [(n, line) for n, line in enumerate(lines[first:], start=first + 1) if line.strip() and not is_comment(line)]
-    if not rows:
-        raise FormatError("no frames after the header", path=path, line=len(lines))
     if len(rows) * channels >= 10_000:
         from motionmind.formats._numbers import read_plain  # numba is slow to import
 

@@ -19,7 +19,7 @@ class BvhJoint:
 
     Attributes:
         name: the joint's name.
-        parent: index of its parent, -1 for the root.
+        parent: index of its parent, -1 for a root.
         line: the line where it begins.
         offset: its OFFSET [3]; None until it is read.
         channels: "XPOSITION", ..., in the file's order.
@@ -93,10 +93,10 @@ class _Words:
 def read_hierarchy(lines: list[str], path: FilePath) -> list[BvhJoint]:
     """Read the joints from the lines between HIERARCHY and MOTION.
 
-    Joints may nest to any depth.
+    Joints may nest to any depth. Each ROOT begins another body.
 
     Returns:
-        The joints, parents before their children.
+        The joints, parents before their children, body after body.
 
     Raises:
         FormatError: the hierarchy is invalid or incomplete; names file and line.
@@ -140,6 +140,8 @@ def read_hierarchy(lines: list[str], path: FilePath) -> list[BvhJoint]:
 def _check_unique_names(joints: list[BvhJoint], path: FilePath) -> None:
     names: set[str] = set()
     for joint in joints:
+        if joint.parent < 0:  # bodies may have the same names
+            names.clear()
         if joint.name in names:
             raise FormatError(f"a second joint named {quoted(joint.name)}", path=path, line=joint.line)
         names.add(joint.name)
@@ -147,8 +149,6 @@ def _check_unique_names(joints: list[BvhJoint], path: FilePath) -> None:
 
 def _open_joint(kind: str, words: _Words, joints: list[BvhJoint], open_blocks: list[int]) -> None:
     """Read the name and brace of a ROOT or JOINT and open its block."""
-    if kind == "ROOT" and joints:
-        raise words.error("a second ROOT: a file may hold only one figure")
     parent = open_blocks[-1] if open_blocks else -1
     if (kind == "JOINT") != (parent >= 0):
         raise words.error(f"a {kind} may not appear here")

@@ -129,9 +129,12 @@ def _new_root(body: Placed, span: float) -> int:
     far = [joint for joint in body.places if joint > 0 and body.stray(joint) > 0.01 * span]
     if not far:
         return 0
-    top = max(far, key=lambda joint: (len(_descendants(skeleton, joint)), -joint))
+    sizes = [1] * len(skeleton)  # of subtrees
+    for joint in range(len(skeleton) - 1, 0, -1):
+        sizes[skeleton.parents[joint]] += sizes[joint]
+    top = max(far, key=lambda joint: (sizes[joint], -joint))
     carried, above = _descendants(skeleton, top), _ancestors(skeleton, top)
-    aside = [joint for joint in range(len(skeleton)) if joint not in carried and joint not in above]
+    aside = sorted({*range(len(skeleton))} - {*carried, *above})
     if not aside:
         return top
     still = all(
@@ -178,7 +181,7 @@ def _fold(body: Placed, top: int, span: float, notes: list[str]) -> Placed:
         old.tips[kept],
     )
     name = old.names[top]
-    aside = [old.names[joint] for joint in range(len(old)) if joint not in new and joint not in above]
+    aside = [old.names[joint] for joint in sorted({*range(len(old))} - {*kept, *above})]
     if aside:
         notes.append(f"{name} becomes the root; joints that stand still beside it are left out: {enumerated(aside)}")
     walking = [old.names[joint] for joint in above if body.stray(joint) > _STILL_SPAN_SHARE * span]

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind._typing import Floats
+from motionmind.display import displayed
 from motionmind.errors import FormatError, quoted
 from motionmind.files import FilePath, read_bytes
 from motionmind.formats import _json
@@ -28,6 +29,7 @@ from motionmind.geometry import rotations as rot
 # 3.6.2.2, 5.1.3; the largest value of a type is 1 where integers are normalised (3.11).
 COMPONENT_DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 N_COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+_MAX_OVERLAP_RATIO = 4  # numbers read against those in the buffers; a clock's parts overlap, little else does
 MIN_SCALE_RATIO = 1e-9  # of a frame, or of its volume; frames that mirror or flatten have less
 
 Vector = tuple[float, float, float]
@@ -153,7 +155,7 @@ class Document(msgspec.Struct, rename="camel"):
     extensions: dict[str, msgspec.Raw] = {}
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Gltf:
     """A glTF file.
 
@@ -166,14 +168,22 @@ class Gltf:
     path: FilePath
     document: Document
     binary: bytes
-    _buffers: dict[int, bytes] = field(default_factory=dict)
+    _buffers: dict[int, bytes] = field(default_factory=dict, repr=False)
+    _files: dict[Path, bytes] = field(default_factory=dict, repr=False)
+    _numbers: dict[tuple[object, ...], Floats] = field(default_factory=dict, repr=False)
+    _bytes_read: int = 0
+
+    @property
+    def size(self) -> int:
+        """The bytes of the buffers that were read."""
+        return sum(map(len, self._buffers.values()))
 
     def fault(self, message: str) -> FormatError:
         """Return the error to raise for this file."""
         return FormatError(message, path=self.path)
 
     def numbers(self, index: int, kind: str, what: str) -> Floats:
-        """Return an accessor's numbers [n, components], checked to be finite.
+        """Return an accessor's numbers [n, components], checked to be finite; the same array if it is read again.
 
         Args:
             index: the accessor's.
@@ -181,15 +191,27 @@ class Gltf:
             what: its name in errors.
 
         Raises:
-            FormatError: there is no such accessor, it has another type, or it is compressed, sparse or beyond its data.
+            FormatError: there is no such accessor, it has another type, it is compressed, sparse or beyond its data, or
+                too many accessors have the same data.
         """
         array, accessor = self._raw(index, kind, what)
+        place = array.__array_interface__["data"][0], array.shape, array.strides, array.dtype, accessor.normalized
+        if place not in self._numbers:
+            self._bytes_read += array.size * array.itemsize
+            if self._bytes_read > _MAX_OVERLAP_RATIO * self.size:
+                raise self.fault(f"{what}: accessor {index} has data that too many others have, in part")
+            self._numbers[place] = self._checked(array, accessor, index, what)
+        return self._numbers[place]
+
+    def _checked(self, array: NDArray[np.generic], accessor: Accessor, index: int, what: str) -> Floats:
+        """Return an accessor's numbers as floats [n, components]; FormatError if one is out of range."""
         numbers = array.astype(np.float64)
         if accessor.normalized and array.dtype.kind in "iu":
             numbers = np.maximum(numbers / np.iinfo(array.dtype.str).max, -1.0)
         if not np.all(np.abs(numbers) <= MAX_NUMBER):
             row = int(np.argwhere(~(np.abs(numbers) <= MAX_NUMBER))[0][0])
             raise self.fault(f"{what}: number {row} of accessor {index} is out of range")
+        numbers.setflags(write=False)
         return numbers
 
     def _raw(self, index: int, kind: str, what: str) -> tuple[NDArray[np.generic], Accessor]:
@@ -204,7 +226,9 @@ class Gltf:
         view = self.member(self.document.buffer_views, accessor.buffer_view, f"{what}: buffer view")
         compressed = [name for name in view.extensions if "meshopt" in name]
         if compressed:
-            raise self.fault(f"{what}: compressed ({compressed[0]}), which cannot be read: export without that")
+            raise self.fault(
+                f"{what}: compressed ({displayed(compressed[0])}), which cannot be read: export without that"
+            )
         dtype = np.dtype(COMPONENT_DTYPES[accessor.component_type])
         width, data = N_COMPONENTS[kind], self.buffer(view.buffer, what)
         size = width * dtype.itemsize
@@ -236,7 +260,7 @@ class Gltf:
         return self._buffers[index]
 
     def fetch(self, uri: str) -> bytes:
-        """Return the bytes of a data URI, or of a file in this one's folder or below (3.6.1.1)."""
+        """Return the bytes of a data URI, or of a file in this one's folder or below (3.6.1.1), which is read once."""
         if uri.startswith("data:"):
             kind, _, text = uri.partition(",")
             try:
@@ -247,7 +271,9 @@ class Gltf:
         beside = Path(name)
         if not name or "\0" in name or ":" in name or "\\" in name or beside.is_absolute() or ".." in beside.parts:
             raise self.fault(f"data is at {quoted(uri)}: it must be in this file's folder or below")
-        return read_bytes(Path(self.path).parent / beside)
+        if beside not in self._files:
+            self._files[beside] = read_bytes(Path(self.path).parent / beside)
+        return self._files[beside]
 
 
 def read_container(path: FilePath) -> Gltf:
@@ -301,15 +327,18 @@ def to_trs(node: Node) -> tuple[Floats, Floats, Floats]:
 
 
 def from_matrix(numbers: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the translation [3], rotation [4] and scale [3] of a matrix [16], stored column by column.
+    """Return translations [..., 3], rotations [..., 4] and scales [..., 3] of matrices [..., 16], stored by column.
 
     Raises:
-        ValueError: the matrix has another size, mirrors or has no volume.
+        ValueError: a matrix has another size, mirrors or has no volume.
     """
-    if numbers.shape != (16,) or not np.all(np.abs(numbers) <= MAX_NUMBER):
+    if numbers.shape[-1:] != (16,) or not np.all(np.abs(numbers) <= MAX_NUMBER):
         raise ValueError("a matrix has 16 numbers")
-    matrix = numbers.reshape(4, 4).T
-    scale = np.linalg.norm(matrix[:3, :3], axis=0)
-    if not np.all(scale > MIN_SCALE_RATIO) or np.linalg.det(matrix[:3, :3] / scale) < MIN_SCALE_RATIO:
+    matrix = np.swapaxes(numbers.reshape(*numbers.shape[:-1], 4, 4), -1, -2)
+    scale = np.linalg.norm(matrix[..., :3, :3], axis=-2)
+    if not np.all(scale > MIN_SCALE_RATIO):
         raise ValueError("a matrix mirrors, or has no volume")
-    return matrix[:3, 3], rot.from_matrix(matrix[:3, :3] / scale), scale
+    turn = matrix[..., :3, :3] / scale[..., None, :]
+    if np.any(np.linalg.det(turn) < MIN_SCALE_RATIO):
+        raise ValueError("a matrix mirrors, or has no volume")
+    return matrix[..., :3, 3], rot.from_matrix(turn), scale

@@ -5,6 +5,7 @@ Section numbers refer to "glTF 2.0 Specification", version 2.0.1, The Khronos Gr
 
 from __future__ import annotations
 
+import logging
 import warnings
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.skeleton import Skeleton
+from motionmind.display import displayed_path
 from motionmind.errors import MotionMindWarning
 from motionmind.formats._gltf import MIN_SCALE_RATIO, Gltf, from_matrix, to_trs
 from motionmind.geometry import rotations as rot
@@ -20,6 +22,8 @@ from motionmind.retarget.fitting import zero_pose_rests
 PATH_TYPES = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
 SAME_KEY_S = 1e-5  # keys no further apart are one; times have seven digits
 _SAME_POSE_RAD = 1e-3
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -81,8 +85,8 @@ def globals_at(
     gltf: Gltf, parents: list[int], joints: list[int], tracks: Tracks, times: Floats
 ) -> tuple[Floats, Floats]:
     """Return the joints' orientations [T, J, 4] and places [T, J, 3] in the world at `times`."""
-    turns = np.empty((len(times), len(joints), 4))
-    places = np.empty((len(times), len(joints), 3))
+    # Joints first, so that the frames of each lie together.
+    turns, places = np.empty((len(joints), len(times), 4)), np.empty((len(joints), len(times), 3))
     number = {node: i for i, node in enumerate(joints)}
     frames: dict[int, tuple[Floats, Floats, Floats]] = {-1: (np.zeros((1, 3)), rot.IDENTITY[None], np.ones((1, 3)))}
     for node in lineage(parents, joints):
@@ -98,14 +102,13 @@ def globals_at(
         least = np.prod(moved[2], axis=-1).min()
         if not least > MIN_SCALE_RATIO:
             raise gltf.fault(f"node {node} has a scale that mirrors or flattens it")
-        frames[node] = (
-            place + rot.mul_vec(turn, scale * moved[0]),
-            rot.mul(turn, moved[1]),
-            scale * moved[2],
-        )
+        place, turn = place + rot.mul_vec(turn, scale * moved[0]), rot.mul(turn, moved[1])
         if node in number:
-            places[:, number[node]], turns[:, number[node]] = frames[node][:2]
-    return rot.normalise(turns), places
+            i = number[node]
+            places[i], turns[i] = place, turn
+            place, turn = places[i], turns[i]
+        frames[node] = place, turn, scale * moved[2]
+    return rot.normalise(turns.swapaxes(0, 1)), places.swapaxes(0, 1)
 
 
 def rest_pose(
@@ -121,29 +124,33 @@ def rest_pose(
     """
     turns, places = globals_at(gltf, parents, joints, {}, np.zeros(1))
     turns, places = turns[0], places[0]
-    bound: dict[int, tuple[Floats, Floats]] = {}
+    number = {node: i for i, node in enumerate(joints)}
+    bound: dict[int, Floats] = {}
     for skin in gltf.document.skins:
-        if skin.inverse_bind_matrices is None:
-            continue
-        for node, numbers in zip(skin.joints, gltf.numbers(skin.inverse_bind_matrices, "MAT4", "skin"), strict=False):
-            if node in joints:
-                place, turn, scale = from_matrix(numbers)
-                bound[joints.index(node)] = -rot.mul_vec(rot.inv(turn), place / scale), rot.inv(turn)
-    known = sorted(bound)
+        if skin.inverse_bind_matrices is not None:
+            matrices = gltf.numbers(skin.inverse_bind_matrices, "MAT4", "skin")
+            bound |= {number[node]: row for node, row in zip(skin.joints, matrices, strict=False) if node in number}
+    known = sorted(joint for joint, row in bound.items() if np.any(row[:12]))
+    if len(known) < len(bound):  # gltfpack writes zeros for an armature without a mesh
+        path, missing = displayed_path(gltf.path), len(bound) - len(known)
+        _log.info("%s: %d inverse bind matrices are zero; the nodes' pose is taken as the rest pose", path, missing)
     if not known and names is not None:
         return _unbound_rest(gltf, parents, joints, names, (turns, places))
     if len(known) < len(joints) - 1:
         return turns, places
-    to_world = rot.mul_inv(turns[known], np.array([bound[i][1] for i in known]))
+    place, turn, scale = from_matrix(np.array([bound[i] for i in known]))
+    bound_turns = rot.inv(turn)
+    to_world = rot.mul_inv(turns[known], bound_turns)
     if np.all(rot.angle(to_world, to_world[:1]) < _SAME_POSE_RAD):  # the nodes stand as they were bound
         return turns, places
-    there = np.array([bound[i][0] for i in known])
-    above = [known.index(i) if (i := joints.index(parents[joints[one]])) in bound else -1 for one in known[1:]]
+    there = -rot.mul_vec(bound_turns, place / scale)
+    row = {joint: i for i, joint in enumerate(known)}
+    above = [row.get(number[parents[joints[one]]], -1) for one in known[1:]]
     pairs = [(i + 1, parent) for i, parent in enumerate(above) if parent >= 0]
     ours = sum(np.linalg.norm(places[known[i]] - places[known[j]]) for i, j in pairs)
     theirs = sum(np.linalg.norm(there[i] - there[j]) for i, j in pairs)
     turns, places = turns.copy(), places.copy()
-    turns[known] = [bound[i][1] for i in known]
+    turns[known] = bound_turns
     places[known] = there * (ours / theirs if theirs > 0.0 else 1.0)
     return turns, places
 
@@ -168,7 +175,7 @@ def _unbound_rest(
         MotionMindWarning: a person stands in neither pose.
     """
     turns, places = standing
-    rows = [joints.index(parents[node]) if i else -1 for i, node in enumerate(joints)]
+    rows = parent_rows(parents, joints)
     if zero_pose_rests(skeleton_at("", names, rows, places)) is not False:
         return standing
     above = parents[joints[0]]
@@ -182,8 +189,14 @@ def _unbound_rest(
             f"{gltf.path}: neither a skin nor the nodes show the rest pose: joints are aligned by the movement, head "
             "and feet roughly (export it with a mesh)"
         )
-        warnings.warn(message, MotionMindWarning, 7)
+        warnings.warn(message, MotionMindWarning, 6)
     return np.tile(unturned, (len(joints), 1)), straight
+
+
+def parent_rows(parents: list[int], joints: list[int]) -> list[int]:
+    """Return the index among joints of each joint's parent, -1 for the first."""
+    number = {node: i for i, node in enumerate(joints)}
+    return [-1, *(number[parents[node]] for node in joints[1:])]
 
 
 def skeleton_at(name: str, names: tuple[str, ...], parents: list[int], rest: Floats) -> Skeleton:

@@ -66,7 +66,7 @@ def read_amc(path: FilePath, asf: FilePath | None = None, *, fps: float = 120.0)
         message = f"{path}: changes of the length or place of {enumerated(ignored)} are ignored"
         warnings.warn(message, MotionMindWarning, stacklevel=2)
     times = (numbers - numbers[0]) / fps
-    return Motion(acclaim.skeleton(), rotations, root * acclaim.scale, times, name=name_of(path))
+    return Motion(acclaim.skeleton(), rotations, root * acclaim.scale, times, name=name_of(path), rate=fps)
 
 
 def _assemble(acclaim: Acclaim, values: Floats, degrees: bool) -> tuple[Floats, Floats, list[str]]:

@@ -17,14 +17,15 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.motion import Motion
 from motionmind.body.rates import MAX_FPS
 from motionmind.body.skeleton import Skeleton
+from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError, MotionMindWarning, quoted
 from motionmind.files import FilePath, name_of, write_atomically
-from motionmind.formats._bvh_file import assemble, read_file
+from motionmind.formats._bvh_file import BvhFile, assemble, read_body, read_file
 from motionmind.formats._bvh_hierarchy import is_comment
 from motionmind.formats._bvh_rig import NormalisedRig, normalise
 from motionmind.formats._clock import even_step
 from motionmind.formats.text import read_lines
-from motionmind.formats.units import guess_unit, metres_per_unit
+from motionmind.formats.units import guess_unit, is_hand, metres_per_unit
 from motionmind.geometry import rotations as rot
 
 _MIN_MOVING_COUNT = 12  # this many frames, and joints, should show some movement
@@ -32,7 +33,9 @@ _MIN_MOVING_COUNT = 12  # this many frames, and joints, should show some movemen
 _log = logging.getLogger(__name__)
 
 
-def read_bvh(path: FilePath, *, unit: str | float | None = None, fps: float | None = None) -> Motion:
+def read_bvh(
+    path: FilePath, *, clip: str | None = None, unit: str | float | None = None, fps: float | None = None
+) -> Motion:
     """Read a motion from a BVH file, on the file's own tree of joints.
 
     Each joint has its own channels, in any order. Blank lines among the frames, and lines that begin with # or //,
@@ -45,7 +48,9 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None, fps: float | No
     Blender meant.
 
     Args:
-        path: the file; its stem becomes the name of the skeleton and of the motion.
+        path: the file; its stem becomes the name of the skeleton and of the motion, and "stem#clip" with a clip.
+        clip: of a file with several ROOTs, the body to read: its ROOT's name, or its number from 1. Bodies whose ROOTs
+            have one name are "Hips", "Hips (2)" and so on. None for the only one.
         unit: a name in `UNITS`, or metres in one unit of the file; None takes the unit that `guess_unit` infers from
             the skeleton, and logs it (logger "motionmind.formats.bvh", level INFO).
         fps: frames per second in place of the header's, which some converters copy from another file.
@@ -54,24 +59,47 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None, fps: float | No
         The motion, in metres and seconds, starting at time 0.
 
     Raises:
-        FormatError: the file does not exist, or is not a complete BVH; the message names file and line.
+        FormatError: the file does not exist, or is not a complete BVH; the message names file and line. Or it has
+            several bodies, and none is chosen.
         MotionMindError: `unit` or `fps` is invalid.
 
     Warns:
         MotionMindWarning: something was repaired, as described above; or the frame time or all angles are implausible.
     """
+    _check_fps(fps)
+    return _to_motion(read_body(path, clip), path, "" if clip is None else f"#{clip}", unit, fps)
+
+
+def read_bvh_clips(path: FilePath, *, unit: str | float | None = None, fps: float | None = None) -> Iterator[Motion]:
+    """Read all bodies of a BVH file, as `read_bvh` reads one.
+
+    If there are several, each has a name of the form "stem#clip".
+    """
+    _check_fps(fps)
+    file = read_file(path)
+    names = file.bodies
+    for number, name in enumerate(names):
+        yield _to_motion(file.body(number), path, f"#{name}" if len(names) > 1 else "", unit, fps)
+
+
+def _check_fps(fps: float | None) -> None:
     if fps is not None and not 0.0 < fps <= MAX_FPS:
         raise MotionMindError(f"fps must be a positive number of frames a second, {MAX_FPS:g} at most, not {fps}")
-    body, stated = _read_body(path)
+
+
+def _to_motion(file: BvhFile, path: FilePath, clip: str, unit: str | float | None, fps: float | None) -> Motion:
+    """Return the movement of the only body in `file`; `clip` is the ending of its name."""
+    body, stated = _normalised(file, f"{name_of(path)}{clip}"), file.frame_time
     frame_time = stated if fps is None else 1.0 / fps
     if unit is None:
         name, scale = guess_unit(body.skeleton)
-        text = "%s: one unit taken as %.5g m (%s), by the height of the body"
-        _log.info(text, path, scale, name, extra={"file": path})
+        text = "%s: one unit taken as %.5g m (%s), by the %s"
+        what = "size of the hand" if is_hand(body.skeleton) else "height of the body"
+        _log.info(text, displayed_path(f"{path}{clip}"), scale, name, what, extra={"file": path})
     else:
         scale = metres_per_unit(unit)
     for message in (*body.repairs(scale), *_implausible(body, stated if fps is None else 0.0)):
-        warnings.warn(f"{path}: {message}", MotionMindWarning, stacklevel=2)
+        warnings.warn(f"{path}{clip}: {message}", MotionMindWarning, stacklevel=3)
     raw = body.skeleton
     return Motion(
         Skeleton(raw.name, raw.names, raw.parents, raw.offsets * scale, raw.tips * scale),
@@ -79,6 +107,7 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None, fps: float | No
         body.root * scale,
         np.arange(len(body.root), dtype=np.float64) * frame_time,
         name=raw.name,
+        rate=1.0 / frame_time,
     )
 
 
@@ -101,23 +130,22 @@ def _implausible(body: NormalisedRig, frame_time: float) -> Iterator[str]:
 
 def bvh_unit(path: FilePath) -> tuple[str, float]:
     """Return the unit that `read_bvh` assumes for a file if none is given: its name, and its length in metres."""
-    return guess_unit(_read_body(path)[0].skeleton)
+    return guess_unit(_normalised(read_body(path, None), name_of(path)).skeleton)
 
 
-def _read_body(path: FilePath) -> tuple[NormalisedRig, float]:
-    """Read the file in its own unit, and its seconds per frame."""
-    file = read_file(path)
-    body = normalise(assemble(file.joints, file.values, name_of(path)))
+def _normalised(file: BvhFile, name: str) -> NormalisedRig:
+    """Return the body in the file's own unit."""
+    body = normalise(assemble(file.joints, file.values, name))
     frames = len(file.values)
     if file.declared != frames:
         body.notes.append(f"the header says {file.declared} frames, the file holds {frames}; all {frames} are read")
-    return body, file.frame_time
+    return body
 
 
 # --- writing -------------------------------------------------------------------------------------------------------
 
 
-_INSERTED_LINE_END = " "  # of a frame that the engine inserted
+INSERTED_LINE_END = " "  # of a frame that the engine inserted
 
 
 def write_bvh(path: FilePath, motion: Motion, unit: str | float = "cm") -> None:
@@ -163,15 +191,15 @@ def frame_lines(motion: Motion, values: Floats, is_angle: Bools, scale: float) -
     step = even_step(motion, "BVH")
     yield f"Frames: {len(motion)}"
     yield f"Frame Time: {step:.12g}"
-    digits = _digits(scale)
+    digits = length_digits(scale)
     # Adding 0 turns -0, printed with its sign, into 0.
     rounded = np.where(is_angle, np.round(values, 6), np.round(values, digits)) + 0.0
     row = " ".join("%.6f" if angle else f"%.{digits}f" for angle in is_angle)
     for frame, inserted in zip(rounded, motion.inserted(), strict=True):
-        yield row % tuple(frame.tolist()) + (_INSERTED_LINE_END if inserted else "")
+        yield row % tuple(frame.tolist()) + (INSERTED_LINE_END if inserted else "")
 
 
-def _digits(scale: float) -> int:
+def length_digits(scale: float) -> int:
     """Return the decimals of lengths: to 1e-8 m, because rounding errors add up along a chain of bones."""
     return max(0, int(np.ceil(8.0 - np.log10(scale))))
 
@@ -183,7 +211,7 @@ def has_inserted_frames(path: FilePath) -> bool:
     """
     lines = read_lines(path)
     start = next((n for n, line in enumerate(lines, 1) if line.startswith("Frame Time:")), len(lines))
-    frames = [line.endswith(_INSERTED_LINE_END) for line in lines[start:] if line.strip()]
+    frames = [line.endswith(INSERTED_LINE_END) for line in lines[start:] if line.strip()]
     return any(frames) and not frames[0]
 
 
@@ -208,7 +236,7 @@ def _depth_first(skeleton: Skeleton) -> list[int]:
 
 def _hierarchy_lines(skeleton: Skeleton, order: list[int], scale: float) -> Iterator[str]:
     """Yield the lines below HIERARCHY, with `scale` units per metre."""
-    digits = _digits(scale)
+    digits = length_digits(scale)
 
     def offset(vector: Floats) -> str:
         return "OFFSET " + " ".join(f"{value:.{digits}f}" for value in np.round(vector * scale, digits) + 0.0)

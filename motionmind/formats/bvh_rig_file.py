@@ -11,7 +11,7 @@ from motionmind._typing import Floats
 from motionmind.body.motion import Motion
 from motionmind.errors import FormatError
 from motionmind.files import FilePath, name_of, write_atomically
-from motionmind.formats._bvh_file import assemble, read_file
+from motionmind.formats._bvh_file import assemble, read_body
 from motionmind.formats._bvh_hierarchy import BvhJoint
 from motionmind.formats._bvh_rig import normalise, resolve_places
 from motionmind.formats._rig_file import RigFile
@@ -64,7 +64,7 @@ class BvhRigFile(RigFile):
         is_angle: list[bool] = []
         for joint, one in enumerate(self.bvh_joints):
             above = held[:, one.parent] if one.parent >= 0 else np.tile(rot.IDENTITY, (len(motion), 1))
-            order = _order(one)
+            order = rotation_order(one)
             angles = self._angles(joint, len(columns), rot.inv_mul(above, wanted[:, joint]))
             if len(order) < 3:
                 held[:, joint] = rot.mul(above, rot.from_euler(order, angles)) if order else above
@@ -88,36 +88,41 @@ class BvhRigFile(RigFile):
         """
         one = self.bvh_joints[joint]
         at = [column + i for i, channel in enumerate(one.channels) if channel.endswith("ROTATION")]
-        order = _order(one)
+        order = rotation_order(one)
         first = np.zeros(3)
         first[: len(at)] = np.radians(self.first[at])
         whole = order + "".join(axis for axis in "XYZ" if axis not in order)
         return _continue_angles(rot.to_euler(whole, turns), first, whole)[:, : len(at)]
 
 
-def _order(joint: BvhJoint) -> str:
+def rotation_order(joint: BvhJoint) -> str:
     """Return the axes of a joint's rotation channels, in their order."""
     return "".join(channel[0] for channel in joint.channels if channel.endswith("ROTATION"))
 
 
 def _continue_angles(angles: Floats, first: Floats, order: str) -> Floats:
-    """Return the same rotations by Euler angles [T, 3], each nearest to the one before; the first nearest to `first`.
+    """Return the same rotations by Euler angles [T, 3], each nearest to the one before, first to `first`."""
+    out = np.empty_like(angles)
+    for frame, own in enumerate(angles):
+        first = out[frame] = nearest_angles(own, first, order)
+    return out
+
+
+def nearest_angles(angles: Floats, near: Floats, order: str) -> Floats:
+    """Return the same rotations by the Euler angles [..., 3] that are nearest to others, `near` [..., 3].
 
     Two triples of angles within a turn give the same rotation: the second has the outer ones half a turn further, and
     the middle one mirrored at a right angle. At gimbal lock only the sum of the outer ones counts, or their difference.
     """
-    other = np.stack([angles[:, 0] + np.pi, np.pi - angles[:, 1], angles[:, 2] + np.pi], axis=-1)
-    both = np.stack([angles, other], axis=1)
-    sides = np.sign(angles[:, 1]) * (1.0 if order in "XYZXY" else -1.0)
-    locked = np.cos(angles[:, 1]) < _MIN_COS_UNLOCKED
-    out = np.empty_like(angles)
-    for frame, pair in enumerate(both):
-        if locked[frame]:
-            off = _nearest_turn(pair[0, 0] + sides[frame] * (pair[0, 2] - first[2]) - first[0])
-            pair[0, [0, 2]] = first[0] + 0.5 * off, first[2] + 0.5 * sides[frame] * off
-        near = first + _nearest_turn(pair - first)
-        first = out[frame] = near[int(np.abs(near - first).sum(axis=-1).argmin())]
-    return out
+    first, middle, last = np.moveaxis(angles, -1, 0)
+    side = np.sign(middle) * (1.0 if order in "XYZXY" else -1.0)
+    off = 0.5 * _nearest_turn(first + side * (last - near[..., 2]) - near[..., 0])
+    together = np.stack([near[..., 0] + off, middle, near[..., 2] + side * off], axis=-1)
+    own = np.where((np.cos(middle) < _MIN_COS_UNLOCKED)[..., None], together, angles)
+    other = np.stack([first + np.pi, np.pi - middle, last + np.pi], axis=-1)
+    own, other = (near + _nearest_turn(one - near) for one in (own, other))
+    is_other = np.abs(other - near).sum(axis=-1) < np.abs(own - near).sum(axis=-1)
+    return np.where(is_other[..., None], other, own)
 
 
 def _nearest_turn(angles: Floats) -> Floats:
@@ -126,7 +131,11 @@ def _nearest_turn(angles: Floats) -> Floats:
 
 
 def read_bvh_rig(
-    path: FilePath, motion: Motion, frames: tuple[int, int] | None, unit: str | float | None = None
+    path: FilePath,
+    motion: Motion,
+    frames: tuple[int, int] | None,
+    unit: str | float | None = None,
+    clip: str | None = None,
 ) -> BvhRigFile:
     """Read the rig of a BVH file.
 
@@ -135,13 +144,14 @@ def read_bvh_rig(
         motion: its movement, as `read_bvh` returns it with the same unit.
         frames: those before and after the movement to come; None if they are not of this file.
         unit: as for `read_bvh`.
+        clip: as for `read_bvh`.
 
     Raises:
         FormatError: a joint has two rotation channels about one axis.
     """
-    file = read_file(path)
+    file = read_body(path, clip)
     for joint in file.joints:
-        if len(set(order := _order(joint))) < len(order):
+        if len(set(order := rotation_order(joint))) < len(order):
             fault = f"{joint.name} turns about one axis twice ({order}), which cannot be written: choose another --rig"
             raise FormatError(fault, path=path, line=joint.line)
     placed, adds = resolve_places(assemble(file.joints, file.values, name_of(path)))

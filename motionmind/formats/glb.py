@@ -103,6 +103,57 @@ def write_glb(path: FilePath, motion: Motion, *, has_root: bool = False) -> None
     write_atomically(path, container(document, bytes(buffer.data), name))
 
 
+def write_group_glb(path: FilePath, motions: Sequence[Motion]) -> None:
+    """Write the movement of several dancers as binary glTF: a skinned body for each, and one animation of all.
+
+    Args:
+        path: the file to write.
+        motions: the dancers' movement, on one clock; each has the dancer's name.
+
+    Raises:
+        MotionMindError: times are too close together for single precision, or the file cannot be written.
+    """
+    name = name_of(path)
+    buffer, meshes = GlbBuffer(), dict[int, int]()
+    document: dict[str, list[dict[str, Any]]] = {"nodes": [], "meshes": [], "materials": [], "skins": []}
+    roots, channels = list[int](), list[tuple[int, str, int]]()
+    clock = add_clock(buffer, motions[0], name)
+    for motion in motions:
+        skeleton, first = motion.skeleton, len(document["nodes"])
+        rest = at_rest(skeleton)
+        if id(skeleton) not in meshes:  # dancers of one piece share their body
+            meshes[id(skeleton)] = len(document["meshes"])
+            mesh, materials = body_mesh(skeleton, rest[0]), len(document["materials"])
+            primitives = _primitives(buffer, mesh)
+            for primitive in primitives:
+                primitive["material"] += materials
+            document["materials"] += [_material(paint) for paint in mesh.paints]
+            document["meshes"].append({"name": f"{skeleton.name} body", "primitives": primitives})
+        joints = joint_nodes(skeleton, rest[0])
+        for node in joints:
+            if "children" in node:
+                node["children"] = [first + child for child in node["children"]]
+        body = {"name": f"{motion.name} body", "mesh": meshes[id(skeleton)], "skin": len(document["skins"])}
+        roots += [first + len(joints), first + len(joints) + 1]  # skinned meshes belong at the top (3.7.3)
+        document["nodes"] += [*joints, {"name": motion.name, "children": [first]}, body]
+        numbers = list(range(first, first + len(joints)))
+        binds = buffer.add(_inverse_binds(rest))
+        skin = {"name": motion.name, "joints": numbers, "skeleton": first, "inverseBindMatrices": binds}
+        document["skins"].append(skin)
+        channels += _channels(buffer, motion, first)
+    whole = {
+        "asset": {"version": "2.0", "generator": "MotionMind"},
+        "scene": 0,
+        "scenes": [{"name": name, "nodes": roots}],
+        **document,
+        "animations": [animation(name, clock, channels)],
+        "accessors": buffer.accessors,
+        "bufferViews": buffer.views,
+        "buffers": [{"byteLength": len(buffer.data)}],
+    }
+    write_atomically(path, container(whole, bytes(buffer.data), name))
+
+
 def encode_marks(path: FilePath, motion: Motion) -> str:
     """Return JSON of MarksSchema: all that glTF cannot hold, with times from the first frame on; "{}" if nothing."""
     # A file's movement takes the file's name, but credits of given movement its own.
@@ -249,15 +300,19 @@ def _material(paint: str) -> dict[str, Any]:
 
 def animation_of(buffer: GlbBuffer, motion: Motion, name: str) -> dict[str, Any]:
     """Return an animation: a sampler and a channel for each joint's rotations, and for the root's places (3.11)."""
-    clock = add_clock(buffer, motion, name)
-    outputs = [(0, "translation", buffer.add(motion.root.astype("<f4")))]
+    return animation(name, add_clock(buffer, motion, name), _channels(buffer, motion))
+
+
+def _channels(buffer: GlbBuffer, motion: Motion, first: int = 0) -> list[tuple[int, str, int]]:
+    """Append a motion's values; return each channel's node, path and accessor, given the root's node."""
+    outputs = [(first, "translation", buffer.add(motion.root.astype("<f4")))]
     rotations = continuous(motion.rotations).swapaxes(0, 1).astype("<f4")  # [J, T, 4]
     view = buffer.view(rotations)
     outputs += [
-        (joint, "rotation", buffer.accessor(view, turns, offset=joint * turns.nbytes))
+        (first + joint, "rotation", buffer.accessor(view, turns, offset=joint * turns.nbytes))
         for joint, turns in enumerate(rotations)
     ]
-    return animation(name, clock, outputs)
+    return outputs
 
 
 def add_clock(buffer: GlbBuffer, motion: Motion, name: str) -> int:
@@ -291,9 +346,5 @@ def animation(name: str, clock: int, outputs: Sequence[tuple[int, str, int]]) ->
 
 
 def continuous(rotations: Floats) -> Floats:
-    """Return the same rotations [T, J, 4], each quaternion in the hemisphere of the one before."""
-    flips = np.sum(rotations[1:] * rotations[:-1], axis=-1, keepdims=True) < 0.0
-    signs = np.cumprod(np.where(flips, -1.0, 1.0), axis=0)
-    first = rot.canonical(rotations[:1])
-    signs *= np.where(np.sum(first * rotations[:1], axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
-    return np.concatenate([first, rotations[1:] * signs])
+    """Return rotations [T, J, 4] by quaternions that begin canonical and stay in the hemisphere of the one before."""
+    return rot.continuous(np.concatenate([rot.canonical(rotations[:1]), rotations[1:]]))

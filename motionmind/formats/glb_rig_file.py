@@ -136,18 +136,23 @@ class GlbRigFile(RigFile):
 
 
 def read_glb_rig(
-    path: FilePath, motion: Motion, frames: tuple[int, int] | None, unit: str | float | None = None
+    path: FilePath,
+    motion: Motion,
+    frames: tuple[int, int] | None,
+    unit: str | float | None = None,
+    clip: str | None = None,
 ) -> GlbRigFile:
     """Read the rig of a glTF file.
 
     Args:
         path: the file.
-        motion: its movement, as `read_gltf` returns it with the same unit.
+        motion: its movement, as `read_gltf` returns it with the same unit and clip.
         frames: those before and after the movement to come; None if they are not of this file.
         unit: as for `read_gltf`.
+        clip: as for `read_gltf`.
     """
     gltf = read_container(path)
-    body = find_body(gltf)
+    body = find_body(gltf, clip)
     rows = gltf.document.nodes
     nodes = lineage(body.parents, body.joints)
     number = {node: bone for bone, node in enumerate(nodes)}
@@ -202,20 +207,25 @@ def _take_buffers(gltf: Gltf, document: dict[str, Any]) -> GlbBuffer:
         FormatError: a view is in no buffer, or a buffer cannot be read.
     """
     data, starts = bytearray(), {}
+    found: dict[int, int] = {}  # where the bytes of a buffer lie, by their identity: buffers may be one file
     buffers = document.get("buffers", [])
     for index, one in enumerate(buffers):
         if index == 0 or "uri" in one:  # others have data of extensions only
-            data += b"\0" * (-len(data) % 4)
-            starts[index] = len(data)
-            data += gltf.buffer(index)
+            whole = gltf.buffer(index)
+            if id(whole) not in found:
+                data += b"\0" * (-len(data) % 4)
+                found[id(whole)] = len(data)
+                data += whole
+            starts[index] = found[id(whole)]
     kept = [index for index in range(len(buffers)) if index not in starts]
+    number = {index: place for place, index in enumerate(kept, start=1)}
     views = document.get("bufferViews", [])
     for view in views:
         for one in (view, *view.get("extensions", {}).values()):
             held, offset = (one.get("buffer"), one.get("byteOffset", 0)) if isinstance(one, dict) else (None, 0)
             if isinstance(held, int) and isinstance(offset, int):
                 gltf.member(buffers, held, "buffer view: buffer")
-                one["buffer"] = 0 if held in starts else 1 + kept.index(held)
+                one["buffer"] = number.get(held, 0)
                 one["byteOffset"] = offset + starts.get(held, 0)
     document["buffers"] = [{}, *(buffers[index] for index in kept)]
     return GlbBuffer(bytes(data), views, document.get("accessors", []))
@@ -223,6 +233,7 @@ def _take_buffers(gltf: Gltf, document: dict[str, Any]) -> GlbBuffer:
 
 def _take_pictures(gltf: Gltf, document: dict[str, Any], buffer: GlbBuffer) -> None:
     """Append pictures that lie beside a file, or in its text, to its buffer; change the document."""
+    found: dict[bytes, int] = {}  # the view of each picture; several may be one file
     for image in document.get("images", []):
         if (uri := image.pop("uri", None)) is None:
             continue
@@ -231,5 +242,7 @@ def _take_pictures(gltf: Gltf, document: dict[str, Any], buffer: GlbBuffer) -> N
         if (kind := next(kinds, None)) is None and "mimeType" not in image:
             raise gltf.fault(f"picture {uri[:40]!r} is neither PNG, JPEG, WebP nor KTX 2")
         image["mimeType"] = kind or image["mimeType"]
-        image["bufferView"] = buffer.view(np.frombuffer(picture + b"\0" * (-len(picture) % 4), dtype=np.uint8))
-        buffer.views[-1]["byteLength"] = len(picture)
+        if picture not in found:
+            found[picture] = buffer.view(np.frombuffer(picture + b"\0" * (-len(picture) % 4), dtype=np.uint8))
+            buffer.views[-1]["byteLength"] = len(picture)
+        image["bufferView"] = found[picture]

@@ -11,30 +11,35 @@ the movement, the pose of zero rotations.
 
 from __future__ import annotations
 
+import shlex
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import msgspec
 import numpy as np
+from networkx.utils import UnionFind
 
 from motionmind._typing import Floats
 from motionmind.body.human import BODIES
 from motionmind.body.motion import Motion
-from motionmind.body.rates import FILM_FPS, check_size
+from motionmind.body.rates import FILM_FPS, MAX_POSITIONS, check_size
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindWarning, enumerated
 from motionmind.files import FilePath, name_of
 from motionmind.formats import _json
 from motionmind.formats._bvh_rig import NormalisedRig, Placed, normalise
-from motionmind.formats._gltf import Animation, Gltf, Humanoid, read_container
+from motionmind.formats._gltf import Gltf, Humanoid, read_container
+from motionmind.formats._gltf_clips import Clips, find_clips, tracks_of
 from motionmind.formats._gltf_poses import (
-    PATH_TYPES,
     SAME_KEY_S,
-    Track,
     Tracks,
     globals_at,
     heading_of,
     lineage,
+    parent_rows,
     rest_pose,
     skeleton_at,
 )
@@ -44,24 +49,27 @@ from motionmind.formats.units import bone_span, metres_per_unit
 from motionmind.geometry import rotations as rot
 
 _CURVE_FPS = 30.0  # of curves and jumps, unless the file has a faster even clock
+_MIN_CLIP_FRAMES = 30  # a shorter clip takes as long to read
 
 
-def read_gltf(path: FilePath, *, unit: str | float | None = None) -> Motion:
+def read_gltf(path: FilePath, *, clip: str | None = None, unit: str | float | None = None) -> Motion:
     """Read a motion from glTF, on the file's own bones; a file without animation is a posture, one frame.
 
     There is a frame at each key, or at each tick of the even clock that the keys lie on; curves and jumps between keys
-    are sampled at the clock's rate or 30 frames a second. If there are several animations, the first that moves the
-    body is read, with a warning. MotionMind's own files come back whole, marks of insertions included.
+    are sampled at the clock's rate or 30 frames a second. If there are several animations and none is named, the first
+    that moves the body is read, with a warning; but animations of one node each, equally long, are one movement.
+    MotionMind's own files come back whole, marks of insertions included.
 
     Args:
-        path: the file; its stem becomes the motion's name.
+        path: the file; its stem becomes the motion's name, and "stem#clip" with a clip.
+        clip: the animation to read, by its name or its number from 1; None for the usual one.
         unit: a name in `UNITS`, or metres in one unit of the file; None takes metres, as glTF defines.
 
     Returns:
         The motion, in metres and seconds, starting at time 0.
 
     Raises:
-        FormatError: the file does not exist, is not glTF 2, holds no body, or compresses its movement.
+        FormatError: the file does not exist, is not glTF 2, holds no body or no such clip, or compresses its movement.
         MotionMindError: `unit` is invalid, or there are too many frames.
 
     Warns:
@@ -69,11 +77,72 @@ def read_gltf(path: FilePath, *, unit: str | float | None = None) -> Motion:
     """
     scale = 1.0 if unit is None else metres_per_unit(unit)
     gltf = read_container(path)
+    with _as_faults(gltf):
+        body = find_body(gltf, clip)
+        if clip is None and (others := body.others):
+            message = (
+                f"{path}: the first animation that moves is read, not {enumerated(others)}; name another, as "
+                f"{shlex.quote(f'{path}#{others[0]}')}"
+            )
+            warnings.warn(message, MotionMindWarning, 3)
+        if clip is None:
+            _report(body)
+        return _read(body, scale, None if clip is None else body.clips.names[body.clips.chosen[0]])
+
+
+def read_gltf_clips(path: FilePath, *, unit: str | float | None = None) -> Iterator[Motion]:
+    """Read all clips of a glTF file that move the body, poses included, as `read_gltf` reads one.
+
+    If there are several, each has a name of the form "stem#clip".
+
+    Raises:
+        FormatError: as of `read_gltf`, or the clips have more frames than the file's size explains.
+    """
+    scale = 1.0 if unit is None else metres_per_unit(unit)
+    gltf = read_container(path)
+    with _as_faults(gltf):
+        body = find_body(gltf)
+        _report(body)
+    if not body.clips.are_several:
+        with _as_faults(gltf):
+            yield _read(body, scale, None)
+        return
+    played = [replace(body.clips, chosen=(number,)) for number in body.clips.moving]
+    positions = 0
+    for clips in played:
+        with _as_faults(gltf):
+            positions += max(len(replace(body, clips=clips).times), _MIN_CLIP_FRAMES) * len(body.joints)
+        # Clips may share numbers, so that a small file could hold hours.
+        if positions > max(MAX_POSITIONS, gltf.size):
+            raise gltf.fault(f"its {len(played)} clips are too long to be read together: name those to read")
+    for clips in played:
+        with _as_faults(gltf):
+            yield _read(replace(body, clips=clips), scale, body.clips.names[clips.chosen[0]])
+
+
+@contextmanager
+def _as_faults(gltf: Gltf) -> Iterator[None]:
+    """Turn numbers that overflow, and values that make no rotation, into FormatErrors of a file."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            return _read(gltf, scale)
+            yield
     except (FormatError, ValueError) as error:
         raise error if isinstance(error, FormatError) else gltf.fault(f"not movement: {error}") from error
+
+
+def _report(body: GltfBody) -> None:
+    """Warn if animations are read as one movement, or move other bodies."""
+    clips = body.clips
+    if len(clips.chosen) > 1:
+        message = (
+            f"{body.gltf.path}: {len(clips.chosen)} animations of one node each, equally long, are read as one "
+            f"movement: {enumerated(clips.names[one] for one in clips.chosen)}"
+        )
+        warnings.warn(message, MotionMindWarning, 4)
+    if clips.apart:
+        others = enumerated(clips.names[one] for one in clips.apart)
+        message = f"{body.gltf.path}: animations of another body are not read: {others}; name one to read it"
+        warnings.warn(message, MotionMindWarning, 4)
 
 
 @dataclass(frozen=True)
@@ -86,9 +155,7 @@ class GltfBody:
         joints: the body's nodes [J], each after its parent.
         names: their names, no two alike.
         skin: name of the skin, "" for none.
-        tracks: the tracks of all nodes that the animation of the body moves.
-        others: names of the animations that are not read.
-        times: times of the frames [T], seconds: the keys of the joints and of the nodes above them.
+        clips: the animations that move the body.
         rest_turns: orientations of the joints at rest, without the heading of the nodes above [J, 4].
         rest: their places at rest [J, 3].
     """
@@ -98,60 +165,75 @@ class GltfBody:
     joints: list[int]
     names: tuple[str, ...]
     skin: str
-    tracks: Tracks
-    others: list[str]
-    times: Floats
+    clips: Clips
     rest_turns: Floats
     rest: Floats
 
+    @property
+    def others(self) -> list[str]:
+        """Names of the clips that are not read."""
+        chosen = set(self.clips.chosen)
+        return [self.clips.names[one] for one in self.clips.moving if one not in chosen]
 
-def find_body(gltf: Gltf) -> GltfBody:
-    """Find the body in a file; FormatError if there is none."""
+    @cached_property
+    def tracks(self) -> Tracks:
+        """The tracks of all nodes that the chosen animations move."""
+        animations = self.gltf.document.animations
+        return {key: track for one in self.clips.chosen for key, track in tracks_of(self.gltf, animations[one]).items()}
+
+    @cached_property
+    def times(self) -> Floats:
+        """Times of the frames [T], seconds: the keys of the joints and of the nodes above them."""
+        movers = set(lineage(self.parents, self.joints))
+        tracks = {key: track for key, track in self.tracks.items() if key[0] in movers}
+        # The root's place counts as one more, and nodes above the joints cost as much as joints.
+        return _clock(tracks, len(movers) + 1, str(self.gltf.path))
+
+
+def find_body(gltf: Gltf, clip: str | None = None) -> GltfBody:
+    """Find the body in a file, and the clip of this name, or the usual one; FormatError if there is none."""
     parents = _parents(gltf)
     names, skins = _bone_names(gltf), _skins(gltf)
     is_person = bool(names)
     carriers = set(names) or {node for _, joints in skins for node in joints}
-    tracks, others = _find_tracks(gltf, set(lineage(parents, carriers)))
-    joints, skin_name = _find_joints(gltf, parents, names, skins, {node for node, path in tracks if path == "rotation"})
+    clips = find_clips(gltf, parents, set(lineage(parents, carriers)), clip)
+    joints, skin_name = _find_joints(gltf, parents, names, skins, set(clips.turned))
     for node, name in enumerate(gltf.document.nodes):
         names.setdefault(node, name.name or f"node {node}")
-    movers = set(lineage(parents, joints))
-    times = _clock({key: track for key, track in tracks.items() if key[0] in movers}, len(joints), str(gltf.path))
     called = _distinct([names[node] for node in joints])
     rest_turns, rest = rest_pose(gltf, parents, joints, None if is_person else called)
     heading = heading_of(gltf, parents, joints[0])
     rest_turns, rest = rot.inv_mul(heading, rest_turns), rot.mul_vec(rot.inv(heading), rest)
-    return GltfBody(gltf, parents, joints, called, skin_name, tracks, others, times, rest_turns, rest)
+    return GltfBody(gltf, parents, joints, called, skin_name, clips, rest_turns, rest)
 
 
-def _read(gltf: Gltf, scale: float) -> Motion:
-    """Read the motion; lengths are in units of `scale` metres."""
-    body = find_body(gltf)
-    joints, times = body.joints, body.times
+def _read(body: GltfBody, scale: float, clip: str | None) -> Motion:
+    """Read the motion; lengths are in units of `scale` metres, and `clip` is the name of its clip, if it needs one."""
+    gltf, joints, times = body.gltf, body.joints, body.times
     turns, places = globals_at(gltf, body.parents, joints, body.tracks, times)
     for what, array in (("rest pose", body.rest), ("movement", places)):
         if not np.all(np.abs(array) <= MAX_NUMBER):
             raise gltf.fault(f"its {what} reaches beyond {MAX_NUMBER:g} m")
-    if body.others:
-        warnings.warn(
-            f"{gltf.path}: the first animation that moves is read, not {enumerated(body.others)}", MotionMindWarning, 5
-        )
-    above = [joints.index(body.parents[node]) if i else -1 for i, node in enumerate(joints)]
-    skeleton = skeleton_at(body.skin or name_of(gltf.path), body.names, above, body.rest)
+    stem = name_of(gltf.path)
+    skeleton = skeleton_at(body.skin or stem, body.names, parent_rows(body.parents, joints), body.rest)
     turned = rot.mul_inv(turns, body.rest_turns)
     rig = _placed(skeleton, turned, places)
     for message in rig.repairs(scale):
-        warnings.warn(f"{gltf.path}: {message}", MotionMindWarning, 5)
+        warnings.warn(f"{gltf.path}{'' if clip is None else '#' + clip}: {message}", MotionMindWarning, 4)
     marks = _marks(gltf)
     tipped = _with_tips(rig.skeleton, marks, scale)
+    if body.clips.chosen != body.clips.usual:
+        marks = MarksSchema()  # they belong to the movement that was written, which comes first
+    known = frozenset(tipped.names)
     return Motion(
         tipped,
         rot.normalise(rig.rotations),
         rig.root * scale,
         times - times[0],
-        name=name_of(gltf.path),
+        name=stem if clip is None else f"{stem}#{clip}",
         insertions=tuple(
-            one.renamed({name: name for name in tipped.names}) for one in map(_json.to_insertion, marks.insertions)
+            replace(one, bridged=tuple(pair for pair in one.bridged if pair[0] in known))
+            for one in map(_json.to_insertion, marks.insertions)
         ),
         keyframed=marks.keyframed,
         recorded=tuple(marks.recorded),
@@ -202,13 +284,13 @@ def _find_joints(
         name, wanted = skins[0]
         if left := [skin or "a skin without a name" for skin, _ in skins[1:]]:
             message = f"{gltf.path}: {name or 'the largest skin'} is read, not {enumerated(left)}"
-            warnings.warn(message, MotionMindWarning, 7)
+            warnings.warn(message, MotionMindWarning, 5)
     wanted = wanted or moving
     if not wanted:
         raise gltf.fault("nothing moves: there is no skin, no person's bone and no animation of nodes")
-    if len(wanted) > MAX_JOINTS:
-        raise gltf.fault(f"{len(wanted)} joints are more than a body has, {MAX_JOINTS}")
     line = lineage(parents, wanted)
+    if len(line) > MAX_JOINTS:
+        raise gltf.fault(f"{len(line)} joints and nodes above them are more than a body has, {MAX_JOINTS}")
     tops = [node for node in line if parents[node] < 0]
     if len(tops) > 1:
         raise gltf.fault(f"its joints have {len(tops)} roots; a body has one")
@@ -217,107 +299,45 @@ def _find_joints(
     for node in line[1:]:
         below[parents[node]] += 1
     top = next(node for node in line if node in wanted or below[node] > 1)
-    joints = line[line.index(top) :]
-    if len(joints) > MAX_JOINTS:
-        raise gltf.fault(f"{len(joints)} joints are more than a body has, {MAX_JOINTS}")
-    return joints, name
+    return line[line.index(top) :], name
 
 
 def _skins(gltf: Gltf) -> list[tuple[str, set[int]]]:
     """Return the names and joints of bodies, the largest first; skins that share joints belong to one body."""
-    groups: list[tuple[str, set[int]]] = []
+    bodies: UnionFind[int] = UnionFind()
     for number, skin in enumerate(gltf.document.skins):
         for node in skin.joints:
             gltf.member(gltf.document.nodes, node, f"skin {number}: joint")
-        joints = set(skin.joints)
-        near = [group for group in groups if group[1] & joints]
-        name = near[0][0] if near else skin.name
-        groups = [group for group in groups if group not in near]
-        groups.append((name, joints.union(*(group[1] for group in near))))
-    return sorted((group for group in groups if group[1]), key=lambda group: -len(group[1]))
+        bodies.union(*skin.joints)
+    groups: dict[int, tuple[str, set[int]]] = {}
+    for skin in gltf.document.skins:
+        if skin.joints:
+            groups.setdefault(bodies[skin.joints[0]], (skin.name, set()))[1].update(skin.joints)
+    return sorted(groups.values(), key=lambda group: -len(group[1]))
 
 
 def _distinct(names: list[str]) -> tuple[str, ...]:
     """Make names unique by appending numbers to repeated ones."""
-    found: dict[str, None] = {}
+    found: dict[str, int] = {}  # with the last number appended
     for name in names:
-        unique, number = name, 1
+        unique, number = name, found.get(name, 1)
         while unique in found:
             number += 1
             unique = f"{name} {number}"
-        found[unique] = None
+        found[name] = number
+        found.setdefault(unique, 1)
     return tuple(found)
 
 
 # --- the movement ---------------------------------------------------------------------------------------------------
 
 
-def _find_tracks(gltf: Gltf, body: set[int]) -> tuple[Tracks, list[str]]:
-    """Return the tracks of the first animation that moves nodes of `body`, and the other animations' names.
-
-    If `body` is empty, any nodes count. Animations of one key are poses, read only if there is nothing else. Several
-    animations of one node each make up one movement.
-    """
-    animations = [
-        one
-        for one in gltf.document.animations
-        if any(
-            channel.target.path in PATH_TYPES and (channel.target.node in body or not body) for channel in one.channels
-        )
-    ]
-    animations.sort(key=lambda one: _is_pose(gltf, one))  # keeps their order otherwise
-    moving = [one for one in animations if not _is_pose(gltf, one)]
-    targets = [(channel.target.node, channel.target.path) for one in moving for channel in one.channels]
-    if (
-        len(moving) > 1
-        and len({*targets}) == len(targets)
-        and all(len({channel.target.node for channel in one.channels}) == 1 for one in moving)
-    ):
-        return {key: track for one in moving for key, track in _tracks(gltf, one).items()}, []
-    names = [one.name or "one without a name" for one in animations[1:]]
-    return (_tracks(gltf, animations[0]) if animations else {}), names
-
-
-def _is_pose(gltf: Gltf, animation: Animation) -> bool:
-    """Return whether an animation has only one key."""
-    rows = gltf.document.accessors
-    return all(not 0 <= one.input < len(rows) or rows[one.input].count <= 1 for one in animation.samplers)
-
-
-def _tracks(gltf: Gltf, animation: Animation) -> Tracks:
-    """Return the tracks of an animation."""
-    found: Tracks = {}
-    for number, channel in enumerate(animation.channels):
-        node, path = channel.target.node, channel.target.path
-        if node is None or path not in PATH_TYPES:
-            continue
-        what = f"animation {animation.name or 'without a name'}, channel {number}"
-        gltf.member(gltf.document.nodes, node, f"{what}: node")
-        sampler = gltf.member(animation.samplers, channel.sampler, f"{what}: sampler")
-        times = gltf.numbers(sampler.input, "SCALAR", what)[:, 0]
-        values = gltf.numbers(sampler.output, PATH_TYPES[path], what)
-        if sampler.interpolation not in ("LINEAR", "STEP", "CUBICSPLINE"):
-            raise gltf.fault(f"{what}: interpolation {sampler.interpolation!r} is unknown")
-        if np.any(np.diff(times) <= 0.0):
-            raise gltf.fault(f"{what}: its times do not increase")
-        curve = sampler.interpolation == "CUBICSPLINE"
-        if len(values) != len(times) * (3 if curve else 1):
-            raise gltf.fault(f"{what}: {len(values)} values for {len(times)} times")
-        values = values.reshape(len(times), 3, -1) if curve else values
-        if path == "rotation":
-            keys = values[:, 1] if curve else values
-            if not np.all(rot.norm(keys) > 1e-5):
-                raise gltf.fault(f"{what}: a rotation is zero")
-            values = values if curve else rot.normalise(values)
-        found[node, path] = Track(times, values, sampler.interpolation)
-    return found
-
-
 def _clock(tracks: Tracks, joints: int, name: str) -> Floats:
     """Return the times of frames [T], seconds: those of the keys, on an even clock if they lie on one."""
     if not tracks:
         return np.zeros(1)
-    times = np.unique(np.concatenate([track.times for track in tracks.values()]))
+    shared = {id(track): track for track in tracks.values()}.values()
+    times = np.unique(np.concatenate([track.times for track in shared]))
     times = times[np.concatenate([[True], np.diff(times) > max(SAME_KEY_S, 1e-6 * float(np.abs(times).max()))])]
     check_size(len(times), joints, name)
     if len(times) == 1:
@@ -331,7 +351,7 @@ def _clock(tracks: Tracks, joints: int, name: str) -> Floats:
     rate = frames[-1] / span if even else _CURVE_FPS
     if abs(round(rate, 2) - rate) < 1e-5 * rate:
         rate = round(rate, 2)  # times have seven digits
-    if all(track.kind == "LINEAR" or len(track.times) == 1 for track in tracks.values()):
+    if all(track.kind == "LINEAR" or len(track.times) == 1 for track in shared):
         return np.asarray(times[0] + np.arange(frames[-1] + 1) / rate if even else times)
     if rate < FILM_FPS:
         rate *= float(np.ceil(_CURVE_FPS / rate))

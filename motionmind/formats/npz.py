@@ -1,5 +1,7 @@
 """Reads and writes AMASS's `.npz`: movement on SMPL's joints, the usual form in human movement data sets and models.
 
+Kimodo's `.npz` is read, too (`motionmind.formats._kimodo`).
+
 Mahmood, Ghorbani, Troje, Pons-Moll and Black, "AMASS: Archive of Motion Capture as Surface Shapes", ICCV (2019). A file
 holds numpy arrays; those of movement are
 
@@ -24,21 +26,22 @@ from __future__ import annotations
 
 import io
 import logging
-import math
 import warnings
 import zipfile
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
 from motionmind.body.rates import MAX_FPS, MAX_POSITIONS
 from motionmind.body.skeleton import Skeleton
+from motionmind.display import displayed_path
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.files import FilePath, name_of, read_bytes, write_atomically
 from motionmind.formats._clock import even_step
+from motionmind.formats._kimodo import KIMODO_ARRAYS, KIMODO_FPS, from_kimodo
+from motionmind.formats._npy import read_array
 from motionmind.formats._smpl import smpl_bodies, to_smpl
 from motionmind.formats._smpl_parts import ARRAY_NAMES, gather_poses
 from motionmind.formats.text import MAX_NUMBER
@@ -48,7 +51,7 @@ from motionmind.retarget.vertical import Z_UP_TO_Y_UP, find_vertical
 
 _RATE_NAMES = ("mocap_framerate", "mocap_frame_rate", "fps", "frame_rate", "framerate")
 
-# Two hours at 120 frames per second. A compressed array that claims more is meant to exhaust memory.
+# Two hours at 120 frames per second. Compressed arrays that claim more are meant to exhaust memory.
 _MAX_ARRAY_BYTES = 2**30
 
 _log = logging.getLogger(__name__)
@@ -57,32 +60,35 @@ _log = logging.getLogger(__name__)
 def read_npz(
     path: FilePath, *, fps: float | None = None, up: str | None = None, unit: str | float | None = None
 ) -> Motion:
-    """Read a motion from an AMASS file, on SMPL's joints, placed as in human44.
+    """Read a motion from an AMASS file, on SMPL's joints, placed as in human44; or from Kimodo's, on its own joints.
 
     `to_human23` maps these joints; `write_npz` restores the same orientations and places. A log entry warns that the
     body's shape is not read (logger "motionmind.formats.npz", level INFO).
 
     Args:
         path: the file; its stem becomes the motion's name.
-        fps: frames per second in place of the file's.
-        up: "y" or "z", the vertical in the file; None takes z, unless the movement stands along y.
-        unit: of the body's place, a name in `UNITS`, or metres in one unit; None takes metres.
+        fps: frames per second in place of the file's, or of 30 for Kimodo's.
+        up: "y" or "z", the vertical in the file; None takes z, unless the movement stands along y, and y for Kimodo's.
+        unit: of the body's place, and all lengths of Kimodo's: a name in `UNITS`, or metres in one unit; None takes
+            metres.
 
     Returns:
         The motion, in metres and seconds, y up.
 
     Raises:
-        FormatError: the file does not exist, or is not an AMASS file; the message names the array.
+        FormatError: the file does not exist, or is neither an AMASS file nor Kimodo's; the message names the array.
 
     Warns:
-        MotionMindWarning: it is doubtful which axis is up, or the body is far above or below 0.
+        MotionMindWarning: it is doubtful which axis is up, the body is far above or below 0, or joints stray.
     """
     arrays = _read_arrays(path)
+    if KIMODO_ARRAYS[0] in arrays:
+        return _read_kimodo(arrays, path, fps, up, unit)
     poses, trans = gather_poses(arrays, path)
     skeleton = next(body for body in smpl_bodies().values() if poses.shape[1:] == (3 * len(body),))
     trans = trans * (1.0 if unit is None else metres_per_unit(unit))
     rate = _rate(arrays, fps, path)
-    _log.info("%s: joints stand where human44's do; the file's body shape (betas) is not read", path)
+    _log.info("%s: joints stand where human44's do; the file's body shape (betas) is not read", displayed_path(path))
     vectors = poses.reshape(len(poses), -1, 3)
     if (longest := float(np.median(rot.norm(vectors).max(axis=1)))) > 20.0:  # radians
         raise FormatError(f"'poses' turns by {longest:.3g} radians: are these degrees?", path=path)
@@ -94,7 +100,20 @@ def read_npz(
         message = f"{path}: the body is {height:.0f} m off 0; is its place in centimetres (--unit cm)?"
         warnings.warn(message, MotionMindWarning, stacklevel=2)
     times = np.arange(len(poses), dtype=np.float64) / rate
-    return Motion(skeleton, rot.normalise(rotations), trans, times, name=name_of(path))
+    return Motion(skeleton, rot.normalise(rotations), trans, times, name=name_of(path), rate=rate)
+
+
+def _read_kimodo(
+    arrays: dict[str, Floats], path: FilePath, fps: float | None, up: str | None, unit: str | float | None
+) -> Motion:
+    """Build the motion from Kimodo's arrays; arguments are those of `read_npz`."""
+    scale = 1.0 if unit is None else metres_per_unit(unit)
+    skeleton, rotations, root = from_kimodo({**arrays, "posed_joints": scale * arrays["posed_joints"]}, path)
+    rate = _rate({_RATE_NAMES[-1]: np.array(KIMODO_FPS), **arrays}, fps, path)
+    if up == "z":
+        rotations[:, 0], root = rot.mul(Z_UP_TO_Y_UP, rotations[:, 0]), rot.mul_vec(Z_UP_TO_Y_UP, root)
+    times = np.arange(len(root), dtype=np.float64) / rate
+    return Motion(skeleton, rot.normalise(rotations), root, times, name=name_of(path), rate=rate)
 
 
 def write_npz(path: FilePath, motion: Motion) -> None:
@@ -139,58 +158,36 @@ def _read_arrays(path: FilePath) -> dict[str, Floats]:
     data = read_bytes(path)
     if not data.startswith(b"PK"):
         raise FormatError("not an .npz file, which is a zip of numpy arrays", path=path)
-    name = ""
+    name, left = "", max_array_bytes(len(data))
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as file:
-            members = file.zip.NameToInfo
-            whole = "poses" in file  # AMASS's SMPL-X has its parts, too
-            for name in (*(("poses", "trans") if whole else ARRAY_NAMES), *_RATE_NAMES):
-                if name in file:
-                    _check_claim(file.zip, members.get(name) or members[f"{name}.npy"], name, len(data), path)
-                    found[name] = checked_numbers(file[name], repr(name), path)
+        with zipfile.ZipFile(io.BytesIO(data)) as file:
+            members = {member.filename.removesuffix(".npy"): member for member in file.infolist()}
+            wholes = (("poses", "trans"), KIMODO_ARRAYS)  # AMASS's SMPL-X has its parts, too
+            names = next((whole for whole in wholes if whole[0] in members), ARRAY_NAMES)
+            for name in (*names, *_RATE_NAMES):
+                if name in members:
+                    found[name] = _read_member(file, members[name], left, path)
+                    left -= found[name].nbytes
     except FormatError:
         raise
-    except Exception as error:  # zipfile's, zlib's, lzma's, numpy's and its parser's errors, two dozen classes
+    except Exception as error:  # zipfile's and zlib's errors, a dozen classes
         what = f"{name!r} cannot be read" if name else "cannot be read"
         raise FormatError(f"{what}: {in_one_line(error)}", path=path) from error
     return found
 
 
-def _check_claim(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str, size: int, path: FilePath) -> None:
-    """Raise FormatError before unpacking if an array claims too much for a file of `size` bytes.
-
-    Unpacking never exceeds the claim: zipfile ends a member at its size, numpy an array at its shape.
-    """
+def _read_member(archive: zipfile.ZipFile, member: zipfile.ZipInfo, max_bytes: int, path: FilePath) -> Floats:
+    """Read an array from an archive; no more is unpacked than the array may take."""
+    name = repr(member.filename.removesuffix(".npy"))
+    if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):  # others may claim gigabytes to unpack
+        raise FormatError(f"{name} cannot be read: compressed otherwise than numpy does", path=path)
     with archive.open(member) as stream:
-        check_array(stream, size, repr(name), path)
-    if member.file_size > 2 * _max_array_bytes(size):
-        raise FormatError(f"{name!r} is too large to be movement", path=path)
+        return read_array(stream, max_bytes, name, path)
 
 
-def check_array(stream: IO[bytes], size: int, what: str, path: FilePath) -> None:
-    """Raise FormatError if an array's header claims too much for a file of `size` bytes."""
-    version = np.lib.format.read_magic(stream)
-    read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, _, _ = read_header(stream)
-    if 8 * math.prod(shape) > _max_array_bytes(size):
-        raise FormatError(f"{what} is too large to be movement: {list(shape)}", path=path)
-
-
-def _max_array_bytes(size: int) -> int:
-    """Return the bytes allowed for an array: twice the file's `size` or the largest motion's, up to a limit."""
+def max_array_bytes(size: int) -> int:
+    """Return the bytes allowed for all arrays: twice the file's `size` or the largest motion's, up to a limit."""
     return min(max(24 * MAX_POSITIONS, 2 * size), _MAX_ARRAY_BYTES)
-
-
-def checked_numbers(array: NDArray[np.generic], what: str, path: FilePath) -> Floats:
-    """Return the array as floats; FormatError names an element that is not a number in range."""
-    if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
-        raise FormatError(f"{what} holds no numbers", path=path)
-    numbers = array.astype(np.float64, copy=False)
-    bad = np.argwhere(~(np.abs(numbers) <= MAX_NUMBER))  # NaN too
-    if len(bad):
-        value = numbers[tuple(bad[0])]
-        raise FormatError(f"{what}{bad[0].tolist()} is {value:g}, not a place or an angle", path=path)
-    return numbers
 
 
 def _vertical(skeleton: Skeleton, rotations: Floats, root: Floats, path: FilePath) -> str:
@@ -214,7 +211,7 @@ def _rate(arrays: dict[str, Floats], fps: float | None, path: FilePath) -> float
     name = "fps" if fps is not None else next((name for name in _RATE_NAMES if name in arrays), None)
     if name is None:
         raise FormatError(f"no array {_RATE_NAMES[0]!r}: give the frames per second (--source-fps, or fps=)", path=path)
-    rate = arrays.get(name, np.array(fps, dtype=np.float64))
+    rate = arrays[name] if fps is None else np.array(fps, dtype=np.float64)
     if rate.size != 1 or not 1.0 / MAX_NUMBER <= rate.item() <= MAX_FPS:
         raise FormatError(f"{name!r} must be one number of frames per second, not {in_one_line(rate)}", path=path)
     return float(rate.item())

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from motionmind.body.motion import Motion
+from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath
 from motionmind.formats.units import metres_per_unit
@@ -114,4 +115,4 @@ def note_settings(path: FilePath, motion: Motion, unit: str | float, remedy: str
     if len(motion) > 1 and abs(motion.fps / PROGRAMS["blender"].fps - 1.0) > 1e-6:
         settings.append("tick Update Scene FPS")
     if settings:
-        _log.info("%s: in Blender's import, %s%s", path, " and ".join(settings), remedy)
+        _log.info("%s: in Blender's import, %s%s", displayed_path(path), " and ".join(settings), remedy)

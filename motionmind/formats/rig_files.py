@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from motionmind.body.motion import Motion
+from motionmind.clip_names import split_clip
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.files import FilePath
 from motionmind.formats import read_motion, write_motion
@@ -32,7 +33,7 @@ def read_rig(
     """Read the rig of a file.
 
     Args:
-        path: a file in `RIG_SUFFIXES`.
+        path: a file in `RIG_SUFFIXES`; hero.glb#Walk names the clip with the frames.
         frames: its frames before and after movement to come, counted from 0, which that movement then meets in every
             bone; None if that movement begins and ends elsewhere: bones that it does not know then stay as in frame 0.
         motion: the file's movement, as `read_motion` returns it, if known.
@@ -46,10 +47,11 @@ def read_rig(
     Warns:
         MotionMindWarning: as `to_human23`, if `frames` is None: retargeting the frames has warned.
     """
+    named, (path, clip) = path, split_clip(path)
     suffix = Path(path).suffix.lower()
     if suffix not in RIG_SUFFIXES:
         raise FormatError(f"no rig to write on: it must end in one of {', '.join(RIG_SUFFIXES)}", path=path)
-    motion = motion or read_motion(path, unit=unit)
+    motion = motion or read_motion(named, unit=unit)
     for frame in frames or ():
         motion.posture(frame)  # raises if there is none
     if frames is None and joint_mapping(motion.skeleton, joints):
@@ -59,11 +61,11 @@ def read_rig(
     if suffix == ".bvh":
         from motionmind.formats.bvh_rig_file import read_bvh_rig
 
-        rig = read_bvh_rig(path, motion, frames, unit)
+        rig = read_bvh_rig(path, motion, frames, unit, clip)
     else:
         from motionmind.formats.glb_rig_file import read_glb_rig
 
-        rig = read_glb_rig(path, motion, frames, unit)
+        rig = read_glb_rig(path, motion, frames, unit, clip)
     return replace(rig, armature=replace(rig.armature, mapping=joints, up=up))
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from motionmind._typing import Floats, Indices
+from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.anatomy import SIDES
 from motionmind.body.human import human23
 from motionmind.body.skeleton import Skeleton
@@ -51,8 +51,24 @@ def metres_per_unit(unit: str | float) -> float:
     return scale
 
 
+_HAND_SPAN_M = 0.31  # longest path along a hand's bones: human44's, from thumb to fingertip
+_FINGER_WORDS = ("thumb", "index", "middle", "ring", "pinky", "pinkie", "little", "finger")
+_MAX_PALM_JOINTS = 8  # joints of hands that belong to no finger: forearm, wrist and palm of both
+
+
+def is_hand(skeleton: Skeleton) -> bool:
+    """Return whether most joints of a skeleton are named for fingers: a hand alone, or two, without a body."""
+    fingers = int(_fingers(skeleton).sum())
+    return len(skeleton) - fingers <= min(fingers, _MAX_PALM_JOINTS)
+
+
+def _fingers(skeleton: Skeleton) -> Bools:
+    """Return whether each joint is named for a finger [J]."""
+    return np.array([any(word in name.lower() for word in _FINGER_WORDS) for name in skeleton.names])
+
+
 def guess_unit(skeleton: Skeleton) -> tuple[str, float]:
-    """Guess the unit of length that brings this body's height nearest, by ratio, to 1.70 m.
+    """Guess the unit of length that brings this body's height nearest, by ratio, to 1.70 m; a hand's span to 0.31 m.
 
     Many rest poses do not stand, so the height is estimated from the bones alone: 0.68 times `bone_span`. A skeleton
     without length gives centimetres, the commonest unit. The closest two units, decimetres and CMU's, differ by a
@@ -64,10 +80,13 @@ def guess_unit(skeleton: Skeleton) -> tuple[str, float]:
     Returns:
         The unit's name, and its length in metres.
     """
-    height = HEIGHT_PER_SPAN_RATIO * bone_span(np.array(skeleton.parents), skeleton.offsets, skeleton.tips)
-    if height <= 0.0:
+    offsets, usual = skeleton.offsets, _PERSON_HEIGHT_M / HEIGHT_PER_SPAN_RATIO
+    if is_hand(skeleton):
+        offsets, usual = np.where(_fingers(skeleton)[:, None], offsets, 0.0), _HAND_SPAN_M  # without the forearm
+    span = bone_span(np.array(skeleton.parents), offsets, skeleton.tips)
+    if span <= 0.0:
         return "cm", UNITS["cm"]
-    name = min(UNITS, key=lambda unit: abs(math.log(height * UNITS[unit] / _PERSON_HEIGHT_M)))
+    name = min(UNITS, key=lambda unit: abs(math.log(span * UNITS[unit] / usual)))
     return name, UNITS[name]
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from motionmind.body.motion import Motion, Posture
+from motionmind.clip_names import split_clip
 from motionmind.corpus import store
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.manifest import SourceManifest, parse_manifest
@@ -148,7 +149,7 @@ class _CorpusCollection(Collection):
     def _corpus(self) -> Corpus:
         from motionmind.learned import persistence  # numba is slow to import
 
-        return persistence.load(self.word, self._home).corpus
+        return persistence.load_corpus(self.word, self._home)
 
     @property
     def postures(self) -> Sequence[str]:
@@ -261,7 +262,7 @@ def find_motion(
     home: Path | None = None,
     *,
     as_clip: bool = True,
-    read: Callable[[Path], Motion] = read_motion,
+    read: Callable[[Path | str], Motion] = read_motion,
 ) -> Motion:
     """Find the movement of a source; a posture is a motion of one frame.
 
@@ -269,14 +270,14 @@ def find_motion(
         source: the source.
         home: the folder of the user's corpora; None for the default folder.
         as_clip: whether a clip has priority over a posture with the same name.
-        read: reads a file.
+        read: reads a file, or the clip in it that its path names.
 
     Raises:
         MotionMindError: there is no such movement, or the source has several clips and names none.
     """
     if source.kind == "file":
         check_exists(source, home)
-        return read(Path(source.place))
+        return read(source.file)
     collection = open_collection(source, home)
     if source.name:
         return collection.find(source.name, as_clip=as_clip)
@@ -287,8 +288,8 @@ def find_motion(
 
 def check_exists(source: Source, home: Path | None = None) -> None:
     """Raise MotionMindError, with a suggestion, if a source does not exist and is not spelled like a file."""
-    word = source.word
-    if source.kind != "file" or is_file(word) or _FILE_SUFFIX.fullmatch(Path(word).suffix):
+    word, place = source.word, str(split_clip(source.place)[0])
+    if source.kind != "file" or is_file(place) or _FILE_SUFFIX.fullmatch(Path(place).suffix):
         return  # the reader reports what is wrong with a file
     if os.path.isdir(word):  # noqa: PTH112 - a name may be too long for any file
         raise MotionMindError(f"{word}: is a folder, and no corpus; give a file, or a corpus's posture or clip")

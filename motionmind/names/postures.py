@@ -37,13 +37,13 @@ class FoundPosture(NamedTuple):
     after: Motion | None = None
 
 
-def read_own(path: Path) -> Motion:
+def read_own(path: Path | str) -> Motion:
     """Read the movement in a file, on human23 if its joints map to it."""
     return own_skeleton(read_motion(path))
 
 
 def find_posture(
-    name: PostureName | str, home: Path | None = None, *, read: Callable[[Path], Motion] = read_own
+    name: PostureName | str, home: Path | None = None, *, read: Callable[[Path | str], Motion] = read_own
 ) -> FoundPosture:
     """Find a posture by name.
 
@@ -52,9 +52,10 @@ def find_posture(
 
     Args:
         name: "ballet/arabesque" (a posture of a corpus), "ballet/adagio@23" (a frame of a clip), "clip.bvh@240",
-            "clip.bvh@2.0s" or "posture.json"; a ~ at the end asks for the movement around the frame, too.
+            "clip.bvh@2.0s", "hero.glb#Dance@24" (a frame of a clip of a glTF file) or "posture.json"; a ~ at the end
+            asks for the movement around the frame, too.
         home: the folder of the user's corpora; None for the default folder.
-        read: reads a file; by default on human23 if its joints map to it.
+        read: reads a file, or the clip in it that its path names; by default on human23 if its joints map to it.
 
     Raises:
         MotionMindError: there is no such posture (the message suggests a similar name or lists all), or no movement

@@ -3,13 +3,15 @@
     arabesque.json           the only posture of a file
     clip.bvh@240             frame 240 of a file, counted from 0; @-1 is the last
     clip.bvh@2.0s            the frame nearest to 2.0 s
+    hero.glb#Dance           a clip of a glTF file that has several
+    hero.glb#Dance@240       a frame of it
     centre.score/tendu       a named posture of a score
     centre.score/adagio@23   a frame of one of its clips
     ballet/arabesque         a named posture of a corpus
     ballet/adagio@23         a posture of one of its clips
 
-A file with the whole name has priority, because file names may contain @ and ~; a corpus, by name or folder, comes
-next. This module only checks which files and corpora exist.
+A file with the whole name has priority, because file names may contain #, @ and ~, and so has a clip of a glTF file; a
+corpus, by name or folder, comes next. This module only checks which files, clips and corpora exist.
 """
 
 from __future__ import annotations
@@ -19,6 +21,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
+
+from motionmind.clip_names import find_name, read_names, split_clip
 
 _MOMENT = r"-?\d{1,9}|\d{1,9}(?:\.\d{1,9})?s"  # more digits are a typing error
 _POSTURE = re.compile(rf"(.+?)(?:@({_MOMENT}))?(~?)", re.ASCII | re.DOTALL)
@@ -31,15 +35,20 @@ class Source:
 
     Attributes:
         word: its spelling.
-        kind: a file of one movement, a score, or a corpus; a missing source counts as a file.
+        kind: a motion file, a score, or a corpus; a missing source counts as a file.
         place: the path of the file or score; the name or the folder of the corpus.
-        name: the posture or clip of the score or corpus; "" if none is named.
+        name: the posture or clip of the score or corpus, or the clip of a glTF file; "" if none is named.
     """
 
     word: str
     kind: Literal["file", "score", "corpus"]
     place: str
     name: str = ""
+
+    @property
+    def file(self) -> Path | str:
+        """The motion file, with its clip if one is named, as `read_motion` takes it."""
+        return f"{self.place}#{self.name}" if self.name else Path(self.place)
 
     @property
     def paths(self) -> tuple[Path, ...]:
@@ -93,6 +102,9 @@ def parse_source(word: str, home: Path | None = None) -> Source:
     from motionmind.corpus.store import MANIFEST, list_corpora
 
     score = _SCORE.fullmatch(word)
+    file, clip = split_clip(word)
+    if clip and is_file(str(file)):
+        return Source(word, "file", str(file), clip)
     if is_file(word) and not (score and score[2] is None):
         return Source(word, "file", word)
     if score:
@@ -107,16 +119,22 @@ def parse_source(word: str, home: Path | None = None) -> Source:
         folder = "/".join(parts[:length])
         if folder and os.path.isfile(f"{folder}/{MANIFEST}"):  # noqa: PTH113 - as in `is_file`
             return Source(word, "corpus", folder, "/".join(parts[length:]))
-    return Source(word, "file", word)
+    return Source(word, "file", str(file), clip) if clip else Source(word, "file", word)
 
 
 def parse_posture(word: str, home: Path | None = None) -> PostureName:
     """Parse the name of a posture; arguments as for `parse_source`."""
     found = _POSTURE.fullmatch(word)
-    if found is None or is_file(word):
+    if found is None or is_file(word) or _is_clip(word):
         return PostureName(word, parse_source(word, home))
     place, moment, tilde = found.groups()
     return PostureName(word, parse_source(place, home), None if moment is None else Moment.of(moment), bool(tilde))
+
+
+def _is_clip(word: str) -> bool:
+    """Return whether a word that may end in a frame is the whole name of a clip of a glTF file, such as Walk@2."""
+    file, clip = split_clip(word)
+    return clip is not None and ("@" in clip or clip.endswith("~")) and find_name(read_names(file), clip) is not None
 
 
 def is_file(word: str) -> bool:

@@ -27,6 +27,7 @@ from motionmind.body.anatomy import SIDES
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
+from motionmind.display import displayed, one_line
 from motionmind.errors import SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.joint_mapping import (
@@ -155,7 +156,7 @@ def _align_shape(shape: _Shape, given: tuple[tuple[str, str], ...] | None) -> tu
             raise SkeletonError(f"{describe_unknown_rig(skeleton)}; give a mapping (--joints)")
         rig, mapping = known
         if limbs := describe_limbs(skeleton):
-            _log.info("%s: %s (--joints maps them otherwise)", skeleton.name, limbs)
+            _log.info("%s: %s (--joints maps them otherwise)", displayed(skeleton.name), one_line(limbs))
     sources = _find_sources(skeleton, mapping)
     if rig is not None and rig.frames and _zero_pose_matches(sources, rig.frames):
         frames = {name: rig.frames[name] for name in rig.frames if name in mapping.values()}
@@ -343,6 +344,7 @@ def _proportions(sources: _Sources, alignment: Floats) -> Skeleton:
     ]
     scale = float(np.mean(legs)) if legs else 1.0
     places, offsets, tips = np.zeros((23, 3)), np.zeros((23, 3)), np.zeros((23, 3))
+    has_spine = sources.position("lumbar") is not None or sources.position("thorax") is not None
     for i, (name, parent) in enumerate(zip(body.names, body.parents, strict=True)):
         into_parent = rot.inv(alignment[parent])
         found = sources.position(name)
@@ -350,7 +352,9 @@ def _proportions(sources: _Sources, alignment: Floats) -> Skeleton:
             places[i] = sources.zero_pose[sources.place[0]]
             continue
         if found is None:
-            places[i] = places[parent] + rot.mul_vec(alignment[parent], scale * body.offsets[i])
+            # The spine is inside a trunk that is one joint.
+            length = 0.0 if not has_spine and name in ("lumbar", "thorax") else scale
+            places[i] = places[parent] + rot.mul_vec(alignment[parent], length * body.offsets[i])
         else:
             places[i] = found
         offsets[i] = rot.mul_vec(into_parent, places[i] - places[parent])

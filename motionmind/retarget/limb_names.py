@@ -9,20 +9,21 @@ joint's place in its limb decides. From the pelvis to the toes, or from the ches
 - the assignment that uses most names must be unique, and the same on both sides.
 
 Pelvis and spine need no names. Legs hang from the pelvis, and the spine lies between it and the joint that carries the
-arms. An unclear rig counts as unknown: a wrong guess is worse than none.
+arms. If one joint carries legs and arms, as in OpenNI, joints between it and neck or arms are thorax and clavicles. An
+unclear rig counts as unknown: a wrong guess is worse than none.
 
 Sources of the words: the rigs of `motionmind.retarget.rigs`; Sony's receiver plugins for mocopi; Microsoft's documents
 of Kinect for Windows 2 and of Azure Kinect's body tracking; Apple's ARKit (`ARSkeletonDefinition.defaultBody3D`);
 Cascadeur's help on rigs; bones of Auto-Rig Pro, Advanced Skeleton and Synty's characters; MikuMikuDance's standard and
 half-standard bones, and their names in English in its models and in MMD Tools; the lists of bones of Rokoko's and Cats'
-add-ons for Blender.
+add-ons for Blender; OpenNI's XnSkeletonJoint.
 """
 
 from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import groupby, pairwise, product
 from typing import NamedTuple
 
@@ -57,6 +58,7 @@ _TRUNK_WORDS = {
     "head": {"head", "頭"},
     "neck": {"neck", "首"},
 }
+_TORSO_WORDS = {"torso", "trunk"}  # may carry legs and arms
 _DIVIDERS = ("stretch", "twistoffset", "twist", "roll", "bend", "part", "捩")
 _AFFIXES = ("", "def", "org", "joint", "jnt", "bone", "bn", "bind", "b", "j", "c")
 _SIDE_WORDS = {"left": ("left", "l", "lf", "lt", "左"), "right": ("right", "r", "rt", "右")}
@@ -127,10 +129,46 @@ def _map_plain(plain: Sequence[str], parents: Sequence[int]) -> dict[int, str] |
             return None
     left, right = ([next(iter(limbs[side, name])) for name in _LIMBS] for side in _SIDE_WORDS)
     pelvis, chest = (_lowest_common_ancestor(*pair, parents) for pair in zip(left, right, strict=True))
-    trunk = _find_trunk(pelvis, chest, named, parents)
+    if plain[pelvis] in _TORSO_WORDS and (chest == pelvis or named[chest].word in _TRUNK_WORDS["neck"]):
+        trunk = _find_torso(pelvis, chest, limbs, named, parents)
+    else:
+        trunk = _find_trunk(pelvis, chest, named, parents)
     if not trunk:
         return None
     return trunk | {i: f"{side}_{joint}" for (side, _), joints in limbs.items() for i, joint in joints.items()}
+
+
+def _find_torso(
+    torso: int,
+    chest: int,
+    limbs: Mapping[tuple[str, str], Mapping[int, str]],
+    named: Sequence[_Named],
+    parents: Sequence[int],
+) -> dict[int, str]:
+    """Return the joints of a trunk without a spine, and the head: {joint's index: human23's joint}; empty if unclear.
+
+    Args:
+        torso: index of the joint that both legs hang from.
+        chest: index of the joint that both arms hang from: the torso or the neck.
+        limbs: {side and limb: {joint's index: human23's joint, without side}}.
+        named: the joints' parsed names.
+        parents: index of each joint's parent, -1 for the root.
+    """
+    head = next((i for i, one in enumerate(named) if not one.side and one.word in _TRUNK_WORDS["head"]), -1)
+    path = _path_to_root(head, parents)
+    if chest not in path:
+        return {}
+    neck = [i for i in path if named[i].word in _TRUNK_WORDS["neck"]]
+    found = dict.fromkeys(neck, "cervical") | {head: "atlantal", torso: "pelvis"}
+    above = path[path.index(torso) - 1]
+    if chest != torso or not named[above].word:
+        found[above] = "thorax"
+    for side in _SIDE_WORDS:
+        arm = limbs[side, "arm"]
+        clavicle = parents[next(iter(arm))]
+        if clavicle != chest and "clavicle" not in arm.values():
+            found[clavicle] = f"{side}_clavicle"
+    return found
 
 
 def _find_trunk(pelvis: int, chest: int, named: Sequence[_Named], parents: Sequence[int]) -> dict[int, str]:

@@ -246,7 +246,10 @@ def test_stretched_keyframes_are_keyframes_no_more(frames: int, every: int) -> N
 
 def test_one_frame_is_not_stretched() -> None:
     motion = some_motion(1)
-    assert motion.stretch_to(24.0) is motion
+    found = motion.stretch_to(24.0)
+    np.testing.assert_array_equal(found.rotations, motion.rotations)
+    np.testing.assert_array_equal(found.times, motion.times)
+    assert found.rate == 24.0
 
 
 # --- the door ---------------------------------------------------------------------------------------------------------

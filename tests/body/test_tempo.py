@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from bundled_clips import ballet_clip
 from motionmind import read_motion
 from motionmind.body.human import human23, human44
 from motionmind.body.motion import Insertion, Motion
+from motionmind.body.support import centre_of_mass
 from motionmind.body.tempo import question_tempo
 from motionmind.corpus.gather import gather
 from motionmind.errors import MotionMindWarning
@@ -23,16 +25,16 @@ BODY = human23()
 FPS = 60.0
 
 
-def at_rest(seconds: float) -> Motion:
+def at_rest(seconds: float, fps: float = FPS) -> Motion:
     """Standing still, with the soles on the floor."""
-    frames = int(seconds * FPS)
+    frames = int(seconds * fps)
     root = np.tile([0.0, -BODY.rest[:, 1].min(), 0.0], (frames, 1))
-    return Motion(BODY, np.tile(rot.IDENTITY, (frames, 23, 1)), root, np.arange(frames) / FPS, name="a")
+    return Motion(BODY, np.tile(rot.IDENTITY, (frames, 23, 1)), root, np.arange(frames) / fps, name="a")
 
 
-def jump(height: float = 0.3, gravity: float = 9.81) -> Motion:
+def jump(fps: float = FPS, height: float = 0.3, gravity: float = 9.81) -> Motion:
     """A stiff body that is thrown up after a second and falls back."""
-    still = at_rest(3.0)
+    still = at_rest(3.0, fps)
     half = np.sqrt(2.0 * height / gravity)
     lift = (height - 0.5 * gravity * (still.times - 1.0 - half) ** 2).clip(0.0)
     return replace(still, root=still.root + lift[:, None] * [0.0, 1.0, 0.0])
@@ -50,11 +52,36 @@ def walk(rate: float = 1.8, step: float = 0.65) -> Motion:
     return replace(still, rotations=rotations, root=still.root + way)
 
 
+def tipping(fps: float = FPS, steps: int = 8) -> Motion:
+    """A stiff body that passes sideways over one foot and then the other, as an inverted pendulum.
+
+    At each step its mass goes from 13 degrees on one side of the foot to 13 degrees on the other.
+    """
+    poses, root = [], []
+    for side, other, sign in (("left", "right", 1.0), ("right", "left", -1.0)) * (steps // 2):
+        posture = np.tile(rot.IDENTITY, (23, 1))
+        for joint, bend in (("hip", -0.9), ("knee", 1.8)):
+            posture[BODY.index(f"{other}_{joint}")] = rot.from_axis_angle([1.0, 0.0, 0.0], bend)
+        ankle = BODY.positions(posture, np.zeros(3))[BODY.index(f"{side}_ankle")]
+        x, length = (centre_of_mass(BODY, posture, np.zeros(3)) - ankle)[:2]
+        falling = np.radians(2.0) * np.sinh(np.arange(0.0, 1.0, 1.0 / fps) * np.sqrt(9.81 / length))
+        falling = falling[falling < np.radians(13.0)]
+        turned = np.tile(posture, (2 * len(falling) - 1, 1, 1))
+        angle = sign * np.concatenate([-falling[:0:-1], falling]) + np.arctan(x / length)
+        turned[:, 0] = rot.from_axis_angle([0.0, 0.0, 1.0], angle)
+        turned[:, BODY.index(f"{side}_ankle")] = rot.inv(turned[:, 0])  # the sole stays flat
+        ankles = BODY.positions(turned, np.zeros((len(turned), 3)))[:, BODY.index(f"{side}_ankle")]
+        poses.append(turned)
+        root.append(np.array([0.0, 0.1, 0.0]) - ankles)
+    frames = sum(map(len, poses))
+    return Motion(BODY, np.concatenate(poses), np.concatenate(root), np.arange(frames) / fps, name="a")
+
+
 def played(motion: Motion, speed: float) -> Motion:
     return replace(motion, times=motion.times / speed)
 
 
-@pytest.mark.parametrize("made", [jump, walk, lambda: at_rest(3.0)])
+@pytest.mark.parametrize("made", [jump, walk, tipping, lambda: at_rest(3.0)])
 def test_the_right_clock_is_not_questioned(made: Callable[[], Motion]) -> None:
     assert question_tempo(made()) == ""
 
@@ -69,6 +96,28 @@ def test_the_right_clock_is_not_questioned(made: Callable[[], Motion]) -> None:
 )
 def test_flights(speed: float, said: str) -> None:
     assert question_tempo(played(jump(), speed)) == said
+
+
+@pytest.mark.parametrize(
+    ("made", "speed"),
+    [(made, speed) for made in (jump, tipping) for speed in (0.1, 0.125, 0.2, 0.25, 0.5, 2.0, 3.0)] + [(tipping, 5.0)],
+)
+def test_a_clock_of_any_speed(made: Callable[[float], Motion], speed: float) -> None:
+    """240 and 120 frames a second labelled 24 and 30 play 10 to 4 times too slow; 24 labelled 120 play too fast."""
+    found = re.match(
+        r"about (\S+) times too (\S+):",
+        question_tempo(played(made(max(24.0 / speed, 24.0 if speed > 4.0 else FPS)), speed)),
+    )
+    assert found
+    times, way = found.groups()
+    assert way == ("fast" if speed > 1.0 else "slow")
+    assert speed == 5.0 or float(times) == pytest.approx(max(speed, 1.0 / speed), rel=0.25)
+
+
+def test_few_steps_do_not_tell() -> None:
+    slow = played(tipping(120.0), 0.2)
+    assert question_tempo(slow)
+    assert question_tempo(played(tipping(120.0, steps=2), 0.2)) == ""  # too few to tell
 
 
 def test_falls_on_the_floor() -> None:
@@ -128,7 +177,7 @@ def test_a_corpus_questions_its_recordings() -> None:
         ("cmu-05/05_08.bvh", "fast", "slow"),
         ("cmu-05/05_12.bvh", "", ""),  # tendus on the floor
         ("cmu-16/16_01.amc", "fast", "slow"),
-        ("cmu-16/16_12.amc", "walks", ""),
+        ("cmu-16/16_12.amc", "walks", "slow"),
         ("cmu-16/16_36.amc", "fast", ""),
         ("indian/15.bvh", "fast", "slow"),
         ("bandai/run_normal_001.bvh", "", ""),

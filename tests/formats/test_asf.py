@@ -176,6 +176,7 @@ def check(motion: Motion, asf: str, amc: str, frames: list[int], metres: float) 
 # --- the shared recordings -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_every_recording(shared_data: Path) -> None:
     files = sorted((shared_data / "cmu-135").glob("*.amc"))
     assert len(files) == 9

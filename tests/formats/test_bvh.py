@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import random
 import re
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from bodies import ant, tumble
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from motionmind.body.human import human23
+from motionmind.body.human import human23, human44
 from motionmind.body.motion import Insertion, Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.formats import read_motion, write_motion
-from motionmind.formats.bvh import bvh_unit, has_inserted_frames, read_bvh, write_bvh
-from motionmind.formats.units import UNITS, guess_unit
+from motionmind.formats._bvh_file import BvhFile
+from motionmind.formats._bvh_hierarchy import BvhJoint
+from motionmind.formats._smpl import smpl_bodies
+from motionmind.formats.bvh import bvh_unit, has_inserted_frames, read_bvh, read_bvh_clips, write_bvh
+from motionmind.formats.units import UNITS, guess_unit, is_hand
 from motionmind.geometry import rotations as rot
 
 Mutate = Callable[[str, random.Random], bytes]
@@ -361,6 +367,80 @@ Frame Time: 1
     assert rot.angle(motion.rotations[0, 0], expected.as_quat()) < 1e-12
 
 
+# --- several bodies ------------------------------------------------------------------------------------------------
+
+
+def write_together(path: Path, motions: list[Motion]) -> list[Motion]:
+    """Write several movements of one clock into a file, each below a ROOT; return them as they are read alone."""
+    parts = [path.with_name(f"{number}.bvh") for number in range(len(motions))]
+    for part, motion in zip(parts, motions, strict=True):
+        write_bvh(part, motion, "m")
+    texts = [part.read_text().split("MOTION\n") for part in parts]
+    rows = [frames.splitlines() for _, frames in texts]
+    hierarchy = "".join(above.removeprefix("HIERARCHY\n") for above, _ in texts)
+    frames = [" ".join(row) for row in zip(*(lines[2:] for lines in rows), strict=True)]
+    path.write_text("\n".join([f"HIERARCHY\n{hierarchy}MOTION", *rows[0][:2], *frames]) + "\n")
+    return [read_bvh(part, unit="m") for part in parts]
+
+
+def same_body(found: Motion, wanted: Motion) -> None:
+    assert found.skeleton.difference(wanted.skeleton) is None
+    np.testing.assert_array_equal(found.rotations, wanted.rotations)
+    np.testing.assert_array_equal(found.root, wanted.root)
+    np.testing.assert_array_equal(found.times, wanted.times)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_each_root_is_a_body(count: int, tmp_path: Path) -> None:
+    bodies = [human23(), ant(), human23()][:count]
+    path = tmp_path / "duo.bvh"
+    alone = write_together(path, [tumble(body, seed) for seed, body in enumerate(bodies)])
+    names = ["pelvis", ant().names[0], "pelvis (2)"][:count]
+    for number, (name, wanted) in enumerate(zip(names, alone, strict=True), 1):
+        for clip in (name, str(number)):
+            found = read_bvh(path, clip=clip, unit="m")
+            same_body(found, wanted)
+            assert found.name == f"duo#{clip}"
+    clips = list(read_bvh_clips(path, unit="m"))
+    assert [clip.name for clip in clips] == [f"duo#{name}" for name in names]
+    for found, wanted in zip(clips, alone, strict=True):
+        same_body(found, wanted)
+
+
+@pytest.mark.parametrize(
+    ("clip", "message"),
+    [
+        (None, "it has 2 bodies, 'pelvis', 'pelvis (2)': choose one, as 'duo.bvh#pelvis'"),
+        ("Pelvis", "no body 'Pelvis'; it has 'pelvis', 'pelvis (2)'"),
+        ("0", "no body '0'"),
+        ("3", "no body '3'"),
+        ("-1", "no body '-1'"),
+        ("", "no body ''"),
+        ("٢", "no body"),
+    ],
+)
+def test_a_body_must_be_chosen(clip: str | None, message: str, tmp_path: Path) -> None:
+    write_together(tmp_path / "duo.bvh", [tumble(human23(), 0), tumble(human23(), 1)])
+    with pytest.raises(FormatError, match=re.escape(f"duo.bvh: {message}")):
+        read_bvh(tmp_path / "duo.bvh", clip=clip)
+
+
+def test_the_only_body_needs_no_choice(tmp_path: Path) -> None:
+    write_bvh(tmp_path / "a.bvh", tumble(ant(), 0))
+    (only,) = read_bvh_clips(tmp_path / "a.bvh")
+    same_body(only, read_bvh(tmp_path / "a.bvh"))
+    assert only.name == "a"
+    same_body(read_bvh(tmp_path / "a.bvh", clip=ant().names[0]), only)
+
+
+def test_many_bodies_of_one_name_have_names_of_their_own() -> None:
+    joints = [BvhJoint(name, -1, 1) for name in ["a", "a (2)", "a", *["b"] * 2000]]
+    names = list(BvhFile([], joints, np.zeros((1, 0)), 1, 1.0, []).bodies)
+    assert len({*names}) == len(names) == len(joints)
+    assert names[:3] == ["a", "a (2)", "a (3)"]
+    assert names[-1] == "b (2000)"
+
+
 # --- what is no BVH ------------------------------------------------------------------------------------------------
 
 
@@ -376,7 +456,7 @@ Frame Time: 1
         ("CHANNELS 3 Zrotation", "CHANNELS 4 Zrotation", ":10: 'END' is not a channel"),
         ("6 Xposition Yposition", "6 Xposition Xposition", ":5: joint 'Hips' has the channel XPOSITION twice"),
         ("JOINT Leg", "JOINT Spine", ":15: a second joint named 'Spine'"),
-        ("JOINT Leg", "ROOT Leg", ":15: a second ROOT"),
+        ("JOINT Leg", "ROOT Leg", ":15: a ROOT may not appear here"),
         ("JOINT Spine\n  {", "JOINT Spine\n", ":8: 'OFFSET' where the '{' of JOINT Spine was expected"),
         ("JOINT Spine", "JOINT", ":6: a JOINT without a name"),
         ("    }\n  }\n}\nMOTION", "    }\n  }\nMOTION", "the hierarchy is incomplete: 1 '}' missing"),
@@ -451,6 +531,40 @@ def test_a_person_of_any_size_is_told_in_any_unit(unit: str) -> None:
 def test_units_of_what_is_no_person() -> None:
     assert guess_unit(Skeleton("dot", ("a",), (-1,), np.zeros((1, 3)))) == ("cm", 0.01)
     assert guess_unit(Skeleton("rod", ("a",), (-1,), np.zeros((1, 3)), np.array([[0.0, 250.0, 0.0]]))) == ("cm", 0.01)
+
+
+def hand_of(body: Skeleton, wrist: str, above: int) -> Skeleton:
+    """The hand at a wrist, with so many joints of the arm above."""
+    top = body.index(wrist)
+    for _ in range(above):
+        top = body.parents[top]
+    kept = [top]
+    for joint in range(top + 1, len(body)):
+        if body.parents[joint] in kept:
+            kept.append(joint)
+    parents = [kept.index(body.parents[joint]) if joint != top else -1 for joint in kept]
+    offsets = np.where(np.arange(len(kept))[:, None] > 0, body.offsets[kept], 0.0)
+    return Skeleton("hand", tuple(body.names[joint] for joint in kept), tuple(parents), offsets, body.tips[kept])
+
+
+@pytest.mark.parametrize("above", [0, 1])
+@pytest.mark.parametrize("name", ["human44", "SMPL+H", "SMPL-X"])
+def test_a_hand_alone_is_no_body(name: str, above: int) -> None:
+    body = human44() if name == "human44" else smpl_bodies()[name]
+    hand = hand_of(body, "left_wrist", above)
+    assert is_hand(hand)
+    assert not is_hand(body)
+    for unit, metres in UNITS.items():
+        assert guess_unit(replace(hand, offsets=hand.offsets / metres, tips=hand.tips / metres))[0] == unit
+
+
+def test_the_note_says_that_a_hand_shows_the_unit(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    hand = hand_of(human44(), "right_wrist", 0)
+    write_bvh(tmp_path / "hand.bvh", tumble(hand, 0), "cm")
+    with caplog.at_level(logging.INFO, "motionmind.formats.bvh"):
+        motion = read_bvh(tmp_path / "hand.bvh")
+    np.testing.assert_allclose(motion.skeleton.offsets, hand.offsets, atol=1e-6)
+    assert "one unit taken as 0.01 m (cm), by the size of the hand" in caplog.text
 
 
 def test_the_unit_that_is_taken_is_logged(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -646,9 +760,9 @@ def test_speed_is_of_the_order_that_was_promised(tmp_path: Path) -> None:
 
     chain = Skeleton("chain", tuple(f"j{i}" for i in range(33)), tuple(range(-1, 32)), np.full((33, 3), 0.05))
     write_bvh(tmp_path / "a.bvh", wandering(chain, 2000, seed=3))
-    start = time.perf_counter()
+    start = time.process_time()
     read_bvh(tmp_path / "a.bvh", unit="cm")
-    assert time.perf_counter() - start < 1.0  # about 0.07 s; ten times that would be a mistake
+    assert time.process_time() - start < 1.0  # about 0.07 s; ten times that would be a mistake
 
 
 # --- properties ----------------------------------------------------------------------------------------------------

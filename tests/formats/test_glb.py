@@ -195,6 +195,7 @@ def expected(motion: Motion, when: float) -> Floats:
 # --- laws -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("body", BODIES)
 @pytest.mark.parametrize("even", [False, True])
 def test_every_joint_is_where_it_was_at_any_time(tmp_path: Path, body: str, even: bool) -> None:
@@ -423,11 +424,12 @@ def test_what_glb_cannot_hold_is_said(tmp_path: Path) -> None:
 def test_speed_is_of_the_order_that_was_promised(tmp_path: Path) -> None:
     motion = wandering(human23(), 10_000)
     write_glb(tmp_path / "a.glb", motion)
-    start = time.perf_counter()
+    start = time.process_time()
     write_glb(tmp_path / "a.glb", motion)
-    assert time.perf_counter() - start < 1.0  # about 0.06 s
+    assert time.process_time() - start < 1.0  # about 0.06 s
 
 
+@pytest.mark.long
 @settings(max_examples=40)
 @given(st.data())
 def test_any_body(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
@@ -476,6 +478,7 @@ def test_convert(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest
         assert len(shown.err.splitlines()) == 1
 
 
+@pytest.mark.long
 def test_tween(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
     postures = Path(__file__).parents[2] / "corpora" / "ballet" / "postures"
@@ -491,6 +494,7 @@ def test_tween(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.C
 # --- other people's programs ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("body", BODIES)
 @pytest.mark.parametrize("frames", [1, 5])
 def test_the_validator_finds_nothing(tmp_path: Path, body: str, frames: int) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import logging
 import re
 import struct
 from collections.abc import Callable
@@ -217,6 +218,30 @@ def test_a_body_that_was_turned_about_the_vertical(file: File) -> None:
     np.testing.assert_allclose(found.root, rot.mul_vec(turn, wanted.root), atol=1e-6)
 
 
+@pytest.mark.parametrize("share", [1.0, 0.5])
+def test_inverse_bind_matrices_of_zeros(file: File, share: float, caplog: pytest.LogCaptureFixture) -> None:
+    reframed(file)
+    wanted = read_gltf(file.write())
+    skin = file.json["skins"][0]
+    binds = file.array(skin["inverseBindMatrices"])
+    binds[: int(np.ceil(share * len(binds)))] = 0.0
+    skin["inverseBindMatrices"] = file.add(binds, "MAT4")
+    with caplog.at_level(logging.INFO, "motionmind.formats._gltf_poses"):
+        found = read_gltf(file.write())
+    same_movement(found, wanted)
+    assert [record.message for record in caplog.records if "matrices are zero" in record.message]
+
+
+@pytest.mark.parametrize("axes", [(0.0, 1.0, 1.0), (-1.0, 1.0, 1.0)])
+def test_inverse_bind_matrices_that_flatten_or_mirror(file: File, axes: tuple[float, float, float]) -> None:
+    skin = file.json["skins"][0]
+    binds = file.array(skin["inverseBindMatrices"])
+    binds[3] = np.diag([*axes, 1.0]).ravel()
+    skin["inverseBindMatrices"] = file.add(binds, "MAT4")
+    with pytest.raises(FormatError, match="a matrix mirrors, or has no volume"):
+        read_gltf(file.write())
+
+
 def test_an_armature_without_a_mesh(file: File) -> None:
     wanted = read_gltf(file.write())
     del file.json["skins"], file.json["meshes"]
@@ -315,8 +340,9 @@ def test_a_posture_is_no_animation(tmp_path: Path) -> None:
 
 def test_others_are_named(file: File) -> None:
     file.json["animations"] = [file.json["animations"][0], file.json["animations"][0] | {"name": "wave"}]
-    with pytest.warns(MotionMindWarning, match="the first animation that moves is read, not wave"):
-        read_gltf(file.write())
+    path = file.write()
+    with pytest.warns(MotionMindWarning, match=f"the first animation that moves is read, not wave; .* '{path}#wave'"):
+        read_gltf(path)
 
 
 def test_a_pose_before_the_movement_is_not_read(file: File) -> None:
@@ -335,7 +361,8 @@ def test_an_animation_for_each_bone_is_one_movement(file: File) -> None:
         {"samplers": [whole["samplers"][one["sampler"]]], "channels": [one | {"sampler": 0}]}
         for one in whole["channels"]
     ]
-    same_movement(read_gltf(file.write()), wanted)
+    with pytest.warns(MotionMindWarning, match="24 animations of one node each, equally long, are read as one"):
+        same_movement(read_gltf(file.write()), wanted)
 
 
 # --- what cannot be read --------------------------------------------------------------------------------------------

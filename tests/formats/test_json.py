@@ -179,9 +179,9 @@ def test_a_posture_written_by_hand(tmp_path: Path) -> None:
 
 def test_thousands_of_postures_are_quick(tmp_path: Path) -> None:
     write_motion(tmp_path / "a.json", random_motion(5_000))
-    start = time.perf_counter()
+    start = time.process_time()
     assert len(read_motion(tmp_path / "a.json")) == 5_000
-    assert time.perf_counter() - start < 2.0  # about 0.15 s; much more would be a mistake
+    assert time.process_time() - start < 2.0  # about 0.15 s; much more would be a mistake
 
 
 # --- what is mended, with a warning --------------------------------------------------------------------------------
@@ -342,6 +342,7 @@ def test_a_file_cut_anywhere_is_an_error(motion: Path) -> None:
         assert "cut short" in fails(motion, whole[:at])
 
 
+@pytest.mark.long
 @settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1))
 def test_only_our_errors_escape(tmp_path_factory: pytest.TempPathFactory, mutate: Mutate, seed: int) -> None:
@@ -385,10 +386,10 @@ def test_postures_in_every_format_that_is_written(tmp_path: Path, suffix: str) -
     assert rot.angle(there.rotations, back.rotations).max() < 1e-6
 
 
-@pytest.mark.parametrize("name", ["a.mov", "a", "a.json.gz"])
+@pytest.mark.parametrize("name", ["a.mov", "a", "a.json.old"])
 def test_an_unknown_suffix_names_the_known_ones(tmp_path: Path, name: str) -> None:
     with pytest.raises(
-        FormatError, match=r"can be read end in \.json, \.bvh, \.amc, \.txt, \.npz, \.pkl, \.npy, \.glb"
+        FormatError, match=r"can be read end in \.json, \.bvh, \.amc, \.txt, \.npz, \.pkl, \.npy, \.pt, \.glb"
     ):
         read_motion(tmp_path / name)
     for write, thing in ((write_motion, random_motion()), (write_posture, random_motion().posture(0))):
@@ -467,6 +468,7 @@ def test_importing_the_package_is_cheap() -> None:
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.long
 def test_the_same_bytes_in_any_process(tmp_path: Path) -> None:
     code = """
 import sys, numpy as np

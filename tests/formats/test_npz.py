@@ -236,9 +236,19 @@ def test_a_rate_that_is_not_said_must_be_given(tmp_path: Path) -> None:
         read_npz(tmp_path / "a.npz", fps=-1)
 
 
+@pytest.mark.parametrize("name", npz._RATE_NAMES)
+def test_a_given_rate_replaces_that_of_any_name(name: str, tmp_path: Path) -> None:
+    found = arrays()
+    found[name] = found.pop("mocap_framerate")
+    path = saved(tmp_path / "a.npz", found)
+    assert read_npz(path).fps == pytest.approx(120.0)
+    assert read_npz(path, fps=60.0).fps == pytest.approx(60.0)
+
+
 # --- there and back -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @settings(max_examples=30)
 @given(st.sampled_from(COUNTS), st.integers(1, 6), st.integers(0, 999), st.sampled_from([1.0, 29.97, 60.0, 120.0]))
 def test_nothing_is_lost_from_file_to_file(
@@ -255,7 +265,7 @@ def test_nothing_is_lost_from_file_to_file(
     np.testing.assert_allclose((here.inv() * there).magnitude(), 0.0, atol=1e-9)
     assert again["poses"].shape == found["poses"].shape
     name = "mocap_frame_rate" if joints == 55 else "mocap_framerate"
-    assert again[name] == (pytest.approx(rate) if frames > 1 else 30.0)
+    assert again[name] == pytest.approx(rate)
 
 
 @given(st.integers(0, 999), st.floats(-np.pi, np.pi))
@@ -388,7 +398,7 @@ def fails(path: Path) -> str:
         ("trans", np.full((5, 3), 1e300), r"'trans'\[0, 0\] is 1e\+300"),
         ("poses", np.full((5, 156), "text"), "'poses' holds no numbers"),
         ("poses", np.zeros((5, 156), dtype=complex), "'poses' holds no numbers"),
-        ("poses", np.array([{"a": 1}]), "'poses' cannot be read: .*pickle"),
+        ("poses", np.array([{"a": 1}]), "'poses' holds no numbers"),
         ("mocap_framerate", np.array(0.0), "'mocap_framerate' must be one number of frames per second, not 0"),
         ("mocap_framerate", np.array(1e9), "must be one number"),
         ("mocap_framerate", np.array([30.0, 60.0]), r"not \[30\. 60\.\]"),
@@ -437,6 +447,7 @@ def test_what_would_fill_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         assert fails(bomb) == "'poses' is too large to be movement: [1000, 156]"
 
 
+@pytest.mark.long
 @settings(max_examples=150)
 @given(st.data())
 def test_only_our_errors_escape(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:

@@ -136,6 +136,7 @@ RECORDED += [f"cmu-05/05_{number:02}" for number in (1, 5, 6, 8, 14, 16, 19)]
 Z_UP = {f"importer/{name}" for name in ["bvh_test1", "dab", "makehuman_tpose", "standard_skeleton"]}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("clip", RECORDED)
 def test_recordings_keep_their_skeleton_and_both_ends(shared_data: Path, clip: str, tmp_path: Path) -> None:
     copy = tmp_path / "in.bvh"
@@ -148,6 +149,7 @@ def test_recordings_keep_their_skeleton_and_both_ends(shared_data: Path, clip: s
         found.check_turns(one_to_one(mapping), Z_UP_TO_Y_UP if clip in Z_UP else rot.IDENTITY)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("clip", ["importer/test_freebvh", "bandai/kick_normal_001", "indian/04", "cmu-05/05_09"])
 def test_what_was_written_on_a_recording_comes_back(shared_data: Path, clip: str, tmp_path: Path) -> None:
     """Other joints are several of the file's, which turn as one between the ends, or lacking there."""
@@ -396,6 +398,7 @@ def test_joints_that_human23_lacks_stay_as_in_frame_0_if_the_ends_are_not_the_ri
     assert degrees_between(tail, local_turns(PlainBvh(source), "a tail")[0]) < PRINTED_DEG
 
 
+@pytest.mark.long
 def test_joints_that_human23_lacks_leave_one_known_pose_for_none(tmp_path: Path) -> None:
     """The first frame is the file's, whole turns of its angles included."""
     source = write_plain(tmp_path / "in.bvh", with_tail(STANDING))

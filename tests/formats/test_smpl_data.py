@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import codecs
 import os
 import pickle
 import pickletools
+import struct
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -122,6 +125,82 @@ def test_nothing_is_run(function: Callable[..., object], protocol: int, tmp_path
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.parametrize("dump", [pickle.dumps, pickle._dumps])
+@pytest.mark.parametrize("protocol", range(6))
+def test_arrays_and_types_may_be_shared(dump: Callable[[object, int], bytes], protocol: int) -> None:
+    poses, trans = vectors(24), np.asfortranarray(TRANS).astype(">f4")
+    held = {"a": poses, "again": poses, "turned": poses.T, "b": trans, "c": trans + 1, "d": np.float32(1.5), "e": ["a"]}
+    found = unpickle(dump(held, protocol))
+    assert isinstance(found, dict)
+    assert found["e"] == ["a"]
+    for name in "a", "again", "turned", "b", "c", "d":
+        np.testing.assert_array_equal(to_array(found[name]), held[name])
+
+
+def nested(make: Callable[[list[Any]], Any], times: int = 6) -> Any:
+    """A value that holds one below it ten times, and so on: a million numbers in a few bytes."""
+    value: Any = 1.0
+    for _ in range(times):
+        value = make([value] * 10)
+    return value
+
+
+TEXT, FREQUENT = "a" * 100_000, 500  # a value, and how often a file mentions it, in two bytes each
+REPEATED = b"X" + struct.pack("<I", len(TEXT)) + TEXT.encode() + b"q\x00"
+LONG_NUMBER = b"L0x" + b"f" * len(TEXT) + b"\nq\x00"
+SCALAR = np.float32(1.0).__reduce__()[0]
+AMPLIFIED = {
+    "lists": pickle.dumps(aist(smpl_poses=nested(list)), 2),
+    "tuples": pickle.dumps(aist(smpl_poses=nested(tuple)), 2),
+    "dicts": pickle.dumps(aist(smpl_poses=nested(lambda rows: dict(zip("abcdefghij", rows, strict=True)))), 2),
+    "itself": b"]q\x00h\x00a.",
+    "key": pickle.dumps({nested(tuple): 1}, 2),
+    "key, not shared": pickle.dumps({(1, 2): 1}, 2),
+    "key, protocol 0": b"(dI1\nI2\ns.",
+    "type": pickle.dumps(aist(smpl_poses=Runs(SCALAR, Runs(np.dtype, nested(list)), b"")), 2),
+    "arrays": pickle.dumps(aist(smpl_poses=[np.zeros(10_000)] * FREQUENT), 2),
+    "texts": pickle.dumps(aist(smpl_poses=[TEXT] * FREQUENT), 2),
+    "encoded texts": pickle.dumps(aist(smpl_poses=[Runs(codecs.encode, TEXT, "latin1") for _ in range(FREQUENT)]), 2),
+    "arguments": b"\x80\x02" + REPEATED + b"c_codecs\nencode\nq\x01" + b"h\x01h\x00R" * FREQUENT + b".",
+    "shape": (
+        b"(S'smpl_trans'\nI1\nS'smpl_poses'\ncnumpy.core.numeric\n_frombuffer\n(S''\ncnumpy\ndtype\n(S'f8'\ntR("
+        + (LONG_NUMBER + b"h\x00" * FREQUENT)
+        + b"tS'C'\ntRd."
+    ),
+}
+
+
+@pytest.mark.parametrize("name", AMPLIFIED)
+def test_a_value_in_many_places_takes_no_memory(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.pkl"
+    path.write_bytes(AMPLIFIED[name])
+    tracemalloc.start()
+    try:
+        with pytest.raises(FormatError, match=r"a\.pkl: ") as error:
+            read_motion(path)
+        assert tracemalloc.get_traced_memory()[1] < 10 * len(AMPLIFIED[name]) + 10**6
+    finally:
+        tracemalloc.stop()
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 300 + len(str(path))
+
+
+@pytest.mark.parametrize("name", ["lists", "tuples", "dicts", "itself", *(name for name in AMPLIFIED if "key" in name)])
+def test_values_are_trees_with_names(name: str) -> None:
+    """Counting, printing or comparing such a value takes no longer than reading the pickle."""
+    with pytest.raises(pickle.UnpicklingError, match=r"it holds one list in several places|its keys are not strings"):
+        unpickle(AMPLIFIED[name])
+
+
+@pytest.mark.parametrize("value", [3, 2.5, True, None, "text", np.array(1.0), np.float32(1.0), Runs(np.dtype, "f8")])
+def test_arrays_without_rows(value: Any, tmp_path: Path) -> None:
+    path = tmp_path / "a.pkl"
+    for name in "smpl_poses", "smpl_trans":
+        path.write_bytes(pickle.dumps(aist(**{name: value}), 2))
+        with pytest.raises(FormatError, match=f"'{name}'"):
+            read_motion(path)
+
+
 @pytest.mark.parametrize(
     "data",
     [
@@ -195,7 +274,7 @@ def test_arrays_that_are_no_dance(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="the rows of a rotation's matrix are zero or parallel"):
         read_motion(path)
     np.save(path, np.array([Runs(os.mkdir, str(tmp_path / "made"))], object), allow_pickle=True)
-    with pytest.raises(FormatError, match="not a numpy array: Object arrays cannot be loaded"):
+    with pytest.raises(FormatError, match="the array holds no numbers"):
         read_motion(path)
     path.write_bytes(path.read_bytes()[:8])
     with pytest.raises(FormatError, match=r"a\.npy: "):
@@ -209,19 +288,6 @@ def test_an_array_that_claims_too_much(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes().replace(b"(4, 315)", b"(9999999999, 315)").replace(b" " * 9 + b"\n", b"\n"))
     with pytest.raises(FormatError, match=r"a\.npy: "):
         read_motion(path)
-
-
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("a.c3d", "C3D holds markers on the skin, not joints"),
-        ("a.fbx", r"FBX is not read: open it in Blender \(File, Import, FBX\) and export glTF"),
-    ],
-)
-def test_formats_that_are_refused_with_the_reason(name: str, said: str, tmp_path: Path) -> None:
-    (tmp_path / name).write_bytes(b"x")
-    with pytest.raises(FormatError, match=said):
-        read_motion(tmp_path / name)
 
 
 def test_smpl_bodies_have_the_joints_that_files_have() -> None:

@@ -157,6 +157,7 @@ def test_a_name_that_nobody_wrote_is_an_error_before_the_corpus_is_learned(monke
         open_collection(parse_source("ballet")).choose(["arabesk"])
 
 
+@pytest.mark.long
 def test_a_clip_whose_score_changes_while_a_corpus_is_open_is_an_error() -> None:
     shutil.copytree(store.locate("karate"), "mine")
     source = parse_source(str(Path("mine").resolve()))
@@ -214,6 +215,7 @@ def test_a_score_of_a_corpus_needs_no_path_and_a_file_of_that_name_goes_first() 
     assert locate_score("centre.score") == Path("centre.score")
 
 
+@pytest.mark.long
 def test_a_posture_of_a_file_is_a_frame_or_the_frame_nearest_to_a_time() -> None:
     clip = ballet_clip("jump").resample(30.0)
     write_motion("clip.bvh", clip)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from bodies import tumble
 
+from motionmind.body.anatomy import SIDES
 from motionmind.body.skeleton import Skeleton
-from motionmind.retarget.joint_mapping import describe_unknown_rig
+from motionmind.retarget.joint_mapping import describe_unknown_rig, joint_mapping
 from motionmind.retarget.limb_names import map_by_limbs
+from motionmind.retarget.retarget import to_human23
 
 TRUNK = "Hips Spine<Hips Chest<Spine Neck<Chest Head<Neck"
 LEG = "Thigh_{S}<Hips Shin_{S}<Thigh_{S} Foot_{S}<Shin_{S} Toe_{S}<Foot_{S}"
@@ -175,3 +178,66 @@ def test_bones_of_another_kind_beside_those_of_limbs() -> None:
     deforming = " ".join("<".join(f"DEF-{name}" for name in row.split("<")) for row in bones.split())
     found = mapped(f"{deforming} {controls}")
     assert found == {f"DEF-{name}": joint for name, joint in mapped(bones).items()}
+
+
+OPENNI_ARM = "{S}_SHOULDER#<{} {S}_ELBOW<{S}_SHOULDER# {S}_HAND<{S}_ELBOW"
+OPENNI_LEG = "{S}_HIP#<{} {S}_KNEE<{S}_HIP# {S}_FOOT<{S}_KNEE"
+
+
+def openni(neck: str, arm: str, leg: str) -> dict[str, str]:
+    """What OpenNI's joints map to, by the joint that each of three rows hangs from."""
+    limbs = OPENNI_ARM.replace("{}", arm) + " " + OPENNI_LEG.replace("{}", leg)
+    helpers = [f"{joint}<TORSO#" for joint in (neck, arm, leg) if joint not in ("TORSO#", "NECK#")]
+    both = [row.replace("{S}", side).replace("{s}", side[0]) for side in ("LEFT", "RIGHT") for row in helpers]
+    sided = " ".join(limbs.replace("{S}", side).replace("{s}", side[0]) for side in ("LEFT", "RIGHT"))
+    return mapped(f"TORSO# {' '.join(both)} NECK#<{neck} HEAD<NECK# {sided}")
+
+
+@pytest.mark.parametrize(
+    ("neck", "arm", "leg", "others"),
+    [
+        ("TORSO#", "TORSO#", "TORSO#", {"NECK#": "cervical"}),
+        ("TORSO#", "NECK#", "TORSO#", {"NECK#": "thorax"}),
+        (
+            "TN",
+            "T{s}S",
+            "T{s}H",
+            {"TN": "thorax", "NECK#": "cervical", "TLS": "left_clavicle", "TRS": "right_clavicle"},
+        ),
+    ],
+)
+def test_one_joint_may_carry_legs_and_arms(neck: str, arm: str, leg: str, others: dict[str, str]) -> None:
+    limbs = {"SHOULDER#": "shoulder", "ELBOW": "elbow", "HAND": "wrist", "HIP#": "hip", "KNEE": "knee", "FOOT": "ankle"}
+    sides = {f"{side.upper()}_{name}": f"{side}_{joint}" for side in SIDES for name, joint in limbs.items()}
+    assert openni(neck, arm, leg) == {"TORSO#": "pelvis", "HEAD": "atlantal"} | sides | others
+
+
+@pytest.mark.parametrize("arms_on", [0, 1])
+def test_a_trunk_of_one_joint_keeps_all_places(arms_on: int) -> None:
+    names = ["Torso", "Neck", "Head"]
+    parents, rest = [-1, 0, 1], [(0.0, 1.2, 0.0), (0.0, 1.45, 0.0), (0.0, 1.65, 0.0)]
+    limbs = {
+        "Shoulder": (0.18, 1.4, 0.0),
+        "Elbow": (0.45, 1.4, 0.0),
+        "Hand": (0.7, 1.4, 0.0),
+        "Hip": (0.09, 0.95, 0.0),
+        "Knee": (0.09, 0.5, 0.01),
+        "Foot": (0.09, 0.08, 0.0),
+    }
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        for name, (x, y, z) in limbs.items():
+            parents.append({"Shoulder": arms_on, "Hip": 0}.get(name, len(names) - 1))
+            names.append(side + name)
+            rest.append((sign * x, y, z))
+    places = np.array(rest)
+    offsets = places - places[np.maximum(parents, 0)]
+    body = Skeleton("openni", tuple(names), tuple(parents), offsets, np.zeros_like(offsets))
+    motion = tumble(body, seed=3)
+    found, mapping = to_human23(motion, up="y"), joint_mapping(body)
+    assert mapping is not None
+    ours = [found.skeleton.index(mapping[name]) for name in names]
+    moved = found.skeleton.positions(found.rotations, found.root)[:, ours]
+    np.testing.assert_allclose(moved, body.positions(motion.rotations, motion.root), atol=1e-9)
+    if not arms_on:  # the spine is within the torso
+        spine = [found.skeleton.index(name) for name in ("lumbar", "thorax")]
+        np.testing.assert_array_equal(found.skeleton.offsets[spine], 0.0)

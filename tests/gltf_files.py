@@ -6,6 +6,7 @@ import json
 import shutil
 import struct
 import subprocess
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -92,6 +93,23 @@ class File:
     def samplers(self) -> list[dict[str, Any]]:
         found: list[dict[str, Any]] = self.json["animations"][0]["samplers"]
         return found
+
+
+def with_clips(path: Path, clips: Sequence[tuple[str, Motion]]) -> File:
+    """A file of one body with an animation for each clip, as modelling programs export them."""
+    file = File(path, clips[0][1])
+    for _, motion in clips[1:]:
+        other = File(path.with_stem("other"), motion)
+        added: dict[str, Any] = json.loads(json.dumps(other.json["animations"][0]))
+        for sampler in added["samplers"]:
+            for key in ("input", "output"):
+                kind = other.json["accessors"][sampler[key]]["type"]
+                sampler[key] = file.add(other.array(sampler[key]), kind)
+        file.json["animations"].append(added)
+        other.path.unlink()
+    for animation, (name, _) in zip(file.json["animations"], clips, strict=True):
+        animation["name"] = name
+    return file
 
 
 def reframed(file: File, seed: int = 1) -> None:
