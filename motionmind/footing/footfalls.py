@@ -24,6 +24,7 @@ class StepCosts(NamedTuple):
         lifted: heights above the lowest limb, metres: a foot hardly stands from the first, not at all from the second.
         stand_lifted: standing with a foot at the second height; proportional to the height above the first.
         stand_moving: standing with a foot that the corpus moves.
+        against_request: standing with a foot that a request lifts, and swinging another foot at the same time.
         drift: distance of a standing foot from its track that costs 1, metres.
         crossing: factor on that cost if the foot is off the track towards the other feet.
         slip: distance that a foot may slip without a step at the cost of `drift`, metres.
@@ -40,6 +41,7 @@ class StepCosts(NamedTuple):
     lifted: tuple[float, float] = (0.02, 0.08)
     stand_lifted: float = 8.0
     stand_moving: float = 3.0
+    against_request: float = 1e4
     drift: float = 0.08
     crossing: float = 4.0
     slip: float = 0.02

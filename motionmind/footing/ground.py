@@ -55,11 +55,14 @@ class Given(NamedTuple):
             with the first and the last.
         ends: the first and the last position of the root [3], metres.
         rates: its first and its last velocity [3], m/s; None where unknown.
+        route: points x, z of the path that the root follows over the floor from the first end to the last [P, 2],
+            metres; None for any path.
     """
 
     low: Mapping[int, float]
     ends: tuple[Floats, Floats]
     rates: tuple[Floats | None, Floats | None]
+    route: Floats | None = None
 
     def scaled(self, by: float) -> Given:
         """Return the same for a body `by` times as large."""
@@ -68,6 +71,7 @@ class Given(NamedTuple):
             {move: by * height for move, height in self.low.items()},
             (by * self.ends[0], by * self.ends[1]),
             (None if first is None else by * first, None if last is None else by * last),
+            None if self.route is None else by * self.route,
         )
 
 
@@ -160,7 +164,7 @@ def find_ground(
     held = _at(0.5 * (times[1:] + times[:-1]), half_steps, stance.stands)
     easily = steps_easily(lowest(posed.places, points_of_feet(skeleton, posed.joints, feet)), fps)
     clear = np.maximum(heights - floor, 0.0)
-    root = root_trajectory(skeleton, posed, clear, held, drifts, given.ends, times[-1], easily)
+    root = root_trajectory(skeleton, posed, clear, held, drifts, given.ends, times[-1], easily, given.route)
     root = stand(skeleton, posed.rotations, _with_rates(root, times, given.rates), heights)
     root[0], root[-1] = given.ends
     for end, beside, sign in ((0, 1, 1.0), (-1, -2, -1.0)):  # a body in the air keeps its velocity

@@ -10,9 +10,12 @@ from motionmind.body.limbs import limb_of_points
 from motionmind.body.skeleton import Skeleton
 from motionmind.footing.feet import GRIP_HEIGHT_M
 from motionmind.footing.smoothing import smoothed
+from motionmind.geometry.polylines import length_of, places_along
 
 CORPUS_TRAVEL_WEIGHT = 0.15  # relative to 1 for a standing foot
 LEAST_TRAVEL_SHARE = 0.3  # of even travel that remains while a leg is raised: no dancer walks with a leg in the air
+SWAY_S = 0.5  # slower departures of a body from its route are travel, not sway
+CORNER_S = 0.12  # before and after a corner of a route, in which a body turns it
 FIRMNESS_EXPONENT = 4  # a limb's firmness to this power is its share of the support: mostly the firmer foot bears
 
 
@@ -25,6 +28,7 @@ def root_trajectory(
     ends: tuple[Floats, Floats],
     seconds: float,
     easily: Floats,
+    route: Floats | None = None,
 ) -> Floats:
     """Return positions [N, 3] of the root, metres, from a to b; `stand` sets their final heights.
 
@@ -34,7 +38,7 @@ def root_trajectory(
 
     The solution is v = (c drift - sum_p w_p v_p + l) / (c + sum_p w_p), with one multiplier l for all frames. It adds
     the distance missing to b where the body stands least firmly. A long distance is added in proportion to `easily`
-    instead, with a ramp at both ends.
+    instead, with a ramp at both ends. With a route, it is added along the route instead of straight to b.
 
     Args:
         skeleton: the body.
@@ -45,6 +49,7 @@ def root_trajectory(
         ends: first and last position of the root, a and b [3], metres.
         seconds: total duration.
         easily: ease of stepping between frames [N - 1], LEAST_TRAVEL_SHARE to 1 (`steps_easily`).
+        route: points x, z of a path over the floor from a to b [P, 2], metres; None for the straight line.
     """
     (a, b), points = ends, posed.places[:, : 2 * len(skeleton)]
     height = points[..., 1] - points[..., 1].min(axis=-1, keepdims=True) + clearance[:, None]
@@ -54,13 +59,34 @@ def root_trajectory(
     steps = (CORPUS_TRAVEL_WEIGHT * drift - np.einsum("np,npk->nk", grip, np.diff(points, axis=0))) / weight[:, None]
     slack = (1.0 / weight) / np.sum(1.0 / weight)
     missing = b - a - steps.sum(axis=0)
-    fast = np.linalg.norm(missing) / seconds
+    fast = (np.linalg.norm(missing) if route is None else length_of(route)) / seconds
     evenly = fast**2 / (fast**2 + 0.3**2)  # half of the distance at 0.3 m/s
     since = np.linspace(0.0, seconds, len(steps) + 2)[1:-1]
     ramp = easily * np.minimum(np.minimum(since, since[::-1]) / 0.3, 1.0)  # starts and stops in 0.3 s
     slack = (1.0 - evenly) * slack + evenly * ramp / ramp.sum()
     steps += slack[:, None] * missing
+    if route is not None:
+        steps[:, [0, 2]] = np.diff(_along(route, slack, steps[:, [0, 2]], len(steps) / seconds), axis=0)
     return np.asarray(a + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]))
+
+
+def _along(route: Floats, slack: Floats, steps: Floats, fps: float) -> Floats:
+    """Return the places [N, 2], metres, of a body that sways about a route.
+
+    It rounds corners, because no body turns them at once.
+
+    Args:
+        route: points x, z of the path [P, 2], metres.
+        slack: share of the path in each step [N - 1].
+        steps: steps of the body on its straight way [N - 1, 2], metres; it sways as there.
+        fps: frames a second.
+    """
+    shares = np.minimum(np.concatenate([[0.0], np.cumsum(slack)]), 1.0)
+    sways = np.concatenate([np.zeros((1, 2)), np.cumsum(steps - slack[:, None] * steps.sum(axis=0), axis=0)])
+    places = np.empty_like(sways)
+    for axis, (way, sway) in enumerate(zip(places_along(route, shares).T, sways.T, strict=True)):
+        places[:, axis] = smoothed(way, CORNER_S, fps) + sway - smoothed(sway, SWAY_S, fps)
+    return places
 
 
 def steps_easily(heights: Floats, fps: float) -> Floats:

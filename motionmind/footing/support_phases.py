@@ -64,6 +64,7 @@ def find_support_phases(
     feet: list[Foot],
     fps: float,
     falls: Floats | None = None,
+    lifted: Bools | None = None,
 ) -> SupportPhases:
     """Find the support of a body, and the steps of its feet.
 
@@ -76,6 +77,7 @@ def find_support_phases(
         feet: feet of the body.
         fps: frames a second.
         falls: degree to which the body would fall without each foot [N, feet], 0 to 1; None if unknown.
+        lifted: whether each foot is off the floor for a reach [N, feet]; None for none.
     """
     root, firm = stretch.ground.root[:, [0, 2]], stretch.ground.firm
     others = _support_of_others(shape, firm, flying)
@@ -90,6 +92,12 @@ def find_support_phases(
     if falls is not None:
         weighs += COSTS.swing_falling * falls
     costs = [(stand, swing + weighs[:, k]) for k, (stand, swing) in enumerate(costs)]
+    if lifted is not None:
+        bears = lifted.any(axis=1, keepdims=True) & ~lifted
+        costs = [
+            (stand + COSTS.against_request * lifted[:, k], swing + COSTS.against_request * bears[:, k])
+            for k, (stand, swing) in enumerate(costs)
+        ]
     tracks = shape.tracks + root[:, None]
     stands = np.stack([stand <= swing for stand, swing in costs], axis=1) if feet else np.zeros((len(root), 0), bool)
     if staying is not None:

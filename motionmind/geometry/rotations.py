@@ -100,6 +100,12 @@ def canonical(q: Floats) -> Floats:
     return np.asarray(q * np.where(sign < 0.0, -1.0, 1.0)[..., None], dtype=np.float64)
 
 
+def continuous(q: Floats) -> Floats:
+    """Return the same rotations [T, ..., 4], each quaternion in the hemisphere of the one before."""
+    flips = np.sum(q[1:] * q[:-1], axis=-1, keepdims=True) < 0.0
+    return np.concatenate([q[:1], q[1:] * np.cumprod(np.where(flips, -1.0, 1.0), axis=0)])
+
+
 def angle(a: Floats, b: Floats) -> Floats:
     """Return the angle [...] in [0, pi], radians, between rotations [..., 4]; accurate near 0 and near pi.
 

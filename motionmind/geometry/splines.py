@@ -55,8 +55,11 @@ def rotation_spline(times: Floats, keys: Floats, at: Floats) -> Floats:
     knots = np.minimum(np.searchsorted(times, at), len(times) - 1)
     if np.array_equal(times[knots], at):
         return keys[knots]
-    from motionmind.geometry.charts import curve_of_rotations  # numba is slow to import
+    from motionmind.geometry.charts import N_CHART_KEYS, curve_of_rotations  # numba is slow to import
 
+    # Keys farther away than a chart reaches have no effect.
+    near = slice(max(int(knots.min()) - N_CHART_KEYS - 1, 0), int(knots.max()) + N_CHART_KEYS + 2)
+    times, keys = times[near], keys[near]
     out = curve_of_rotations(_floats(times), _floats(keys).reshape(len(times), -1, 4), _floats(at))
     return out.reshape(len(at), *keys.shape[1:])
 

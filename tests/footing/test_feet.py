@@ -185,6 +185,7 @@ def test_a_foot_that_is_given_a_little_above_the_floor_on_one_spot_stands_there(
     assert np.linalg.norm(places[:, [0, 2]] - places[0, [0, 2]], axis=1).max() < 0.005
 
 
+@pytest.mark.long
 def test_the_farther_a_body_has_to_go_the_more_steps_it_takes_one_foot_after_the_other() -> None:
     counts = []
     for far in (0.5, 1.2, 2.4):
@@ -242,6 +243,7 @@ def test_the_height_is_smooth() -> None:
     assert smooth < 0.7 * rough
 
 
+@pytest.mark.long
 def test_a_body_that_steps_travels_hardly_faster_than_it_may() -> None:
     """Between two steps it would hurry from one foot to the other; the distance takes 0.83 m/s."""
     q, root = sway(seconds=3.0, travel=2.5)
@@ -272,6 +274,7 @@ def test_a_body_that_passes_an_end_fast_does_not_stop_dead(way: float) -> None:
     assert jolt(pushes=25.0) < 1.02 * jolt()
 
 
+@pytest.mark.long
 def test_the_weight_comes_over_the_standing_foot() -> None:
     """A body whose trunk leans far aside on one leg; at both ends it stands upright."""
     frames = 91
@@ -291,6 +294,7 @@ def test_the_weight_comes_over_the_standing_foot() -> None:
     assert over(without=("balance",)) > over() + 0.03
 
 
+@pytest.mark.long
 def test_the_floor_and_the_limits_hold() -> None:
     for travel in (0.0, 0.5, 1.5):
         q, root = sway(seconds=1.2 + travel, size=0.2, travel=travel)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
@@ -111,3 +113,23 @@ def test_a_body_that_spins_several_times_is_never_spun_back(tilt: float, step: f
     curve = rotation_spline(times, keys, at)
     fastest_between_keys = rot.angle(keys[1:], keys[:-1]).max() / 0.2
     assert rot.angle(curve[1:], curve[:-1]).max() / (at[1] - at[0]) < 1.5 * fastest_between_keys
+
+
+@pytest.mark.parametrize(("first", "last"), [(0, 3), (0, 60), (17, 18), (20, 41), (75, 119), (118, 119)])
+def test_a_part_of_a_long_curve_is_that_of_the_whole_to_the_last_bit(first: int, last: int) -> None:
+    times, keys = wander(120, 60.0, seed=first)
+    at = np.linspace(times[0] - 0.1, times[-1] + 0.1, 1000)
+    here = (at >= times[first]) & (at <= times[last])
+    np.testing.assert_array_equal(rotation_spline(times, keys, at[here]), rotation_spline(times, keys, at)[here])
+
+
+def test_a_part_of_a_curve_takes_no_more_memory_the_longer_the_curve_is() -> None:
+    peaks = []
+    for count in (1_000, 20_000):
+        times, keys = np.arange(float(count)), np.tile(rot.IDENTITY, (count, 20, 1))
+        keys.setflags(write=False)  # like a corpus's
+        tracemalloc.start()
+        rotation_spline(times, keys, np.array([500.2, 510.7]))
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 2 * peaks[0]
