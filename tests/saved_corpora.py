@@ -1,4 +1,4 @@
-"""Small corpora on disk, and a program that saves, renames or deletes one and is killed on the way."""
+"""Small corpora on disk, and a program that changes one, or edits a project or runs a command, killed on the way."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from motionmind.corpus.entries import Packed
 
 MANIFEST = {"name": "arms", "clips": []}
 # What changes the disk, as Python reports it before it asks the system.
-CHANGES = {"open", "os.rename", "os.remove", "os.rmdir", "os.mkdir", "os.truncate", "os.chmod"}
+CHANGES = {"open", "os.link", "os.rename", "os.remove", "os.rmdir", "os.mkdir", "os.truncate", "os.chmod"}
 _LET_TRACE, _ANYBODY = 0x59616D61, ctypes.c_ulong(-1)  # PR_SET_PTRACER and PR_SET_PTRACER_ANY of Linux
 
 
@@ -104,6 +104,34 @@ def main(words: Mapping[str, str]) -> None:
             store.rename(folder.name, "legs", home)
         case "delete":
             store.delete(folder.name, home)
+        case "command":
+            run_command(folder, json.loads(words["words"]))
+        case "edit":
+            edit_project(folder, int(words["count"]))
+
+
+def run_command(folder: Path, words: Sequence[str]) -> None:
+    """Run a command in a folder, with a home and a cache of learned arrays there, and print nothing."""
+    import platformdirs
+
+    from motionmind.cli import main as run
+
+    os.chdir(folder)
+    os.environ.setdefault("NUMBA_CACHE_DIR", platformdirs.user_cache_dir("motionmind", appauthor=False))
+    os.environ |= {"MOTIONMIND_HOME": str(folder / "home"), "XDG_CACHE_HOME": str(folder / "cache")}
+    sys.stdout = sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 - until the process ends
+    run(words)
+
+
+def edit_project(path: Path, count: int) -> None:
+    """Open or create a project, and insert stretches until there are so many."""
+    from motionmind.studio.edits import Insert
+    from motionmind.studio.project import Project
+
+    project = Project.open(path) if path.exists() else Project.create(path, "ballet")
+    for number in range(len(project.state.blocks), count):
+        project.edit("w1", Insert(f"b{number}", "ballet/adagio", 0, 9))
+    project.close()
 
 
 def changed(**words: object) -> int:
@@ -155,9 +183,20 @@ def _end(starter: subprocess.Popen[str]) -> None:
         pass
 
 
+def preload(do: str) -> None:
+    """Import once what all processes of a kind import."""
+    if do == "command":
+        import motionmind.cli.application
+        import motionmind.tween.engine
+    elif do == "edit":
+        import motionmind.learned.persistence
+        import motionmind.studio.project  # noqa: F401
+
+
 def start() -> None:
     """Fork a process that runs `main` for each line that comes, and tell how it ended."""
     for line in sys.stdin:
+        preload(json.loads(line).get("do", "save"))
         if (child := os.fork()) == 0:
             main(json.loads(line))
             sys.exit()

@@ -31,8 +31,8 @@ _NAME = re.compile(r"\w+(\.\w+)*")  # of an array: no name in a manifest leads o
 class ArrayEntry(msgspec.Struct, frozen=True):
     """The entry of an array in a manifest: its type as NumPy writes it, its shape, and the SHA-256 of its file."""
 
-    type: Annotated[str, msgspec.Meta(pattern="^[<|][fiub][1248]$")]
-    shape: tuple[Annotated[int, msgspec.Meta(ge=0)], ...]
+    type: Annotated[str, msgspec.Meta(pattern=r"^(<f[248]|<[iu][248]|\|[iub]1)\Z")]
+    shape: Annotated[tuple[Annotated[int, msgspec.Meta(ge=0, le=2**40)], ...], msgspec.Meta(max_length=8)]
     sha256: str
 
 

@@ -16,6 +16,7 @@ import time
 import warnings
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +34,7 @@ from motionmind.corpus.arrays import (
 from motionmind.corpus.fingerprint import code_name
 from motionmind.errors import FormatError, MotionMindWarning
 from motionmind.files import make_folder
+from motionmind.private_folders import is_fixed, is_private, temporary_folder
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -52,8 +54,8 @@ def recall(corpus: str) -> dict[str, NDArray[Any]] | None:
     Warns:
         MotionMindWarning: they are damaged; the corpus will be learned again.
     """
-    folder = _folder(corpus)
     try:
+        folder = _folder(corpus)
         data = (folder / _MANIFEST).read_bytes()
     except OSError:
         return None
@@ -81,11 +83,12 @@ def remember(corpus: str, arrays: Mapping[str, NDArray[Any]]) -> None:
     Warns:
         MotionMindWarning: the cache cannot be written.
     """
-    folder = _folder(corpus)
-    unfinished = folder.with_name(f".{secrets.token_hex(8)}")
+    folder = None
     try:
+        folder = _folder(corpus)
         make_folder(folder.parent)
         _remove_unused(folder.parent)
+        unfinished = folder.with_name(f".{secrets.token_hex(8)}")
         try:
             unfinished.mkdir()
             entries = write_arrays(unfinished, arrays, flush=False)  # a checksum detects damage by a power cut
@@ -94,27 +97,42 @@ def remember(corpus: str, arrays: Mapping[str, NDArray[Any]]) -> None:
         finally:
             shutil.rmtree(unfinished, ignore_errors=True)
     except OSError as error:
-        if not folder.exists():
-            what = f"{folder.parent}: cannot be written: {error.strerror or error}"
+        if folder is None or not folder.exists():
+            what = f"{cache_folder('learned')}: cannot be written: {error.strerror or error}"
             warnings.warn(f"{what}; each command will learn the corpus again", MotionMindWarning, stacklevel=2)
 
 
 def forget(corpus: str) -> None:
     """Remove all arrays learned from a corpus, by its hash, by any version of the code; ignore errors."""
-    for folder in cache_folder("learned").glob(f"{corpus}-*"):
-        _remove(folder)
+    with suppress(OSError):
+        for folder in _private(cache_folder("learned")).glob(f"{corpus}-*"):
+            _remove(folder)
 
 
 def workroom() -> Path | None:
     """Return a folder for large arrays while learning; None if there is none."""
     with suppress(OSError):
-        make_folder(cache_folder("learned"))
-        return cache_folder("learned")
+        folder = _private(cache_folder("learned"))
+        make_folder(folder)
+        return folder
     return None
 
 
 def _folder(corpus: str) -> Path:
-    return cache_folder("learned") / f"{corpus}-{code_name()}"
+    """Return the folder of what this code learned from a corpus; OSError if there is no place for it."""
+    return _private(cache_folder("learned")) / f"{corpus}-{code_name()}"
+
+
+@cache
+def _private(folder: Path) -> Path:
+    """Return a folder, or one among temporary files if other users could write to it: compiled code trusts arrays."""
+    folder = Path(os.path.realpath(folder))
+    if is_fixed(folder):
+        with suppress(OSError):
+            make_folder(folder)
+        if is_private(folder) or not folder.exists():
+            return folder
+    return temporary_folder() / folder.name
 
 
 def _remove(folder: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -261,8 +261,9 @@ class Corpus:
         """
         between = self.detail.shape[1]
         if between == 0 or len(clip) == 1:
-            postures = self.motion(clip)
-            return postures if start == 0 and stop is None else postures.slice(start, stop or len(postures))
+            # Part of a long clip costs no more than part of a short one.
+            stop = len(clip) if stop is None else min(stop, len(clip))
+            return self.motion(replace(clip, start=clip.start + start, stop=clip.start + stop))
         here = slice(clip.start, clip.stop)
         whole = self.recorded_times(clip)
         frames = np.arange(len(whole))[start:stop]

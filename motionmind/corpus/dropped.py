@@ -5,7 +5,7 @@ body elsewhere; or nothing, and the frames after them follow at once. A *gap* is
 
 - *repeated* frames in the midst of movement: after them the body is where it would be, had it gone on meanwhile;
 - frames in which the whole body is *elsewhere*: it leaps there and back again within a frame, faster than any body;
-- a *leap* without a way back, from one frame to the next.
+- a *leap* without a way back, from one frame to the next. A loop whose root is put back leaps the same way each time.
 
 Short gaps are filled by going evenly from the frame before to the frame after, long ones are left out.
 """
@@ -27,6 +27,8 @@ from motionmind.geometry import rotations as rot
 
 # No body is as fast: of the root, and of all joints on average.
 _IMPOSSIBLE_MPS, _IMPOSSIBLE_RADPS = 12.0, np.radians(750.0)
+MAX_CLOCK_FRAMES = 5  # that a recording at one rate repeats in a file at another
+LONGEST_EVEN_GAP_S = 0.25  # a longer gap hides movement that nobody can guess from its ends
 
 
 class Gap(NamedTuple):
@@ -44,12 +46,14 @@ class Filled(NamedTuple):
         motion: the recording as it is now.
         repairs: the frames that were filled, by joint.
         left: the gaps that are too long to be filled, and leaps.
-        report: says how many frames were dropped, and where; "" if none were.
+        clock: says how many frames the recording's clock repeats, which stay; "" if it repeats none.
+        report: says that, and how many frames were dropped, and where; "" if there is nothing to say.
     """
 
     motion: Motion
     repairs: tuple[JointRepair, ...]
     left: tuple[Gap, ...]
+    clock: str
     report: str
 
 
@@ -97,31 +101,40 @@ def fill_gaps(motion: Motion, begin: int = 0, skipped: int = 0) -> Filled:
         skipped: frames of the file before it, which the report counts, too.
     """
     gaps = [gap for gap in find_gaps(motion) if gap.start > begin]
-    repeated = sum(gap.stop - gap.start for gap in gaps if gap.kind == "repeated")
-    is_clocks = repeated > 0.1 * len(motion)  # so many frames are repeated by the recording's clock
+    # So many frames, a few at a time, are repeated by the recording's clock.
+    clocks = [gap for gap in gaps if gap.kind == "repeated" and gap.stop - gap.start <= MAX_CLOCK_FRAMES]
+    repeated = sum(gap.stop - gap.start for gap in clocks)
+    is_clocks = repeated > 0.1 * len(motion)
     if is_clocks:
-        gaps = [gap for gap in gaps if gap.kind != "repeated"]
-    report = [f"{repeated} of {len(motion)} frames repeat the one before; they stay"] * is_clocks
+        gaps = [gap for gap in gaps if gap not in clocks]
+    clock = f"{repeated} of {len(motion)} frames repeat the one before; they stay" if is_clocks else ""
     if not gaps:
-        return Filled(motion, (), (), "".join(report))
+        return Filled(motion, (), (), clock, clock)
     rotations, root, times = motion.rotations.copy(), motion.root.copy(), motion.times
     repairs: list[JointRepair] = []
     left: list[Gap] = []
     for gap in gaps:
         before, after = gap.start - 1, gap.stop
-        if gap.kind == "leap" or times[after] - times[before] > 0.25:  # seconds
+        if gap.kind == "leap" or times[after] - times[before] > LONGEST_EVEN_GAP_S:
             left.append(gap)
             continue
-        inner = slice(gap.start, gap.stop)
-        share = ((times[inner] - times[before]) / (times[after] - times[before]))[:, None]
-        rotations[inner] = rot.normalise(rot.slerp(rotations[before], rotations[after], share))
-        root[inner] = root[before] + share * (root[after] - root[before])
+        go_evenly(times, rotations, root, gap.start, gap.stop)
         at = (float(times[gap.start]), float(times[gap.stop - 1]))
         repairs += [JointRepair(name, gap.start, gap.stop, at, exact=False) for name in motion.skeleton.names]
+    report = [clock] * is_clocks
     report += _describe([gap for gap in gaps if gap not in left], ": reconstructed", skipped)
     report += _describe([gap for gap in left if gap.kind != "leap"], ": left out", skipped)
     report += [f"{leaps}: cut there" for leaps in _describe_leaps(left, skipped)]
-    return Filled(replace(motion, rotations=rotations, root=root), tuple(repairs), tuple(left), "; ".join(report))
+    filled = replace(motion, rotations=rotations, root=root)
+    return Filled(filled, tuple(repairs), tuple(left), clock, "; ".join(report))
+
+
+def go_evenly(times: Floats, rotations: Floats, root: Floats, start: int, stop: int) -> None:
+    """Replace frames `start` to `stop - 1` of `rotations` [T, J, 4] and `root` [T, 3] by even movement, in place."""
+    before, after, inner = start - 1, stop, slice(start, stop)
+    share = ((times[inner] - times[before]) / (times[after] - times[before]))[:, None]
+    rotations[inner] = rot.normalise(rot.slerp(rotations[before], rotations[after], share))
+    root[inner] = root[before] + share * (root[after] - root[before])
 
 
 def _elsewhere(motion: Motion, quick: Bools) -> Iterator[Gap]:
@@ -130,7 +143,7 @@ def _elsewhere(motion: Motion, quick: Bools) -> Iterator[Gap]:
     at = 0
     while at < len(leaps):
         start = int(leaps[at]) + 1
-        back = next((n for n in range(at + 1, len(leaps)) if _returns(motion, start - 1, int(leaps[n]) + 1)), None)
+        back = next((n for n in range(at + 1, len(leaps)) if _returns(motion, start - 1, int(leaps[n]))), None)
         if back is None:
             yield Gap(start, start, "leap")
             at += 1
@@ -139,13 +152,33 @@ def _elsewhere(motion: Motion, quick: Bools) -> Iterator[Gap]:
             at = back + 1
 
 
-def _returns(motion: Motion, before: int, after: int) -> bool:
-    """Return whether a body may have gone from one frame to another by itself, within a second."""
-    seconds = float(motion.times[after] - motion.times[before])
-    turned = float(rot.angle(motion.rotations[before], motion.rotations[after]).mean())
-    went = float(np.linalg.norm(motion.root[after] - motion.root[before]))
+def _returns(motion: Motion, there: int, back: int) -> bool:
+    """Return whether a body that leaps after frame `there` and after frame `back` is where it may have gone meanwhile.
+
+    It may be there within a second, unless the second leap repeats the first, as where a loop begins again.
+    """
+    seconds = float(motion.times[back + 1] - motion.times[there])
+    turned, went = _apart(motion, there, back + 1)
     is_slow = turned < 0.5 * _IMPOSSIBLE_RADPS * seconds and went < 0.5 * _IMPOSSIBLE_MPS * seconds
-    return seconds <= 1.0 and is_slow
+    return seconds <= 1.0 and is_slow and not _repeats(motion, there, back)
+
+
+def _repeats(motion: Motion, first: int, second: int) -> bool:
+    """Return whether leaps after two frames begin alike and end alike, rather than undo each other."""
+    same, undone = (
+        sum(value**2 for a, b in pairs for value in _apart(motion, a, b))
+        for pairs in (
+            ((first, second), (first + 1, second + 1)),
+            ((first, second + 1), (first + 1, second)),
+        )
+    )
+    return same < 0.25 * undone
+
+
+def _apart(motion: Motion, a: int, b: int) -> tuple[float, float]:
+    """Return how far two frames are apart: mean radians of all joints, and metres of the root."""
+    turned = float(rot.angle(motion.rotations[a], motion.rotations[b]).mean())
+    return turned, float(np.linalg.norm(motion.root[b] - motion.root[a]))
 
 
 def _repeated(motion: Motion, steps: Floats, seconds: Floats) -> Iterator[Gap]:

@@ -14,6 +14,8 @@ LEARNED_BY = (
     *("_cells.py", "_typing.py", "arguments.py", "bundled.py", "display.py", "errors.py", "files.py", "jit.py"),
     *(
         "codecache.py",
+        "clip_names.py",
+        "private_folders.py",
         "plugins.py",
         "executors",
         "geometry",

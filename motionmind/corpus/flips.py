@@ -4,8 +4,9 @@ Motion capture fits a skeleton to markers frame by frame. If several orientation
 jump to another one and, some frames later, back. The knee of a raised leg swings to the other side of the line from hip
 to ankle, or a hand or foot turns over. Such a *flip* is repaired in one of two ways:
 
-- It is *put back* exactly if it is a half turn about the line from the joint to its child or grandchild. Such a turn
-  does not move the child or grandchild, and a second half turn about the same line undoes it.
+- It is *put back* exactly if it is a half turn about the line from the joint to its child or grandchild, unless the
+  joint is the root. Such a turn does not move the child or grandchild, and a second half turn about the same line
+  undoes it.
 - Otherwise the joint is *reconstructed*: interpolated over the frames between flips that follow each other closely.
 """
 
@@ -169,9 +170,12 @@ def _put_back(motion: Motion, joint: int, jumps: list[_Jump], tolerance: float) 
 def _half_turns(motion: Motion, joint: int) -> Iterator[Floats]:
     """Yield the half turns of a joint [T, 4], in its own frame, that do not move its child, then its grandchild.
 
-    At the end of a limb the tip counts as the child.
+    At the end of a limb the tip counts as the child. The root has none: a body may face anywhere, so its rest
+    orientation does not show which side of a jump is wrong.
     """
     skeleton = motion.skeleton
+    if joint == 0:
+        return
     place, turned, at = np.zeros(3), np.broadcast_to(rot.IDENTITY, (len(motion), 4)), joint
     for _ in range(2):
         child = next(iter(skeleton.children(at)), None)

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from motionmind.corpus.arrays import ArrayEntry
+from motionmind.corpus.arrays import ArrayEntry, parse_entries
 from motionmind.corpus.clip import FLIP_DEG
 from motionmind.corpus.corpus import Facing
 from motionmind.credits.credit import Origin
@@ -20,7 +20,10 @@ _Vector = tuple[float, float, float]
 
 
 class ClipFile(msgspec.Struct, frozen=True):
-    """A clip of a corpus that people write; `file` is relative to the manifest's folder, `performer` as in Clip."""
+    """A clip of a corpus that people write; `performer` is as in Clip.
+
+    `file` is relative to the manifest's folder, and may name a clip of a glTF file: "hero.glb#Dance".
+    """
 
     name: str
     file: str
@@ -50,9 +53,11 @@ class SourceManifest(Provenance, frozen=True, kw_only=True):
     scores: list[str] = []
 
     def __post_init__(self) -> None:
-        """Check that there are clips or scores."""
+        """Check that there are clips or scores, and that a stranger's scores name no other files."""
         if not (self.clips or self.scores):
             raise ValueError("there is no key `clips` with a clip in it, nor `scores` with a score")
+        if (other := next((name for name in self.scores if not name.endswith(".score")), None)) is not None:
+            raise ValueError(f"{other!r} is not a score, whose name ends in .score")
 
 
 class BodyEntry(msgspec.Struct, frozen=True):
@@ -95,6 +100,6 @@ def parse_manifest(manifest: dict[str, Any], schema: type[_Schema], path: Path) 
 
 def count_clips(manifest: Mapping[str, Any]) -> int:
     """Return the number of clips of a built corpus, from its manifest; 0 if it states none."""
-    with suppress(LookupError, TypeError):
-        return int(manifest["arrays"]["clips.order"]["shape"][0])
+    with suppress(LookupError, ValueError):  # msgspec's errors are ValueErrors
+        return parse_entries(manifest["arrays"])["clips.order"].shape[0]
     return 0

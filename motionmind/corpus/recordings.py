@@ -116,7 +116,7 @@ def take(recording: Motion, taking: Taking) -> Recording:
     repairs: tuple[JointRepair, ...] = ()
     left: tuple[Gap, ...] = ()
     if taking.flips == "repair":
-        motion, repairs, left, report = fill_gaps(motion, added, skip)
+        motion, repairs, left, _, report = fill_gaps(motion, added, skip)
         if report:
             warnings.warn(f"{motion.name}: {report}", MotionMindWarning, stacklevel=2)
     ends = sorted({0, *(frame for gap in left for frame in (gap.start, gap.stop)), len(motion)})

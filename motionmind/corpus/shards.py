@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
+from motionmind.clip_names import CLIP_SUFFIXES, split_clip
 from motionmind.corpus import store, versions
 from motionmind.corpus.clip import Clip, JointFlip
 from motionmind.corpus.fingerprint import code_name
@@ -36,7 +37,7 @@ from motionmind.corpus.manifest import BodyEntry
 from motionmind.corpus.recordings import Piece, Recording, Taking, take
 from motionmind.errors import CorpusError, MotionMindError, MotionMindWarning
 from motionmind.executors.team import Team, UnfinishedError
-from motionmind.files import make_folder, read_bytes, reads_recorded, replace_file
+from motionmind.files import make_folder, name_of, read_bytes, reads_recorded, replace_file
 
 _ONE_AT_A_TIME = threading.Lock()  # all threads of a process share Python's list of warnings
 
@@ -64,10 +65,11 @@ class Job(NamedTuple):
 
     Attributes:
         file: its path.
-        name: its clip's name; a score names its own clips.
+        name: its clip's name; a score names its own clips, and clips of a glTF file with several add theirs to it.
         reading: the options.
         folder: the shards' folder.
         code: hash of the package's code (`code_name`).
+        clip: the clip of a glTF file to take; None for all.
     """
 
     file: Path
@@ -75,9 +77,10 @@ class Job(NamedTuple):
     reading: Reading
     folder: Path
     code: str
+    clip: str | None = None
 
     def __str__(self) -> str:
-        return str(self.file)
+        return str(self.file) if self.clip is None else f"{self.file}#{self.clip}"
 
 
 class Taken(NamedTuple):
@@ -190,23 +193,24 @@ def take_files(
         UnfinishedError: a file crashes workers again and again, or workers are out of reach.
     """
     code = code_name()
-    jobs = [Job(file, name, reading, folder, code) for file, name in names.items()]
-    done: dict[Path, Taken] = {}
+    parts = [(split_clip(file), name) for file, name in names.items()]
+    jobs = [Job(Path(place), name, reading, folder, code, clip) for (place, clip), name in parts]
+    done: dict[str, Taken] = {}
 
     def work(some: Sequence[Job]) -> None:
         # A pipe can be read once, and by this process alone.
         ours = [job for job in some if not job.file.is_file()]
         theirs = [job for job in some if job.file.is_file()]
         for job, taken in zip(ours, map(take_file, ours), strict=True):
-            done[job.file] = taken
+            done[str(job)] = taken
             on_taken(taken)
         for job, taken in zip(theirs, team.map(take_file, theirs), strict=True):
-            done[job.file] = taken
+            done[str(job)] = taken
             on_taken(taken)
 
     samples = list({job.file.suffix.lower(): job for job in reversed(jobs)}.values())
     work(samples)
-    if (needed := _needed(names, done)) > 0.0:
+    if (needed := _needed(jobs, done)) > 0.0:
         present = sum(file.stat().st_size for file in folder.rglob("*.npz"))
         on_need(needed)
         free = shutil.disk_usage(folder).free
@@ -214,33 +218,35 @@ def take_files(
             raise CorpusError(
                 f"{folder}: the corpus needs about {needed / 1e9:.1f} GB of disk, and {free / 1e9:.1f} GB are free"
             )
-    work([job for job in jobs if job.file not in done])
-    readable = [job for job in jobs if done[job.file].key]
+    work([job for job in jobs if str(job) not in done])
+    readable = [job for job in jobs if done[str(job)].key]
     if jobs and not readable:
-        raise CorpusError(done[jobs[0].file].fault)
-    bodies = Counter(done[job.file].body for job in readable)
-    usual = max(readable, key=lambda job: bodies[done[job.file].body], default=None)  # the first of them
+        raise CorpusError(done[str(jobs[0])].fault)
+    bodies = Counter(done[str(job)].body for job in readable)
+    usual = max(readable, key=lambda job: bodies[done[str(job)].body], default=None)  # the first of them
     for job in readable:
-        if usual and done[job.file].body != done[usual.file].body:
+        if usual and done[str(job)].body != done[str(usual)].body:
             on_odd(_differs(job, usual, done))
         else:
-            yield from _recordings(job, done[job.file])
+            yield from _recordings(job, done[str(job)])
 
 
-def _differs(job: Job, usual: Job, done: Mapping[Path, Taken]) -> str:
+def _differs(job: Job, usual: Job, done: Mapping[str, Taken]) -> str:
     """Say how the skeleton of a file differs from that of another."""
-    body, other = (_shard(one, done[one.file])[0][0].body for one in (usual, job))
+    body, other = (_shard(one, done[str(one)])[0][0].body for one in (usual, job))
     return (
         f"{job.file}: is on another skeleton than {usual.file}: {body.difference(other)}; a corpus has one (a mapping "
         "of joints may bring it there)"
     )
 
 
-def _needed(names: Mapping[Path, str], samples: Mapping[Path, Taken]) -> float:
+def _needed(jobs: Sequence[Job], samples: Mapping[str, Taken]) -> float:
     """Estimate the bytes on disk that all files need, from one of each format."""
-    shares = {file.suffix.lower(): taken.size / max(_size(file), 1) for file, taken in samples.items()}
+    shares = {
+        job.file.suffix.lower(): samples[str(job)].size / max(_size(job.file), 1) for job in jobs if str(job) in samples
+    }
     # 7 bytes per byte of shards: the shards, the corpus's arrays, and what is learned
-    return 7.0 * sum(shares[file.suffix.lower()] * _size(file) for file in names)
+    return 7.0 * sum(shares[job.file.suffix.lower()] * _size(job.file) for job in jobs)
 
 
 def _size(file: Path) -> int:
@@ -307,7 +313,7 @@ def take_file(job: Job) -> Taken:
 def _read(job: Job) -> Iterator[Motion]:
     """Read the movement of a file; on human23 if its joints map to it."""
     from motionmind.body.motion import Insertion
-    from motionmind.formats import read_motion
+    from motionmind.formats import read_clips
     from motionmind.formats.bvh import has_inserted_frames
     from motionmind.notation.compose import motions
     from motionmind.notation.read import read_score
@@ -317,20 +323,30 @@ def _read(job: Job) -> Iterator[Motion]:
         yield from motions(read_score(job.file))
         return
     options = job.reading
-    motion = read_motion(job.file, unit=options.unit, asf=options.asf, fps=options.fps, up=options.up)
-    if len(motion) == 1:
-        doubt = f"{job.file}: holds one posture, and no move to learn from"
-        if options.taking.skip:  # it would drop the posture
-            raise CorpusError(doubt)
-        warnings.warn(doubt, MotionMindWarning, stacklevel=2)
-    if job.file.suffix.lower() == ".bvh" and has_inserted_frames(job.file):
-        motion = replace(motion, insertions=(Insertion(motion.times),))
-    yield own_skeleton(replace(motion, name=job.name), options.joints, up="y" if options.up else None)
+    up = "y" if options.up else None
+    has_moves = False
+    for motion in read_clips(str(job), unit=options.unit, asf=options.asf, fps=options.fps, up=options.up):
+        has_clips = job.file.suffix.lower() in CLIP_SUFFIXES
+        clip = motion.name.removeprefix(name_of(job.file)) if has_clips and job.clip is None else ""  # "#Dance"
+        doubt = f"{job}{clip}: holds one posture, and no move to learn from"
+        if len(motion) == 1 and clip:
+            warnings.warn(f"{doubt}; left out", MotionMindWarning, stacklevel=2)
+            continue
+        if len(motion) == 1:
+            if options.taking.skip:  # it would drop the posture
+                raise CorpusError(doubt)
+            warnings.warn(doubt, MotionMindWarning, stacklevel=2)
+        if job.file.suffix.lower() == ".bvh" and has_inserted_frames(job.file):
+            motion = replace(motion, insertions=(Insertion(motion.times),))  # noqa: PLW2901
+        has_moves = True
+        yield own_skeleton(replace(motion, name=f"{job.name}{clip}"), options.joints, up=up)
+    if not has_moves:
+        raise CorpusError(f"{job}: its clips hold one posture each, and no move to learn from")
 
 
 def _key(job: Job) -> str:
     data = hashlib.sha256(read_bytes(job.file)).hexdigest()
-    depends = (job.code, job.file.suffix.lower(), job.name, job.reading, data)
+    depends = (job.code, job.file.suffix.lower(), job.clip, job.name, job.reading, data)
     return hashlib.sha256(msgspec.json.encode(depends)).hexdigest()
 
 

@@ -7,7 +7,7 @@ import os
 import re
 import shlex
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -26,7 +26,7 @@ from motionmind.corpus.arrays import (
     remember_checked,
     write_arrays,
 )
-from motionmind.errors import CorpusError, FormatError, suggestion
+from motionmind.errors import CorpusError, FormatError, quoted, suggestion
 from motionmind.files import make_folder, replace_file, sync_folder
 
 if TYPE_CHECKING:
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 FORMAT, BUILT = "motionmind-corpus", "motionmind-built-corpus"
 VERSIONS = {FORMAT: 1, BUILT: 11}
 MANIFEST = "manifest.json"
+# Names of devices on Windows, with any suffix.
+_DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in "0123456789¹²³")}
 _PREVIOUS = "previous"  # key of a manifest: the manifest of the corpus that this one replaced
 _MAX_RETRIES, _PAUSE_S = 20, 0.005  # until a missing version appears
 
@@ -74,12 +76,22 @@ def locate(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
 
 
 def place_for(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
-    """Return the folder for a new corpus of a user; CorpusError if the name is invalid or a bundled corpus's."""
+    """Return the folder for a corpus of a user; CorpusError if the name is a bundled corpus's or not portable."""
     if not re.fullmatch(r"\w[\w.-]{0,63}", name):
         raise CorpusError(f"{name!r:.80} cannot be a corpus's name: use letters, digits, -, _ and . (64 at most)")
     if _is_bundled(name):
         raise CorpusError(f"{name!r} is the name of a bundled corpus; choose another")
+    if name not in (known := list_corpora(folder)):
+        _check_portable(name, known)
     return home(folder) / "corpora" / name
+
+
+def _check_portable(name: str, known: Iterable[str]) -> None:
+    """Raise CorpusError if not every system can have a folder of this name beside those of the known corpora."""
+    if name.endswith(".") or name.partition(".")[0].casefold() in _DEVICES:
+        raise CorpusError(f"{name!r} cannot be a folder on Windows; choose another name")
+    if twin := next((one for one in known if one.casefold() == name.casefold()), None):
+        raise CorpusError(f"{name!r} differs from the corpus {twin!r} only by case; choose another name")
 
 
 def own_place(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
@@ -194,14 +206,16 @@ def _parse(path: Path, data: bytes) -> dict[str, Any]:
         advice = f"; {remedy(path.parent)}" if is_built else ""
         raise FormatError(f"cannot be read as a corpus's manifest: {error}{advice}", path=path) from error
     form, version = manifest.get("format"), manifest.get("version")
-    if form not in (FORMAT, BUILT):
-        raise FormatError(f"is {form!r} version {version!r}; {FORMAT!r} and {BUILT!r} can be read", path=path)
+    if not isinstance(form, str) or form not in VERSIONS:
+        form = quoted(form) if isinstance(form, str) else "no text"
+        raise FormatError(f"its `format` is {form}; {FORMAT!r} and {BUILT!r} can be read", path=path)
     if version == VERSIONS[form]:
         return manifest
     if form == BUILT and isinstance(version, int):
         age = "an earlier" if version < VERSIONS[form] else "a later"
         raise FormatError(f"a corpus of {age} version; {remedy(path.parent)}", path=path)
-    raise FormatError(f"is {form!r} version {version!r}; version {VERSIONS[form]} can be read", path=path)
+    shown = version if isinstance(version, int) and abs(version) < 2**63 else "not a small number"
+    raise FormatError(f"its `version` is {shown}; version {VERSIONS[form]} can be read", path=path)
 
 
 def remedy(folder: Path) -> str:

@@ -33,7 +33,7 @@ from motionmind.bundled import bundled
 from motionmind.discretize.protocol import joints_meant, nameable
 from motionmind.discretize.turns import format_turns, parse_turns
 from motionmind.errors import FormatError, did_you_mean, suggestion
-from motionmind.files import FilePath, parse_toml, read_bytes, write_atomically
+from motionmind.files import FilePath, format_toml_string, parse_toml, read_bytes, write_atomically
 from motionmind.geometry import rotations as rot
 
 LIBRARY_FORMAT = "motionmind-library"
@@ -276,22 +276,16 @@ def write_library(path: FilePath, library: Library) -> None:
 def format_library(library: Library) -> str:
     """Return the text of a library file; the inverse of `parse_library`."""
     lines = [f'format = "{LIBRARY_FORMAT}"', f"version = {LIBRARY_VERSION}"]
-    lines += [f"{key} = {_quoted(getattr(library, key))}" for key in _TEXT_KEYS]
+    lines += [f"{key} = {format_toml_string(getattr(library, key))}" for key in _TEXT_KEYS]
     for table, entries in library.tables.items():
-        lines += ["", f"[{table if _bare(table) else _quoted(table)}]"]
+        lines += ["", f"[{table if _bare(table) else format_toml_string(table)}]"]
         for (name, value), q in zip(entries.items(), library.rotations(table), strict=True):
             turns = value if isinstance(value, str) else format_turns(q)
             # Write a quaternion as given: normalised at every reading and writing, it would drift.
-            text = f"[{', '.join(repr(float(v)) for v in value)}]" if turns is None else _quoted(turns)
-            lines.append(f"{_quoted(name)} = {text}")
+            text = f"[{', '.join(repr(float(v)) for v in value)}]" if turns is None else format_toml_string(turns)
+            lines.append(f"{format_toml_string(name)} = {text}")
     return "\n".join(lines) + "\n"
 
 
 def _bare(key: str) -> bool:
     return key != "" and key.isascii() and key.replace("_", "").replace("-", "").isalnum()
-
-
-def _quoted(text: str) -> str:
-    """Return the text as a TOML basic string."""
-    escapes = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
-    return '"' + "".join(escapes.get(c, c if c.isprintable() else f"\\U{ord(c):08X}") for c in text) + '"'

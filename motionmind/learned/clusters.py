@@ -28,6 +28,8 @@ N_TREE_DIMENSIONS = 6  # more gain little
 MAX_FOUNDERS_COMPARED = 32  # with a posture, nearest projections first
 N_POSTURES_PER_BLOCK = 2048  # compared at a time
 N_POSTURES_FOR_DIRECTIONS = 4096
+MAX_JOINTS_DECOMPOSED = 64  # joints of a part with exact directions, whose time is cubic; with more, fewer postures
+N_SUBSPACE_DIMENSIONS, N_SUBSPACE_ROUNDS = 2 * N_TREE_DIMENSIONS, 3
 SLACK_RAD2 = 1e-6  # for rounding in squared distances of projections
 # Squared distances, radians^2, that differ by less are a tie. Rounding makes differences of 1e-15, by which two dozen
 # of the 13,932 memberships in recordings of one dancer (cmu-05) differed between two processors.
@@ -123,12 +125,28 @@ def _grow(founders: Ints, seen: Floats) -> _Tree:
 def _seen(orientations: Floats, workshop: Workshop) -> Floats:
     """Project the postures onto the directions of greatest variance [N, d]; distances are at most the root of
     `squared_distance`."""
-    shown = _points(orientations[:: max(len(orientations) // N_POSTURES_FOR_DIRECTIONS, 1)])
+    excess = max(orientations.shape[1] / MAX_JOINTS_DECOMPOSED, 1.0)
+    shown = _points(orientations[:: max(int(len(orientations) * excess) // N_POSTURES_FOR_DIRECTIONS, 1)])
     middle = shown.mean(axis=0)
-    directions = np.linalg.eigh((shown - middle).T @ (shown - middle))[1][:, ::-1][:, :N_TREE_DIMENSIONS]
+    directions = _directions(shown - middle)
     seen: Floats = workshop.empty((len(orientations), directions.shape[1]))
     _look_along(orientations, middle, np.ascontiguousarray(directions), seen)
     return seen
+
+
+def _directions(points: Floats) -> Floats:
+    """Return orthonormal directions of greatest variance [9 m, d] of centred points [n, 9 m].
+
+    In many dimensions they are approximate, found by iteration in a random subspace (Halko, Martinsson and Tropp,
+    "Finding structure with randomness", SIAM Review 53:217, 2011). Exact ones would list fewer candidates, not others.
+    """
+    if points.shape[1] <= 9 * MAX_JOINTS_DECOMPOSED:
+        return np.asarray(np.linalg.eigh(points.T @ points)[1][:, ::-1][:, :N_TREE_DIMENSIONS])
+    basis = np.random.default_rng(0).standard_normal((points.shape[1], N_SUBSPACE_DIMENSIONS))
+    for _ in range(N_SUBSPACE_ROUNDS):
+        basis = np.linalg.qr(points.T @ (points @ basis))[0]
+    within = points @ basis
+    return np.asarray(basis @ np.linalg.eigh(within.T @ within)[1][:, ::-1][:, :N_TREE_DIMENSIONS])
 
 
 def _points(orientations: Floats) -> Floats:

@@ -68,7 +68,7 @@ class LearnedCorpus(Learned):
         check_mapping("mix", mix, or_none=True)
         check_path("home", home, or_none=True)
         check_type("workshop", workshop, Workshop, or_none=True)
-        others = [(persistence.load(other, home).corpus, weight) for other, weight in (mix or {}).items()]
+        others = [(persistence.load_corpus(other, home), weight) for other, weight in (mix or {}).items()]
         corpus = gather(name, clips, mix=others, workshop=workshop, **options)
         return cls.learn(corpus, discretization or Codebook(15.0), workshop)
 

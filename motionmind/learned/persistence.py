@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import MISSING, asdict, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from motionmind._typing import States
 from motionmind.body.limbs import parts_of
 from motionmind.body.skeleton import Skeleton
+from motionmind.clip_names import split_clip
 from motionmind.corpus import cache, store
 from motionmind.corpus.clip import FLIP_DEG, Clip, JointFlip
 from motionmind.corpus.corpus import Corpus
@@ -31,13 +33,14 @@ from motionmind.discretize.library import library_path
 from motionmind.discretize.protocol import Discretization
 from motionmind.discretize.spec import from_spec
 from motionmind.discretize.states import StateSpace
-from motionmind.errors import CorpusError, FormatError, MotionMindWarning
+from motionmind.errors import CorpusError, FormatError, MotionMindError, MotionMindWarning
 from motionmind.executors.workshop import Workshop
 from motionmind.formats import read_motion
 from motionmind.grammar.bridges import Bridges
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.transitions import Transitions
+from motionmind.jit import interpreted
 from motionmind.learned.gauge import Gauge
 from motionmind.learned.learning import Learned, learn, learn_from_states
 from motionmind.learned.neighbours import Neighbours
@@ -163,15 +166,15 @@ def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:
     stored = store.load(folder)
     if stored.manifest["format"] == store.BUILT:
         return _open(folder, stored)
-    source = parse_manifest(stored.manifest, SourceManifest, folder / store.MANIFEST)
-    built = cache.cache_folder("corpora") / f"{folder.name}-{fingerprint(_source_files(folder, source))}"
+    source, built = _find_built(folder, stored)
     if (built / store.MANIFEST).exists():
         try:
             return _open(built, store.load(built))
         except FormatError as error:
             what = str(error).removesuffix(f"; {store.remedy(built)}")
             warnings.warn(f"{what}; learning from {folder.name} again", MotionMindWarning, stacklevel=2)
-    learned = learn(*_read_source(folder, source))
+    with interpreted(False):
+        learned = learn(*_read_source(folder, source))
     try:
         save(learned, built, keep=False)  # it can be made again
     except CorpusError as error:
@@ -179,12 +182,36 @@ def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:
     return learned
 
 
+def load_corpus(name: str, home: str | os.PathLike[str] | None = None) -> Corpus:
+    """Load the movement of a corpus, without learning from it: a hand-written one is composed unless the cache has it.
+
+    Arguments and errors are as for `load`.
+    """
+    folder = store.locate(name, home)
+    stored = store.load(folder)
+    if stored.manifest["format"] == store.BUILT:
+        return _read_movement(folder, stored)[0]
+    source, built = _find_built(folder, stored)
+    if (built / store.MANIFEST).exists():
+        with suppress(FormatError):  # `load` warns, and makes it again
+            return _read_movement(built, store.load(built))[0]
+    with interpreted(False):  # thousands of postures: compiling takes 2 s, Python would take 40
+        return _read_source(folder, source)[0]
+
+
+def _find_built(folder: Path, stored: store.Stored) -> tuple[SourceManifest, Path]:
+    """Return a hand-written corpus's manifest, and the cache's folder of the corpus that is compiled from it."""
+    source = parse_manifest(stored.manifest, SourceManifest, folder / store.MANIFEST)
+    return source, cache.cache_folder("corpora") / f"{folder.name}-{fingerprint(_source_files(folder, source))}"
+
+
 def _open(folder: Path, stored: store.Stored) -> Learned:
     """Return what was learned from a built corpus, from the cache or anew; FormatError if the corpus is not valid."""
     corpus, space, states = _read_movement(folder, stored)
     arrays = cache.recall(stored.digest)
     if arrays is None:
-        learned = learn_from_states(corpus, space, states, Workshop(folder=cache.workroom()))
+        with interpreted(False):
+            learned = learn_from_states(corpus, space, states, Workshop(folder=cache.workroom()))
         cache.remember(stored.digest, learned_arrays(learned))
         return learned
     grammar = Grammar(
@@ -257,7 +284,7 @@ def _read_movement(folder: Path, stored: store.Stored) -> tuple[Corpus, StateSpa
         if not stored.is_checked:
             check_values(arrays, corpus, space.sizes)
             stored.remember_checked()
-    except (ValueError, OverflowError) as error:
+    except (MotionMindError, ValueError, OverflowError) as error:
         raise FormatError(f"{error}; {store.remedy(folder)}", path=path) from error
     return corpus, space, arrays["states"]
 
@@ -291,7 +318,7 @@ def _source_files(folder: Path, manifest: SourceManifest) -> list[Path]:
     library = manifest.discretization.get("library")
     return [
         folder / store.MANIFEST,
-        *(folder / clip.file for clip in manifest.clips),
+        *(Path(split_clip(folder / clip.file)[0]) for clip in manifest.clips),
         *(file for score in manifest.scores for file in sources(folder / score)),
         *([library_path(library)] if isinstance(library, str) else []),
     ]

@@ -102,17 +102,11 @@ def npss(truth: Floats, made: Floats) -> float:
         truth: true global rotations [B, T, J, 4].
         made: generated global rotations [B, T, J, 4].
     """
-    powers = [np.fft.fft(_continuous(q).reshape(*q.shape[:2], -1), axis=1).real ** 2 for q in (truth, made)]
+    steady = [rot.continuous(q.swapaxes(0, 1)).swapaxes(0, 1).reshape(*q.shape[:2], -1) for q in (truth, made)]
+    powers = [np.fft.fft(one, axis=1).real ** 2 for one in steady]
     totals = [power.sum(axis=1) for power in powers]
     true_share, made_share = (
         np.cumsum(power / np.where(total > 0.0, total, 1.0)[:, None], axis=1)
         for power, total in zip(powers, totals, strict=True)
     )
     return float(np.average(np.abs(made_share - true_share).sum(axis=1), weights=totals[0]))
-
-
-def _continuous(q: Floats) -> Floats:
-    """Give each rotation [B, T, ..., 4] the sign that is nearer to the frame before."""
-    flips = np.sum(q[:, 1:] * q[:, :-1], axis=-1, keepdims=True) < 0.0
-    sign = np.cumprod(np.where(flips, -1.0, 1.0), axis=1)
-    return np.concatenate([q[:, :1], q[:, 1:] * sign], axis=1)

@@ -14,14 +14,14 @@ together.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from motionmind._typing import Floats, Ints
 from motionmind.errors import InfeasibleError
-from motionmind.search.problem import Model, Problem, costs_to_go
+from motionmind.search.problem import Model, Problem, Via, costs_to_go
 
 
 @dataclass(frozen=True)
@@ -70,6 +70,12 @@ def choose_length(problem: Problem) -> LengthChoice:
     cost, haste = float(so_far[-1][ends[-1]]), sum(hastes[k, b - a] for k, (a, b) in enumerate(pairwise(ends)))
     elsewhere = float(np.delete(so_far[-1], ends[-1]).min(initial=np.inf))
     return LengthChoice(ends[-1], cost, cost, elsewhere, 0, float(haste), tuple(ends[1:-1]))
+
+
+def fewest_moves_between(problem: Problem) -> list[int] | None:
+    """Return the least number of moves of each segment between stops; None if a segment has no path."""
+    possible = np.isfinite(_hastes(replace(problem, vias=tuple(Via(via.states) for via in problem.vias))))
+    return [int(row.argmax()) for row in possible] if possible.any(axis=1).all() else None
 
 
 def fewest_moves(problem: Problem) -> int | None:

@@ -18,7 +18,7 @@ from motionmind.body.human import human23
 from motionmind.body.mirror import find_sides, mirrored
 from motionmind.corpus.gather import gather
 from motionmind.discretize.codebook import Codebook
-from motionmind.errors import CorpusError, FormatError
+from motionmind.errors import FormatError
 from motionmind.tween.certificate import Source
 from motionmind.tween.engine import Engine
 from motionmind.tween.result import Tween
@@ -93,6 +93,7 @@ def tweens(engine: Engine) -> list[Tween]:
     return [engine.tween(a.posture(i), b.posture(k)) for a, i, b, k in ends]
 
 
+@pytest.mark.long
 def test_a_tween_tells_corpus_clip_and_posture_and_what_is_mirrored_and_reversed(everything: Engine) -> None:
     kinds = set()
     for tween in tweens(everything):
@@ -115,6 +116,7 @@ def test_a_tween_tells_corpus_clip_and_posture_and_what_is_mirrored_and_reversed
     assert any(is_reversed for _, _, is_reversed in kinds)
 
 
+@pytest.mark.long
 def test_the_written_problem_of_mixed_corpora_is_made_of_what_is_reported(everything: Engine) -> None:
     for tween in tweens(everything):
         assert_reported(tween)
@@ -136,6 +138,7 @@ def test_what_a_corpus_was_made_of_is_said(everything: Engine) -> None:
     assert [entry["name"] for entry in everything.info()["clips"]][:4] == ["solo", "trio", "other: solo", "other: duet"]
 
 
+@pytest.mark.long
 def test_what_is_loaded_answers_as_what_was_saved(everything: Engine, tmp_path: Path) -> None:
     everything.save(tmp_path / "corpora" / "mine")
     loaded = Engine.load("mine", tmp_path)
@@ -163,7 +166,7 @@ def test_a_manifest_that_lacks_an_array_or_has_no_such_weight_is_refused(everyth
     clips = entries(tmp_path / "bent")
     for key, value in (("weight", 0.0), ("weight", -2.0), ("reverse", -1.0), ("reverse", 1e9)):
         put_entries(tmp_path / "bent", [clips[0], clips[1] | {key: value}, *clips[2:]])
-        with pytest.raises(CorpusError, match="trio weighs"):
+        with pytest.raises(FormatError, match="trio weighs"):
             Engine.load(str(tmp_path / "bent"))
 
 

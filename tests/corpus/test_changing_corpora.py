@@ -81,6 +81,7 @@ def built(dances: list[Motion]) -> Callable[[str], Learned]:
     return {way: learn(gathered(dances[:2], way), STATES) for way in WAYS}.__getitem__
 
 
+@pytest.mark.long
 @settings(max_examples=12, deadline=None)
 @given(way=st.sampled_from(WAYS), turns=st.lists(st.integers(0, 3), min_size=1, max_size=4), trees=st.booleans())
 def test_in_any_order_it_is_as_if_it_were_built_so(

@@ -190,6 +190,7 @@ def test_ballet_hangs_together() -> None:
     assert np.median(list(found["out_degree"].values())) >= 2.5
 
 
+@pytest.mark.long
 def test_tweens_in_ballet_are_new_and_attested() -> None:
     """At least half of the postures between random ones are in no clip, and every move of every joint is in one."""
     engine = Engine.load("ballet")

@@ -259,6 +259,17 @@ def test_a_corpus_keeps_what_its_postures_leave_out(fps: float, rate: float) -> 
     assert np.abs(again.root - clip.at(again.times).root).max() < 1e-6  # it goes evenly
 
 
+@pytest.mark.parametrize("rate", [None, 5.0])
+@pytest.mark.parametrize(("start", "stop"), [(0, 7), (3, 20), (11, None), (0, 10_000)])
+def test_part_of_a_recording_is_that_of_the_whole(rate: float | None, start: int, stop: int | None) -> None:
+    corpus = gather("arms", [shaking(300, 60.0), shaking(400, 60.0, 1)], rate=rate)
+    for clip in corpus.clips:
+        whole = corpus.recording(clip)
+        part, wanted = corpus.recording(clip, start, stop), whole.slice(start, len(whole) if stop is None else stop)
+        for name in ("rotations", "root", "times", "name", "keyframed", "recorded"):
+            np.testing.assert_array_equal(getattr(part, name), getattr(wanted, name))
+
+
 def test_a_joint_that_jumps_between_two_postures_has_no_detail_there() -> None:
     clip = shaking(361, 60.0)
     rotations = clip.rotations.copy()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import io
 import json
 import random
 import shutil
@@ -17,7 +19,7 @@ from numpy.typing import NDArray
 
 from motionmind.corpus import store
 from motionmind.corpus.fingerprint import fingerprint
-from motionmind.corpus.manifest import SourceManifest, parse_manifest
+from motionmind.corpus.manifest import SourceManifest, count_clips, parse_manifest
 from motionmind.errors import CorpusError, FormatError
 
 MANIFEST = {"name": "arms", "title": "Übung", "clips": [{"name": "a", "start": 0}], "rate": None}
@@ -123,17 +125,19 @@ def test_an_array_that_is_missing_or_another_is_named(tmp_path: Path, name: str,
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ('{"format": "motionmind-corpus", "version": 2}', "version 2; version 1 can be read"),
+        ('{"format": "motionmind-corpus", "version": 2}', "its `version` is 2; version 1 can be read"),
         ('{"format": "motionmind-built-corpus", "version": 11, "folder": 3}', "there is no folder 3 beside it"),
         ('{"format": "motionmind-built-corpus", "version": 11}', "there is no key `folder`"),
-        ('{"format": "motionmind-motion", "version": 1}', "is 'motionmind-motion' version 1"),
-        ("{}", "is None version None"),
+        ('{"format": "motionmind-motion", "version": 1}', "its `format` is 'motionmind-motion'"),
+        ("{}", "its `format` is no text"),
         ("[]", "cannot be read as a corpus's manifest"),
         ('{"format": ', "cannot be read as a corpus's manifest"),
         ("", "cannot be read as a corpus's manifest"),
         ("\udcff", "cannot be read as a corpus's manifest"),
         ("[" * 100_000, "cannot be read as a corpus's manifest"),
-        ('{"format": "motionmind-built-corpus", "version": "1"}', "version '1'; version 11 can be read"),
+        ('{"format": "motionmind-built-corpus", "version": "1"}', "its `version` is not a small number; version 11"),
+        (f'{{"format": "motionmind-corpus", "version": {"9" * 1000}}}', "its `version` is not a small number"),
+        (f'{{"format": {"[" * 300}{"]" * 300}}}', "its `format` is no text"),
     ],
 )
 def test_a_manifest_that_is_none_is_a_format_error(tmp_path: Path, text: str, words: str) -> None:
@@ -169,6 +173,7 @@ def test_a_corpus_of_another_version_is_one_line_with_the_command_that_rebuilds_
         ({"a": {"type": "|O8", "shape": [3], "sha256": ""}}, "type"),
         ({"a": {"type": "<f8", "shape": [-1], "sha256": ""}}, "shape"),
         ({"a": None}, "Expected `object`"),
+        ({"a\nb": {"type": "<f8", "shape": [3], "sha256": ""}}, "is not the name of an array"),
     ],
 )
 def test_an_entry_of_an_array_that_is_none_is_a_format_error(tmp_path: Path, change: object, words: str) -> None:
@@ -176,6 +181,42 @@ def test_an_entry_of_an_array_that_is_none_is_a_format_error(tmp_path: Path, cha
     path = tmp_path / "arms" / store.MANIFEST
     path.write_text(json.dumps(json.loads(path.read_text("utf-8")) | {"arrays": change}), "utf-8")
     with pytest.raises(FormatError, match=rf"^.*manifest.json: .*{words}.*; rebuild it: "):
+        store.load(tmp_path / "arms")
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        *(None, 7, "7", {"0": 7}, [7.0], ["7"], [True], [None], [-1], [[7]], [2**41], [10**30], ["9" * 9]),
+        *([1] * 9, [9] * 10_000, [[[]]], [{"shape": [7]}], [7, "x\ny"]),
+    ],
+    ids=lambda shape: repr(shape)[:20],
+)
+def test_shapes_are_non_negative_whole_numbers(tmp_path: Path, shape: object) -> None:
+    store.save(tmp_path / "arms", MANIFEST, arrays() | {"clips.order": np.zeros(7, np.int32)})
+    path = tmp_path / "arms" / store.MANIFEST
+    manifest = json.loads(path.read_text("utf-8"))
+    assert count_clips(manifest) == 7
+    for name in ("rotations", "clips.order"):
+        changed = manifest["arrays"] | {name: manifest["arrays"][name] | {"shape": shape}}
+        path.write_text(json.dumps(manifest | {"arrays": changed}), "utf-8")
+        with pytest.raises(FormatError, match=r"^.*manifest.json: .*shape.*; rebuild it: [^\n]*\Z") as caught:
+            store.load(tmp_path / "arms")
+        assert len(str(caught.value)) < 400
+        assert count_clips(json.loads(path.read_text("utf-8"))) == 0
+
+
+@pytest.mark.parametrize("kind", ["<f1", "|f8", "<f8\n", "<b1", ">f8", "|O8", "f8", "<i16", "<U1", ""])
+@pytest.mark.parametrize("shape", [(3,), (0, 3)])
+def test_types_are_those_of_numbers(tmp_path: Path, kind: str, shape: tuple[int, ...]) -> None:
+    store.save(tmp_path / "arms", MANIFEST, {"a": np.zeros(shape)})
+    path, file = tmp_path / "arms" / store.MANIFEST, tmp_path / "arms" / "1" / "a.npy"
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": kind, "fortran_order": False, "shape": shape})
+    file.write_bytes(header.getvalue() + bytes(24))
+    entry = {"type": kind, "shape": shape, "sha256": hashlib.sha256(file.read_bytes()).hexdigest()}
+    path.write_text(json.dumps(json.loads(path.read_text("utf-8")) | {"arrays": {"a": entry}}), "utf-8")
+    with pytest.raises(FormatError, match=r"manifest.json: .*type.*; rebuild it: "):
         store.load(tmp_path / "arms")
 
 
@@ -217,6 +258,13 @@ def test_what_a_persons_manifest_lacks_is_named() -> None:
             parse_manifest(SOURCE | {"clips": [clip]}, SourceManifest, path)
 
 
+@pytest.mark.parametrize("name", ["/dev/zero", "../.netrc", "insect.score/../secret", ""])
+def test_a_persons_manifest_names_no_files_but_scores(name: str) -> None:
+    manifest = {key: value for key, value in SOURCE.items() if key != "clips"} | {"scores": ["a.score", name]}
+    with pytest.raises(FormatError, match=r"is not a score, whose name ends in \.score"):
+        parse_manifest(manifest, SourceManifest, Path("manifest.json"))
+
+
 @pytest.mark.parametrize(("key", "value"), [("facing", "north"), ("rate", "5"), ("clips", {}), ("discretization", "x")])
 def test_what_is_wrong_in_a_persons_manifest_is_named(key: str, value: object) -> None:
     with pytest.raises(FormatError, match=rf"at `\$.{key}`"):
@@ -235,6 +283,34 @@ def test_a_name_is_a_place(tmp_path: Path, name: str) -> None:
 def test_a_name_that_is_none_is_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(CorpusError, match="cannot be a corpus's name"):
         store.place_for(name, tmp_path)
+
+
+DEVICES = ["CON", "nul.x", "Aux.tar.gz", "com1", "LPT9.v2", "prn", "com\u00b2", "mine.", "v1..."]
+
+
+@pytest.mark.parametrize("name", DEVICES)
+def test_a_name_that_windows_cannot_have_is_refused_for_a_new_corpus(tmp_path: Path, name: str) -> None:
+    with pytest.raises(CorpusError, match="cannot be a folder on Windows; choose another name"):
+        store.place_for(name, tmp_path)
+    place = tmp_path / "corpora" / name  # of an earlier version: it can be renamed and deleted
+    store.save(place, MANIFEST, arrays())
+    assert store.own_place(name, tmp_path) == place
+    store.rename(name, "other", tmp_path)
+    assert (list(store.list_corpora(tmp_path)).count("other"), place.exists()) == (1, False)
+
+
+@pytest.mark.parametrize("name", ["console", "nully", "com", "com10", "lpt", "a.con", "con-1", "v1.nul"])
+def test_a_name_that_only_resembles_a_device_is_a_place(tmp_path: Path, name: str) -> None:
+    assert store.place_for(name, tmp_path).name == name
+
+
+@pytest.mark.parametrize(("new", "known"), [("Ballet", "ballet"), ("MINE", "mine"), ("STRASSE", "straße")])
+def test_names_that_differ_only_by_case_are_refused(tmp_path: Path, new: str, known: str) -> None:
+    if known != "ballet":
+        store.save(store.place_for(known, tmp_path), MANIFEST, arrays())
+        assert store.place_for(known, tmp_path).is_dir()  # its own name is none of another
+    with pytest.raises(CorpusError, match=f"{new!r} differs from the corpus {known!r} only by case"):
+        store.place_for(new, tmp_path)
 
 
 def test_a_bundled_corpus_keeps_its_name(tmp_path: Path) -> None:

@@ -65,6 +65,24 @@ def test_many_frames_are_left_out_of_what_is_learned(kind: str) -> None:
         assert len(gather("mine", [faulty]).clips) == 2
 
 
+@pytest.mark.parametrize("period", [6, 13, 29, 30, 59, 61, 100])
+@pytest.mark.parametrize("rounds", [2, 3, 6])
+@pytest.mark.parametrize("heading_deg", [0.0, 75.0, 200.0])
+@pytest.mark.parametrize("turn_deg", [0.0, 40.0])
+def test_a_loop_that_is_put_back_is_cut(period: int, rounds: int, heading_deg: float, turn_deg: float) -> None:
+    """Walks of 1.5 m a round, straight or in a curve, that begin again at their start, a millimetre off."""
+    at = np.arange(period * rounds) % period
+    once, share = dance(period), at / period
+    heading = np.radians(heading_deg + turn_deg * share)
+    root = np.stack([np.sin(heading) * 1.5 * share, 0.9 + 0.0 * share, np.cos(heading) * 1.5 * share], axis=1)
+    root += np.random.default_rng(period).normal(scale=0.001, size=root.shape)
+    rotations = once.rotations[at].copy()
+    rotations[:, 0] = rot.mul(rot.from_axis_angle([0.0, 1.0, 0.0], heading), rotations[:, 0])
+    loop = Motion(once.skeleton, rotations, root, np.arange(len(at)) / FPS, "loop")
+    assert find_gaps(loop) == [Gap(start, start, "leap") for start in range(period, len(at), period)]
+    assert fill_gaps(loop).motion.root == pytest.approx(root, abs=0.0)
+
+
 def test_a_leap_is_no_movement() -> None:
     motion = dance()
     root = motion.root.copy()

@@ -292,6 +292,7 @@ def test_a_dancers_raised_legs_are_put_back(shared_data: Path) -> None:
         assert np.degrees(rot.angle(*mended.motion.rotations[one.start - 1 : one.start + 1, hip])) < 15.0
 
 
+@pytest.mark.long
 def test_a_dancers_clips_stay_whole(shared_data: Path) -> None:
     clips = [own_skeleton(read_motion(path)) for path in sorted((shared_data / "cmu-05").glob("*.bvh"))]
     engine = Engine.fit(clips, name="dancer", skip=1)

@@ -292,6 +292,7 @@ def test_what_cannot_be_mirrored_names_the_clip() -> None:
 # --- the command line -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_corpus_is_built_of_files_and_another_corpus_and_tells_it(run: Run) -> None:
     write_motion("walk.json", dance("walk", 1))
     write_motion("spin.json", dance("spin", 2))
@@ -325,6 +326,7 @@ def test_a_corpus_is_built_of_files_and_another_corpus_and_tells_it(run: Run) ->
     assert {source["corpus"] for source in sources if source} == {"mine", "theirs"}
 
 
+@pytest.mark.long
 def test_a_corpus_is_built_of_other_corpora_alone(run: Run, tmp_path: Path) -> None:
     write_motion("walk.json", dance("walk", 1))
     assert run("corpus", "build", "walks", "walk.json").code == 0

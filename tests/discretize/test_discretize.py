@@ -240,6 +240,7 @@ def test_small_blocks_give_the_same_as_one() -> None:
         assert np.allclose(whole[1], part[1], rtol=0.0, atol=1e-15)
 
 
+@pytest.mark.long
 def test_the_same_bytes_whatever_the_hash_seed() -> None:
     script = (
         "import hashlib, sys, numpy as np\n"
@@ -403,6 +404,7 @@ tables = st.dictionaries(
 
 
 class TestLibrary:
+    @pytest.mark.long
     @given(tables, words, words, words)
     @settings(max_examples=80, deadline=None)
     def test_what_is_written_is_read_back(self, states: dict, title: str, author: str, licence: str) -> None:

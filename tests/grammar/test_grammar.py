@@ -287,6 +287,7 @@ def test_the_k_d_tree_finds_the_bridges_of_all_pairs(monkeypatch: pytest.MonkeyP
             np.testing.assert_allclose(one, other, atol=1e-5)
 
 
+@pytest.mark.long
 def test_bridges_of_twice_as_many_states_look_at_hardly_more_than_twice_as_many_pairs(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -518,6 +519,7 @@ def test_the_best_path_is_that_of_brute_force_on_counts_and_cpds(
                     assert learned.transitions.edge(chain, s, t) >= 0 or s == t == goal[chain]
 
 
+@pytest.mark.long
 def test_fresh_processes_give_the_same_bytes_whatever_their_hash_seed() -> None:
     code = (
         "import sys, numpy as np; sys.path[:0] = sys.argv[1:]\n"

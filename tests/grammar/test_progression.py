@@ -315,6 +315,7 @@ def test_a_guide_over_moves_is_paid_on_the_way_and_the_optimum_is_that_of_toulba
     assert checked > 10
 
 
+@pytest.mark.long
 def test_paths_are_drawn_as_often_as_they_are_likely() -> None:
     tried = 0
     for seed in range(60):
@@ -385,6 +386,7 @@ def join(engine: Engine, **asked: Any) -> Tween:
     return engine.tween(a, b, coordination="progression", **asked)
 
 
+@pytest.mark.long
 def test_the_report_adds_up_to_the_cost(engine: Engine) -> None:
     plain = join(engine)
     assert plain.status == "optimal"
@@ -436,6 +438,7 @@ def test_more_moves_than_a_node_can_number_are_refused(engine: Engine, monkeypat
         join(engine)
 
 
+@pytest.mark.long
 def test_the_command_line_finds_the_same_and_writes_its_problem(run: Run, engine: Engine, tmp_path: Path) -> None:
     problem = tmp_path / "problem.cfn"
     a, b = POSTURES / "arabesque.json", POSTURES / "fifth.json"

@@ -18,6 +18,7 @@ from saved_corpora import kill_before
 
 import motionmind
 from motionmind.corpus import cache, store
+from motionmind.corpus.corpus import Corpus
 from motionmind.errors import MotionMindWarning
 from motionmind.learned import persistence
 from motionmind.learned.learning import Learned
@@ -53,6 +54,29 @@ def no_learning(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(persistence, "learn_from_states", lambda *_: pytest.fail("it was learned again"))
 
 
+@pytest.mark.parametrize("name", ["hands", "walk-hexapod"])
+def test_the_movement_of_a_corpus_loads_without_learning(
+    name: str, empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def is_whole(movement: Corpus) -> bool:
+        arrays = ("rotations", "root", "times", "detail")
+        return all(np.array_equal(getattr(movement, one), getattr(corpus, one)) for one in arrays) and (
+            list(movement.clips) == list(corpus.clips) and movement.own_origin == corpus.own_origin
+        )
+
+    with monkeypatch.context() as patch:
+        for learn in ("learn", "learn_from_states"):
+            patch.setattr(persistence, learn, lambda *_: pytest.fail("it was learned"))
+        composed = persistence.load_corpus(name)
+    corpus = persistence.load(name).corpus
+    (built,) = cache.cache_folder("corpora").iterdir()
+    with monkeypatch.context() as patch:
+        patch.setattr(persistence, "_read_source", lambda *_: pytest.fail("it was composed again"))
+        assert all(map(is_whole, [composed, persistence.load_corpus(name), persistence.load_corpus(str(built))]))
+    (built / store.MANIFEST).write_bytes(b"")
+    assert is_whole(persistence.load_corpus(name))  # composed, whatever the cache holds
+
+
 def test_a_build_fills_the_cache_and_loading_learns_what_it_does_not_hold(
     hands: Learned, built: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -63,6 +87,24 @@ def test_a_build_fills_the_cache_and_loading_learns_what_it_does_not_hold(
     assert is_same(persistence.load(str(built)), hands)
     no_learning(monkeypatch)
     assert is_same(persistence.load(str(built)), hands)
+
+
+def test_arrays_that_others_could_have_written_are_learned_again_elsewhere(
+    hands: Learned, built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cache, "temporary_folder", lambda: tmp_path / "temporary")
+    for shared in (cache.cache_folder("learned"), cache.cache_folder("learned").parent):
+        cache._private.cache_clear()
+        shared.chmod(0o777)
+        (array := next(kept().glob("*.npy"))).write_bytes(b"not looked at")
+        assert is_same(persistence.load(str(built)), hands)
+        assert array.read_bytes() == b"not looked at"
+        with monkeypatch.context() as patch:
+            no_learning(patch)
+            assert is_same(persistence.load(str(built)), hands)
+        shared.chmod(0o700)
+        shutil.rmtree(tmp_path / "temporary")
+    cache._private.cache_clear()
 
 
 def flip(file: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from typing import Any
 
 import numpy as np
@@ -38,14 +39,18 @@ def wander(seed: int, count: int, joints: int, pace: float) -> Floats:
     joints=st.integers(1, 6),
     pace=st.sampled_from([0.0, 0.01, 0.1, 1.0]),
     block=st.sampled_from([1, 7, 64]),
+    decomposed=st.sampled_from([1, 64]),
 )
-def test_clusters_are_those_of_all_comparisons(seed: int, joints: int, pace: float, block: int) -> None:
+def test_clusters_are_those_of_all_comparisons(
+    seed: int, joints: int, pace: float, block: int, decomposed: int
+) -> None:
     orientations = wander(seed, 60, joints, pace)
     orientations[17:23] = orientations[40:46]  # what is danced again is in the same cluster
     within = joints * CLUSTER_RADIUS_RAD**2
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(clusters, "N_POSTURES_PER_BLOCK", block)
         patch.setattr(clusters, "MAX_FOUNDERS_COMPARED", 60)
+        patch.setattr(clusters, "MAX_JOINTS_DECOMPOSED", decomposed)
         found = clusters.clusters(orientations, within)
     np.testing.assert_array_equal(found, one_by_one(orientations, within))
     np.testing.assert_array_equal(found[17:23], found[40:46])
@@ -95,3 +100,24 @@ def test_those_that_look_nearest_are_compared_and_no_others(seed: int, most: int
         if enough < 0.0:
             assert (least[posture], place[posture]) == (min(distances), compared[np.argmin(distances)])
         assert (least[posture] > enough) == (min(distances) > enough)
+
+
+@given(seed=st.integers(0, 2**32 - 1), joints=st.integers(65, 90), count=st.integers(1, 40))
+def test_directions_of_many_joints_keep_nearly_all_that_exact_ones_do(seed: int, joints: int, count: int) -> None:
+    points = clusters._points(wander(seed, count, joints, 0.1))
+    points -= points.mean(axis=0)
+    directions = clusters._directions(points)
+    np.testing.assert_allclose(directions.T @ directions, np.eye(clusters.N_TREE_DIMENSIONS), atol=1e-9)
+    greatest = np.linalg.svd(points, compute_uv=False)[: clusters.N_TREE_DIMENSIONS]
+    assert np.sum((points @ directions) ** 2) >= 0.98 * np.sum(greatest**2)
+
+
+def test_memory_is_in_proportion_to_the_joints() -> None:
+    peaks = []
+    for joints in (200, 800):
+        orientations = wander(0, 20, joints, 0.1)
+        tracemalloc.start()
+        clusters.clusters(orientations, joints * CLUSTER_RADIUS_RAD**2)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 6.0 * peaks[0]

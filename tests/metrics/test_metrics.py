@@ -448,6 +448,7 @@ def test_a_corpus_measures_itself_within_its_range_but_for_what_it_copies(engine
     assert found["moves"].value == len(clip) - 1
 
 
+@pytest.mark.long
 def test_a_body_that_bounces_does_so_beyond_the_corpus() -> None:
     ballet = Engine.load("ballet")
     clip = at_rate(ballet.corpus.recording(ballet.corpus.clips[0])).slice(0, 60)

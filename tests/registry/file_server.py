@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
+import socketserver
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -80,5 +81,29 @@ def serving_files(folder: Path) -> Iterator[Files]:
         try:
             yield files
         finally:
+            server.shutdown()
+            thread.join()
+
+
+@contextmanager
+def dripping(at_once: bytes, then: bytes, pause: float = 0.02) -> Iterator[str]:
+    """Answer each request with some bytes, and then with others again and again, as long as the client is there."""
+    over = threading.Event()
+
+    class Handler(socketserver.BaseRequestHandler):
+        def handle(self) -> None:
+            with suppress(OSError):
+                self.request.recv(1 << 16)
+                self.request.sendall(at_once)
+                while not over.wait(pause):
+                    self.request.sendall(then)
+
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Handler) as server:
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True)
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{server.server_address[1]}/file"
+        finally:
+            over.set()
             server.shutdown()
             thread.join()

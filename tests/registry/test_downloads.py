@@ -7,11 +7,12 @@ import http.client
 import shutil
 import socket
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from file_server import Files, serving_files
+from file_server import Files, dripping, serving_files
 
 from motionmind.errors import CorpusError
 from motionmind.registry import download as downloads
@@ -169,12 +170,71 @@ def test_no_network_is_said_at_once_and_what_has_come_stays(place: Place) -> Non
         read_address(nobody, 1000)
 
 
-def test_a_server_that_says_nothing_is_not_waited_for(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(downloads, "_TIMEOUT_S", 0.1)
+@pytest.fixture
+def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Limit all time to 0.3 s."""
+    monkeypatch.setattr(downloads, "_TIMEOUT_S", 0.3)
+    monkeypatch.setattr(downloads, "_INDEX_TIMEOUT_S", 0.3)
+
+
+def test_a_server_that_says_nothing_is_not_waited_for(place: Place, hasty: None) -> None:
     with socket.create_server(("127.0.0.1", 0)) as silent:
         url = f"http://127.0.0.1:{silent.getsockname()[1]}/file"
-        with pytest.raises(CorpusError, match=r"nothing came for 0\.1 s"):
+        with pytest.raises(CorpusError, match=r"0 of 1,004,000 bytes have come: less than 1 kB/s came for 0\.3 s"):
             place.fetch(url)
+        with pytest.raises(CorpusError, match=r"cannot be reached: it took longer than 0\.3 s"):
+            read_address(url, 1000)
+
+
+HEAD = b"HTTP/1.1 200 OK\r\n"
+CHUNKED = HEAD + b"Transfer-Encoding: chunked\r\n\r\n"
+DRIPS = {
+    "the status": (b"HTTP/1.1 200 ", b"O", 0.02),
+    "a header": (HEAD + b"Server: ", b"x", 0.02),
+    "headers": (HEAD, b"A: b\r\n", 0.02),
+    "answers before the answer": (b"", 1000 * b"HTTP/1.1 100 Continue\r\n\r\n", 0.0),
+    "the length of a chunk": (CHUNKED, b"0", 0.02),
+    "chunks": (CHUNKED, b"1\r\nx\r\n", 0.02),
+    "what follows chunks": (CHUNKED + b"1\r\nx\r\n0\r\n", b"A: b\r\n", 0.02),
+    "the file": (HEAD + b"Content-Length: 1004000\r\n\r\n", b"x", 0.02),
+}
+
+
+@pytest.mark.parametrize("what", DRIPS)
+def test_a_server_that_drips_for_ever_is_left(what: str, place: Place, hasty: None) -> None:
+    with dripping(*DRIPS[what]) as url:
+        with pytest.raises(CorpusError, match=r"bytes have come: less than 1 kB/s came"):
+            place.fetch(url)
+        with pytest.raises(CorpusError, match=r"cannot be reached: it took longer"):
+            read_address(url, 10**6)
+    assert not place.whole.exists()
+
+
+def test_a_redirection_without_end_is_followed_at_once(place: Place) -> None:
+    with (
+        dripping(HEAD + b"Content-Length: 9\r\n\r\n", b"all of it") as there,
+        dripping(b"HTTP/1.1 302 Found\r\nLocation: " + there.encode() + b"\r\n\r\n", bytes(10**6), 0.0) as url,
+    ):
+        assert read_address(url, 9) == (b"all of it", there)
+
+
+@pytest.mark.parametrize(("rate", "lasts"), [(0.0, 30.0), (500.0, 60.0), (900.0, 300.0), (1001.0, None), (1e6, None)])
+def test_a_download_lasts_as_long_as_its_rate_is_high(
+    rate: float, lasts: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = 1000.0
+    monkeypatch.setattr(downloads, "monotonic", lambda: now)
+    deadline = downloads._Deadline(30.0, "slow")
+    for quick in (0.0, 3600.0):  # an hour at 1 MB/s buys no more time afterwards
+        now += quick
+        deadline.postpone(int(quick * 1e6))
+    begun = now
+    with suppress(TimeoutError):
+        while now - begun < 3600.0:
+            now += 0.5
+            deadline.left()
+            deadline.postpone(int(rate * 0.5))
+    assert now - begun == pytest.approx(3600.0 if lasts is None else lasts, rel=0.05)
 
 
 def test_another_part_than_was_asked_for_is_not_taken(

@@ -402,6 +402,7 @@ def test_an_index_that_is_not_there_is_named(run: Run) -> None:
 EVERY = 13  # of the changes of the disk, one is the last of a process
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the system has no fork")
 def test_a_kill_before_a_change_of_the_disk_leaves_no_corpus_or_the_whole(published: Path, tmp_path: Path) -> None:
     index, home = str(published / "index.json"), tmp_path / "home"

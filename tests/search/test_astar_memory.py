@@ -165,6 +165,7 @@ def test_all_numbers_of_moves_together_take_no_more_expansions_than_are_allowed(
     assert spent > 5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("budget", [30, 45, 70])
 def test_full_memory_loses_a_quarter_of_its_nodes_and_keeps_the_bound(budget: int) -> None:
     """Or all but the way to the node that is being expanded: so forgetting is paid for by the nodes then made anew."""

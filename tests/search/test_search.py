@@ -69,6 +69,7 @@ def a_body(**changes: Any) -> Toy:
 # --- the answer ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_the_cost_at_every_number_of_moves_is_that_of_brute_force(kind: dict[str, bool]) -> None:
     for seed in range(120):
         toy = random_toy(seed, **kind)
@@ -94,6 +95,7 @@ def test_the_cost_over_all_numbers_of_moves_is_the_least_of_them(kind: dict[str,
             assert found.cost == pytest.approx(least, abs=PROVEN), seed
 
 
+@pytest.mark.long
 def test_a_path_keeps_the_rules_and_costs_what_is_stated(kind: dict[str, bool]) -> None:
     for seed in range(100):
         toy = random_toy(seed, **kind)
@@ -103,6 +105,7 @@ def test_a_path_keeps_the_rules_and_costs_what_is_stated(kind: dict[str, bool]) 
                 assert toy.cost(found.path) == pytest.approx(found.cost, abs=ROUNDING), (seed, node_budget)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pairs", [0, bounding.MAX_STATE_PAIRS])
 @pytest.mark.parametrize("sweeps", [1, 2])
 def test_bound_optimum_and_cost_stand_in_this_order_whatever_effort_is_allowed(
