@@ -134,7 +134,9 @@ class State:
         body, count = self.body, len(self.body.skeleton)
         centres = np.broadcast_to(body.mass_centres, (len(self.x), count, 3))
         own = self.places[:, :count] + rot.mul_vec(self.global_rotations, centres)
-        return np.asarray(np.einsum("ij,tik->tjk", body.ancestors * body.mass_shares[:, None], own))
+        heavy = slice(None) if body.has_masses else slice(1)  # all of it in the root
+        shares = body.ancestors[heavy] * body.mass_shares[heavy, None]
+        return np.asarray(np.einsum("ij,tik->tjk", shares, own[:, heavy]))
 
     @cached_property
     def mass_jacobian(self) -> Floats:

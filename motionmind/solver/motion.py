@@ -7,7 +7,7 @@ the root and the joints of all frames. Its terms (`motionmind.solver.terms`) sta
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -32,13 +32,16 @@ from motionmind.solver.collision import Collision
 from motionmind.solver.kinematics import Freedom, State, body_of
 from motionmind.solver.one_sided import BOUND_TOLERANCE, UP, Balance, Floor, Limits
 from motionmind.solver.plan import Plan, plan_contacts
+from motionmind.solver.reaches import Reach, Stay, joints_towards, reaches_in, within_workspace
 from motionmind.solver.residual import Residual
+from motionmind.solver.route import Route
 from motionmind.solver.solve import Problem, solve
 from motionmind.solver.speed_bounds import Speed, Travel
 from motionmind.solver.terms import Ballistic, Contacts, Smoothness, Term, Track
 from motionmind.solver.weights import WEIGHTS, Weights
 
 MOTIONLESS_RAD = 2e-3  # a joint that leaves its first orientation by less does not move
+MAX_FREE_JOINTS = 48  # the time of a solve is cubic in their number; people have 13, stick insects 23
 LEGS_PASS_S = 0.12  # before legs meet and after they part, in which the plane between them turns; chosen on cmu-05
 N_WINDOW_FRAMES = 400  # solved at once
 N_OVERLAP_FRAMES = 60  # at the end of a window, which the next window solves again
@@ -112,6 +115,8 @@ def solve_motion(
     without: Collection[Correction] = (),
     before: Synthesis | None = None,
     weights: Weights = WEIGHTS,
+    reaches: Sequence[Reach] = (),
+    stays: Sequence[Stay] = (),
 ) -> Synthesis:
     """Return the movement near a reference that its feet carry, exact in the given postures.
 
@@ -125,11 +130,14 @@ def solve_motion(
         without: terms to leave out (`motionmind.footing.corrections`).
         before: movement to start from (`Synthesis.at`); None for the reference.
         weights: standard deviations of the terms.
+        reaches: places for joints at given times.
+        stays: joints that keep their places for a while.
     """
     size = size_of(skeleton)
     by, person = 1.0 / size, _as_large_as_a_person(skeleton)
     lengths = stance.scaled(by), given.scaled(by), bounds.scaled(by)
-    scene = _Scene(person, reference, times, *lengths, GRAVITY_MPS2 / size, without, weights, before)
+    wanted = [reach.scaled(by) for reach in reaches]
+    scene = _Scene(person, reference, times, *lengths, GRAVITY_MPS2 / size, without, weights, before, wanted, stays)
     x = scene.solve()
     state = scene.problem(slice(0, len(times))).state(x)
     root = size * state.root
@@ -156,6 +164,8 @@ class _Scene:
         without: Collection[Correction],
         weights: Weights,
         before: Synthesis | None,
+        reaches: Sequence[Reach],
+        stays: Sequence[Stay],
     ) -> None:
         self.before = before
         self.skeleton, self.reference, self.given, self.bounds = skeleton, reference, given, bounds
@@ -164,8 +174,16 @@ class _Scene:
         self.posed = pose(skeleton, reference)
         self.ground = find_ground(skeleton, self.posed, times, stance, given, self.feet, gravity)
         self.body = body_of(skeleton)
+        places = self.posed.places + self.ground.root[:, None]
+        reaches = [*reaches, *(reach for stay in stays for reach in stay.reaches(skeleton, places, times))]
+        self.reaches = []
+        for reach in reaches:
+            frame = min(round(self.fps * reach.seconds), len(times) - 1)
+            self.reaches.append(within_workspace(skeleton, reach, places[frame]))
         # Keep the degrees of freedom: on another clock a joint that hardly moves may seem still.
-        self.freedom = _freedom(skeleton, bounds.fixed, reference) if before is None else before.freedom
+        self.reaching, self.reaching_limbs = joints_towards(skeleton, reaches)
+        reaching = self.reaching, self.reaching_limbs
+        self.freedom = before.freedom if before else _freedom(skeleton, bounds.fixed, reference, *reaching)
         self.stops = self.fps * stance.half_steps[2 * np.array(list(given.low))]
         moving = given.rates[0] is not None, given.rates[1] is not None
         self.fixed = np.zeros(len(times), dtype=np.bool_)
@@ -235,10 +253,10 @@ class _Scene:
                 (None if rate[0] is None else float(rate[0][1]), None if rate[1] is None else float(rate[1][1])),
             )
             falls = None if self.before is None else self.before.falls[part]
-            flies = "flight" not in self.without
-            yield plan_contacts(
-                self.skeleton, stretch, mass[part], self.feet, self.overhang, self.gravity, self.fps, flies, falls
-            )
+            fixed = self.overhang, self.gravity, self.fps, "flight" not in self.without
+            plan = plan_contacts(self.skeleton, stretch, mass[part], self.feet, *fixed, falls)
+            plan.reach_with_feet(self.reaches)
+            yield plan
 
     def _terms(self, frames: slice, root: Floats) -> list[Term]:
         """Return the terms of a slice of the frames, with the root near these positions [M, 3]."""
@@ -247,7 +265,7 @@ class _Scene:
         for plan in self.plans:
             flying[plan.stretch.frames] |= plan.flying
         flying = flying[frames]
-        sds, runs = _sds(self.skeleton, self.freedom, bounds.wished, fps, w)
+        sds, runs = _sds(self.skeleton, self.freedom, bounds.wished, fps, w, self.reaching_limbs)
         floor = self.ground.floor[frames]
         push = w.push_level, w.push_vertical if "bounce" not in self.without else np.inf
         terms: list[Term] = [
@@ -257,6 +275,10 @@ class _Scene:
             self._contacts(frames, root),
             Floor(floor, w.floor),
         ]
+        if self.reaches and (reaches := reaches_in(self.reaches, frames, fps, w.reach, w.reach_pull)):
+            terms.append(reaches)
+        if self.given.route is not None:
+            terms.append(Route(self.given.route, w.route, w.route_pull))
         if len(self.freedom.joints):
             terms.append(Limits(self.reference[self.fixed], bounds.loose, w.limits))
         if self.body.has_masses and "balance" not in self.without:
@@ -318,21 +340,33 @@ class _Scene:
         return out[frames]
 
 
-def _freedom(skeleton: Skeleton, fixed: Bools, reference: Floats) -> Freedom:
+def _freedom(
+    skeleton: Skeleton,
+    fixed: Bools,
+    reference: Floats,
+    reaching: Collection[int] = (),
+    limbs: Collection[int] = (),
+) -> Freedom:
     """Return the degrees of freedom of a solve: legs down to the foot, and other joints with a long reach.
 
-    A fixed joint has none, nor has a joint outside the legs that the reference does not turn. Knees and elbows are
-    hinges.
+    A fixed joint has none, nor has a joint that the reference does not turn, outside the legs and the `reaching` ones.
+    Joints of reaching `limbs` have a reach of any length.
+    Knees and elbows are hinges. If more than MAX_FREE_JOINTS qualify, those with the shortest reach keep the reference.
     """
     moves = rot.angle(reference, reference[:1]).max(axis=0) > MOTIONLESS_RAD
     joints, axes, legs, reach = [], [], _in_legs(skeleton), _reach(skeleton)
     # The first joint of a long limb is a collarbone.
     chosen = reach > 0.3  # m
     chosen[[limb[0] for limb in limbs_of(skeleton) if len(limb) > 3]] = False
-    for joint in range(len(skeleton)):
-        free = legs[joint] <= 1 if joint in legs else chosen[joint]
-        if not free or fixed[joint] or not (moves[joint] or joint in legs):
-            continue
+    chosen[list(limbs)] = True
+    free = [
+        joint
+        for joint in range(len(skeleton))
+        if (legs[joint] <= 1 if joint in legs else chosen[joint])
+        and not fixed[joint]
+        and (moves[joint] or joint in legs or joint in reaching)
+    ]
+    for joint in sorted(sorted(free, key=lambda joint: -reach[joint])[:MAX_FREE_JOINTS]):
         is_hinge = legs.get(joint) == 0 or skeleton.names[joint].endswith("elbow")
         hinge = find_hinge(skeleton, joint) if is_hinge else None
         own = np.eye(3) if hinge is None else hinge[None]
@@ -341,7 +375,9 @@ def _freedom(skeleton: Skeleton, fixed: Bools, reference: Floats) -> Freedom:
     return Freedom(np.array(joints, dtype=np.int64), np.concatenate([np.zeros((0, 3)), *axes]))
 
 
-def _sds(skeleton: Skeleton, freedom: Freedom, wished: Bools, fps: float, weights: Weights) -> tuple[Floats, Floats]:
+def _sds(
+    skeleton: Skeleton, freedom: Freedom, wished: Bools, fps: float, weights: Weights, reaching: Collection[int]
+) -> tuple[Floats, Floats]:
     """Return standard deviations of the unknowns (`Track`) and of their second differences (`Smoothness`) [n]."""
     legs, limbs = _in_legs(skeleton), {joint for limb in limbs_of(skeleton) for joint in limb}
     level, vertical, seconds = weights.root_level, weights.root_height, [weights.root_s] * 3
@@ -349,8 +385,8 @@ def _sds(skeleton: Skeleton, freedom: Freedom, wished: Bools, fps: float, weight
     for joint in freedom.joints.tolist():
         if joint in legs:
             own, slow = (weights.hip, weights.knee, weights.foot)[min(legs[joint], 1) + 1], weights.legs_s
-        elif joint in limbs:
-            own, slow = weights.arm, weights.arms_s
+        elif joint in limbs or joint in reaching:
+            own, slow = weights.arm, weights.reach_s if joint in reaching else weights.arms_s
         else:
             own, slow = weights.pelvis if joint == 0 else weights.trunk, weights.trunk_s
         # Legs may leave the states that a request constrains, so that feet can stand.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -25,9 +25,12 @@ from motionmind.footing.support_phases import (
     find_support_phases,
 )
 from motionmind.learned.posture_statistics import FIRMNESS_HALVED_MPS
+from motionmind.solver.reaches import Reach
 from motionmind.solver.terms import Contacts
 
 STEP_HEIGHT_M = 0.105  # of a step from 0.3 m on whose reference does not lift the foot; chosen on cmu-05 and cmu-16
+LIFT_S = 0.1  # before and after a reach for which its foot is off the floor
+STANDS_THERE_M = 0.02  # distance of a standing foot from the place of a reach that it need not leave the floor for
 FULL_SWING_M = 0.08  # height of a swinging foot from which its standard deviations apply in full
 
 
@@ -93,6 +96,8 @@ class Plan:
         overhang: allowed distance of the centre of mass from the support, metres.
         fps: frames a second.
         falls: how far it would fall without each foot [N, feet], 0 to 1; None where unknown.
+        lifted: whether each foot is off the floor for a reach [N, feet]; None for none.
+        passes: a foot, a frame, and the position of the root [3] at which the foot would be at its place then, metres.
         phases: its support: stances of the feet, and other parts on the floor.
     """
 
@@ -106,12 +111,22 @@ class Plan:
     overhang: float
     fps: float
     falls: Floats | None
+    lifted: Bools | None = None
+    passes: list[tuple[int, int, Floats]] = field(default_factory=list)
     phases: SupportPhases = field(init=False)
 
     def plan_steps(self) -> None:
         """Plan the steps."""
         self.phases = find_support_phases(
-            self.shape, self.stretch, self.mass, self.flying, self.staying, self.feet, self.fps, self.falls
+            self.shape,
+            self.stretch,
+            self.mass,
+            self.flying,
+            self.staying,
+            self.feet,
+            self.fps,
+            self.falls,
+            self.lifted,
         )
 
     def replan_steps(self, root: Floats, mass: Floats) -> bool:
@@ -159,6 +174,26 @@ class Plan:
             _stacked([part.slips for part in parts], (count - 1, 0)),
         )
 
+    def reach_with_feet(self, reaches: Sequence[Reach]) -> None:
+        """Plan the steps again so that feet pass the places of their own reaches."""
+        root, first, last = self.stretch.ground.root, self.stretch.frames.start, len(self.mass) - 1
+        planned, lifted = self._off(root), np.zeros((last + 1, len(self.feet)), dtype=np.bool_)
+        for reach in reaches:
+            at = self.fps * reach.seconds - first
+            frame = round(at)
+            for k, foot in enumerate(self.feet):
+                if not 0 < frame < last or reach.joint not in foot.leg[foot.knee :]:
+                    continue
+                off = reach.place - self.shape.places[frame, reach.joint] - root[frame]
+                if np.linalg.norm(off - planned[frame, k]) > STANDS_THERE_M or not self.phases.stands[frame, k]:
+                    lifted[1:-1, k] |= np.abs(np.arange(last + 1) - at)[1:-1] <= LIFT_S * self.fps
+                    self.passes.append((k, frame, off + root[frame]))
+        if lifted.any():
+            self.lifted = lifted
+            if self.staying is not None and lifted[:, self.staying].any():
+                self.staying = None
+            self.plan_steps()
+
     def _of_feet(self, root: Floats, steps: bool) -> Iterator[_Point]:
         """Yield the targets of the feet's points."""
         shape, phases, ground, off = self.shape, self.phases, self.stretch.ground, self._off(root)
@@ -173,6 +208,8 @@ class Plan:
             speed = np.hypot(FIRMNESS_HALVED_MPS * np.sqrt(1.0 / firm - 1.0), SDS.firm_speed)
             high = np.maximum(shape.low[:, k] + root[:, 1] + off[:, k, 1] - ground.floor, 0.0)
             free = np.where(self.flying, np.inf, np.clip(high / FULL_SWING_M, SDS.low_swing, 1.0))
+            if self.lifted is not None:
+                free[self.lifted[:, k]] = np.inf
             still = stands[1:] & stands[:-1]
             slip = np.where(still, 0.5 * (speed[1:] + speed[:-1]), SDS.low_swing_speed) / self.fps
             for point in np.flatnonzero(shape.feet[k]):
@@ -225,7 +262,11 @@ class Plan:
                     near = np.clip(1.0 - np.abs(np.arange(count) - edge) / (0.3 * self.fps), 0.0, 1.0)
                     wanted += height[edge, k] * smoothstep(near)
                 off[here, 1] = (wanted - height[:, k])[here]
-            edges = [0, *(frame for stance in phases.stances[k] for frame in (stance.start, stance.end)), count - 1]
+            passed = [(frame, place) for foot, frame, place in self.passes if foot == k and not phases.stands[frame, k]]
+            for frame, place in passed:
+                off[frame] = place - root[frame]
+            stops = [*((stance.start, stance.end) for stance in phases.stances[k]), *((at, at) for at, _ in passed)]
+            edges = [0, *(frame for stop in sorted(stops) for frame in stop), count - 1]
             for begin, end in zip(edges[::2], edges[1::2], strict=True):
                 if end - begin < 2:
                     continue

@@ -24,6 +24,11 @@ class Weights(NamedTuple):
         speed: excess angular speed of a joint, rad/s.
         travel: excess speed of the root, m/s.
         pushes: excess acceleration of the root, m/s^2.
+        reach: distance of a joint from its place in a reach, metres.
+        reach_pull: distance beyond which the pull there is constant, metres.
+        route: excess distance of the root from a drawn path, metres.
+        route_pull: excess beyond which the pull there is constant, metres.
+        reach_s: time over which a reaching arm departs from the reference and returns, seconds.
     """
 
     pelvis: float = 0.08
@@ -51,6 +56,11 @@ class Weights(NamedTuple):
     speed: float = 0.03
     travel: float = 0.02
     pushes: float = 0.2
+    reach: float = 0.001
+    reach_pull: float = 0.005
+    route: float = 0.005
+    route_pull: float = 0.1
+    reach_s: float = 0.2
 
 
 WEIGHTS = Weights()

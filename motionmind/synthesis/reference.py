@@ -16,6 +16,7 @@ from motionmind.body.support import size_of
 from motionmind.corpus.corpus import Corpus, subdivide_times
 from motionmind.footing.ground import Stance, ends_in_air
 from motionmind.geometry import rotations as rot
+from motionmind.geometry.polylines import places_along
 from motionmind.geometry.splines import rotation_spline
 from motionmind.learned.posture_statistics import PostureStatistics
 from motionmind.solver.motion import MOTIONLESS_RAD
@@ -53,7 +54,7 @@ class Reference(NamedTuple):
 def find_reference(path: Int32s, style: Style, wishes: Wishes) -> Reference:
     """Return the mean of the corpus walks near a path, moved like a passage, in the time that they take."""
     a, b, corpus, statistics, grammar = wishes.a, wishes.b, style.corpus, style.statistics, style.grammar
-    clock = timeline(path, grammar.transitions, wishes.fps, wishes.length)
+    clock = timeline(path, grammar.transitions, wishes.fps, wishes.length, wishes.fixed_times)
     postures = {0: a, **wishes.through, len(path) - 1: b}
     stops = {move: stop_at(corpus, posture) for move, posture in postures.items()}
     # Find the walk at a pace of 1, then scale it in time.
@@ -74,8 +75,7 @@ def find_reference(path: Int32s, style: Style, wishes: Wishes) -> Reference:
     if wishes.length is None:
         longer = np.full(len(travel), slower)
         if style.fastest is not None:
-            missing = (b.root - a.root) / size - travel.sum(axis=0)
-            even = travel + missing / len(travel)
+            even = travel - travel.mean(axis=0) + _even_steps(wishes, len(travel)) / size
             longer *= keep_pace(walk, clock.frames, corpus, style.fastest, even, wishes.moving)
             if "flight" not in wishes.without:
                 # Steps and weight shifts keep their own time: at a slower pace they stay as fast as in the corpus.
@@ -89,6 +89,14 @@ def find_reference(path: Int32s, style: Style, wishes: Wishes) -> Reference:
     lasts = float(statistics.trust.lasts[0])
     rotations = _with_velocities(rotations, clock, [*stops], wishes.leaving, wishes.arriving, lasts)
     return Reference(clock, _within_limits(rotations, postures, statistics.loose), stance, low, danced, walk.left_out)
+
+
+def _even_steps(wishes: Wishes, count: int) -> Floats:
+    """Return equal steps of the root from `a` to `b`, straight or along the route [count, 3], metres."""
+    if wishes.route is None:
+        return np.tile((wishes.b.root - wishes.a.root) / count, (count, 1))
+    steps = np.diff(places_along(wishes.route, np.linspace(0.0, 1.0, count + 1)), axis=0)
+    return np.stack([steps[:, 0], np.zeros(count), steps[:, 1]], axis=1)
 
 
 def _scaled(factor: float, velocity: Velocity | None) -> Velocity | None:

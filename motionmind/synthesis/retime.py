@@ -12,7 +12,8 @@ keeps its speed in free fall, but not where a body dips as fast with its feet on
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -154,7 +155,7 @@ def land_between(seconds: Floats, heights: Floats, size: float, moving: tuple[bo
 
 
 def slower_steps(
-    motion: Motion, most: Floats, moving: tuple[bool, bool], slides: float = np.inf, keeps_length: bool = False
+    motion: Motion, most: Floats, moving: tuple[bool, bool], slides: float = np.inf, kept: Sequence[float] = ()
 ) -> Floats:
     """Return the factor by which to stretch each step of a movement [N - 1] to respect the speed limits.
 
@@ -164,11 +165,17 @@ def slower_steps(
             and on the root's acceleration, heights/s^2 [J + 4].
         moving: whether the first and the last posture have a given velocity, which must not change.
         slides: limit on the speed of a foot near the floor, heights/s; only for bodies at least as tall as people.
-        keeps_length: whether to keep the total duration: slower steps then take time from steps with slack.
+        kept: times that stay, increasing up to the last frame's, or none: slower steps between them then take time from
+            steps with slack.
     """
     posed = pose(motion.skeleton, motion.rotations, motion.root)
     slower, slack = _factors(motion, posed, most, slides, moving)
-    return _keep_duration(slower, slack, np.diff(motion.times)) if keeps_length else slower
+    seconds = np.diff(motion.times)
+    frames = np.rint(np.interp([motion.times[0], *kept], motion.times, np.arange(len(motion)))).astype(int)
+    for begin, end in pairwise(frames.tolist()):
+        part = slice(begin, end)
+        slower[part] = _keep_duration(slower[part], slack[part], seconds[part])
+    return slower
 
 
 def _factors(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
 from motionmind.solver.motion import Bounds, Synthesis, solve_motion
 from motionmind.solver.residual import Residual
+from motionmind.synthesis.accents import accented_clock, n_on_count, retimed
 from motionmind.synthesis.reference import Reference, find_reference
 from motionmind.synthesis.retime import JOINT_SPEED_RATIO, SPEED_HEADROOM_RATIO, slower_steps
 from motionmind.synthesis.timeline import Timeline, stretch
@@ -23,6 +25,7 @@ from motionmind.synthesis.wishes import Style, Wishes
 from motionmind.walks.passages import Danced
 
 MAX_SOLVES = 3  # the first, then others on slower clocks
+MAX_ACCENT_SOLVES = 3  # on clocks that bring accents to their times
 
 
 class Synthesised(NamedTuple):
@@ -107,22 +110,48 @@ def _synthesise(
     reference: Reference, style: Style, wishes: Wishes, final: Floats | None, bounds: Bounds
 ) -> Synthesised:
     """Synthesise a motion, and again on slower clocks while it exceeds the bounds of the finished movement [J + 4]."""
-    a, b, pace, keeps_length = wishes.a, wishes.b, max(wishes.pace, 1.0), wishes.length is not None
+    a, b, pace = wishes.a, wishes.b, max(wishes.pace, 1.0)
     clock, rotations, stance = reference.clock, reference.rotations, reference.stance
+    kept = [] if wishes.length is None else [*(clock.moves[move] for move in wishes.fixed_times), clock.frames[-1]]
     velocities = _root_velocity(wishes.leaving), _root_velocity(wishes.arriving)
-    ends = Given(reference.low, (a.root, b.root), velocities)
+    ends = Given(reference.low, (a.root, b.root), velocities, wishes.route)
     before: Synthesis | None = None
-    for number in range(MAX_SOLVES):
-        made = solve_motion(a.skeleton, rotations, clock.frames, stance, ends, bounds, wishes.without, before)
+    n_slower, n_accented, accented = 0, 0, list[Motion]()
+    while True:
+        made = solve_motion(
+            a.skeleton,
+            rotations,
+            clock.frames,
+            stance,
+            ends,
+            bounds,
+            wishes.without,
+            before,
+            reaches=wishes.reaches,
+            stays=wishes.stays,
+        )
         motion = _motion_between(a, b, made.rotations, made.root, clock)
-        if final is None or not wishes.slows or number == MAX_SOLVES - 1:
-            break
-        slower = slower_steps(motion, final, wishes.moving, pace * style.slides, keeps_length)
-        if slower.max() < 1.02:  # not worth another solve
-            break
+        steps = None
+        if final is not None and wishes.slows and n_slower < MAX_SOLVES - 1:
+            slower = slower_steps(motion, final, wishes.moving, pace * style.slides, kept)
+            steps = slower if slower.max() >= 1.02 else None  # less is not worth another solve
+            n_slower += 1
+        if steps is None:
+            n_slower = MAX_SOLVES
+            if wishes.accents is None:
+                break
+            shown = accented_clock(
+                motion, wishes.accents, _joint_speeds(final, bounds), wishes.moving, _given_times(wishes, kept)
+            )
+            made_so_far = replace(motion, insertions=(Insertion(clock.moves),))
+            accented.append(made_so_far if shown is None else retimed(made_so_far, shown))
+            if shown is None or n_accented == MAX_ACCENT_SOLVES:
+                break
+            steps = np.diff(np.interp(clock.frames, shown, clock.frames)) / np.diff(clock.frames)
+            n_accented += 1
         was, end = clock.frames, clock.frames[-1]
-        clock, at = stretch(clock, was, slower, wishes.fps)
-        if keeps_length:  # to the last digit
+        clock, at = stretch(clock, was, steps, wishes.fps)
+        if kept:  # to the last digit
             clock = clock._replace(frames=np.append(clock.frames[:-1], end), moves=np.append(clock.moves[:-1], end))
         then = np.interp(clock.frames, at, was)
         rotations = rot.normalise(rotation_spline(was, rotations, then))
@@ -130,7 +159,22 @@ def _synthesise(
         before = made.at(was, then)
         stance = stance._replace(half_steps=np.interp(stance.half_steps, was, at))
     motion = replace(motion, insertions=(Insertion(clock.moves),))
+    if wishes.accents is not None:  # of those on equally many counts, the one that was solved last
+        motion = max(reversed(accented), key=partial(n_on_count, wishes.accents))
     return Synthesised(motion, reference.danced, reference.left_out, made.residuals)
+
+
+def _given_times(wishes: Wishes, kept: Sequence[float]) -> list[float]:
+    """Return the times between A and B that a movement of given length keeps: of `kept` vias, reaches and stays."""
+    end = kept[-1]
+    shares = [share for stay in wishes.stays for share in (stay.begins, stay.ends)]
+    times = {*kept[:-1], *(reach.seconds for reach in wishes.reaches), *(share * end for share in shares)}
+    return sorted(time for time in times if 0.0 < time < end)
+
+
+def _joint_speeds(final: Floats | None, bounds: Bounds) -> Floats | None:
+    """Return the greatest speeds of the joints in the finished movement [J], rad/s; None for no bound."""
+    return None if final is None else final[: len(bounds.fixed)]
 
 
 def _motion_between(a: Posture, b: Posture, rotations: Floats, root: Floats, clock: Timeline) -> Motion:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
+from itertools import pairwise
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -54,7 +57,13 @@ def durations(path: Int32s, transitions: Transitions) -> Floats:
     return out
 
 
-def timeline(path: Int32s, transitions: Transitions, fps: float, length: float | None = None) -> Timeline:
+def timeline(
+    path: Int32s,
+    transitions: Transitions,
+    fps: float,
+    length: float | None = None,
+    fixed: Mapping[int, float] = MappingProxyType({}),
+) -> Timeline:
     """Return the times of a path's moves and of its frames, at about `fps`; the last frame falls on the end exactly.
 
     Args:
@@ -63,14 +72,22 @@ def timeline(path: Int32s, transitions: Transitions, fps: float, length: float |
         fps: frames a second.
         length: total duration, seconds, to which the frames are fitted; None for the duration in the corpus, rounded to
             whole frames.
+        fixed: times by which some numbers of moves end, seconds, both increasing, within a given `length`; each is
+            moved to the nearest frame.
     """
     seconds = durations(path, transitions)
     usually = float(seconds.sum())
     frames = max(1, round((length or usually) * fps))
     check_size(frames + 1, path.shape[1], "the tween")
     length = length or frames / fps
-    moves = np.concatenate([[0.0], np.cumsum(seconds * (length / usually))])
-    moves[-1] = length
+    ends = {0: 0.0} | {move: round(time / length * frames) * length / frames for move, time in fixed.items()}
+    ends[len(seconds)] = length
+    own = np.concatenate([[0.0], np.cumsum(seconds)])
+    moves = np.empty_like(own)
+    for (first, begin), (last, end) in pairwise(ends.items()):
+        share = (own[first : last + 1] - own[first]) / (own[last] - own[first])
+        moves[first : last + 1] = begin + share * (end - begin)
+        moves[last] = end
     return Timeline(moves, np.linspace(0.0, length, frames + 1), max(1, round(len(seconds) * length / usually)))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -14,6 +14,8 @@ from motionmind.corpus.corpus import Corpus
 from motionmind.footing.corrections import Correction
 from motionmind.grammar.grammar import Grammar
 from motionmind.learned.posture_statistics import PostureStatistics
+from motionmind.solver.reaches import Reach, Stay
+from motionmind.synthesis.accent_times import Accents
 from motionmind.walks.passages import Place
 
 
@@ -52,6 +54,7 @@ class Wishes(NamedTuple):
         fps: frames a second; the motion is stretched by less than a frame so that `b` falls on one.
         length: duration, seconds; None for the typical duration of the corpus.
         through: postures on the way, by the number of moves that lead there, increasing.
+        fixed_times: the times of some of them, seconds, by the same numbers.
         leaving: velocity at `a`; None where unknown.
         arriving: velocity at `b`; None where unknown.
         without: terms of the solve to leave out.
@@ -59,6 +62,10 @@ class Wishes(NamedTuple):
         slows: whether the clock may slow down; if not, the given moves keep their durations.
         liveliness: 0 for the mean of walks, up to 1 for a passage of the corpus (`motionmind.walks.passages`).
         place: start of that passage in the corpus; None for any.
+        reaches: places for joints at given times.
+        accents: moments of greatest or least speed, in a movement of given length; None for none.
+        route: points x, z of the path over the floor from `a` to `b` [P, 2], metres; None for any.
+        stays: joints that keep their places for a while.
     """
 
     a: Posture
@@ -75,6 +82,11 @@ class Wishes(NamedTuple):
     slows: bool = True
     liveliness: float = 0.5
     place: Place | None = None
+    fixed_times: Mapping[int, float] = MappingProxyType({})
+    reaches: Sequence[Reach] = ()
+    route: Floats | None = None
+    stays: Sequence[Stay] = ()
+    accents: Accents | None = None
 
     @property
     def moving(self) -> tuple[bool, bool]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -17,6 +18,7 @@ from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.joint_mapping import joint_mapping
 from motionmind.retarget.retarget import to_human23
+from motionmind.tween.travel import stand_at
 from motionmind.walks.stops import Stop, stop_at
 
 _Movement = TypeVar("_Movement", Motion, Posture)
@@ -56,7 +58,12 @@ class Ends:
 
 
 def bring_ends(
-    corpus: Corpus, a: Posture, b: Posture, before: Motion | None = None, after: Motion | None = None
+    corpus: Corpus,
+    a: Posture,
+    b: Posture,
+    before: Motion | None = None,
+    after: Motion | None = None,
+    to: Sequence[float] | None = None,
 ) -> Ends:
     """Bring the postures and the movement around them onto the corpus's skeleton.
 
@@ -66,6 +73,7 @@ def bring_ends(
         b: posture B.
         before: frames that lead up to A; None if unknown.
         after: frames that follow B; None if unknown.
+        to: where B stands, and perhaps its facing (`stand_at`); None for where it is.
 
     Raises:
         SkeletonError: a posture or a movement has another skeleton than the corpus, or lacks a joint.
@@ -83,6 +91,9 @@ def bring_ends(
         after = _before_flips(after)
     leaving = None if before is None else Velocity.at_end(before)
     arriving = None if after is None else Velocity.at_start(after)
+    if to is not None:
+        b, turned = stand_at(b, to)
+        arriving = arriving and Velocity(arriving.rotations, rot.mul_vec(turned, arriving.root))
     return Ends(a, b, leaving, arriving, _seconds(before), _seconds(after))
 
 

@@ -27,6 +27,7 @@ from motionmind.search.sample import sample_path
 from motionmind.search.solve import Certificate, Watch, solve
 from motionmind.synthesis.synthesise import Synthesised, synthesise
 from motionmind.synthesis.wishes import Style, Wishes
+from motionmind.tween.accents import find_accented
 from motionmind.tween.certificate import (
     break_down_cost,
     credit_tween,
@@ -41,8 +42,10 @@ from motionmind.tween.formulate import Formulation, formulate
 from motionmind.tween.modes import Modes
 from motionmind.tween.pacing import tempo_of, worded
 from motionmind.tween.problem import ingredients_of
+from motionmind.tween.reaches import find_reached, find_stayed, resolve_reaches, resolve_stays
 from motionmind.tween.request import TweenOptions, TweenRequest
 from motionmind.tween.result import Tween
+from motionmind.tween.travel import destination, find_travelled
 from motionmind.tween.what_if import Answer, WhatIf, find_what_if
 from motionmind.tween.whole_body import Bodies, diagnose_whole_body, find_bodies, solve_whole_body
 
@@ -115,7 +118,7 @@ class Engine(LearnedCorpus):
         check_type("after", after, Motion, or_none=True)
         check_function("watch", watch, or_none=True)
         began = perf_counter()
-        ends = bring_ends(self.corpus, a, b, before, after)
+        ends = bring_ends(self.corpus, a, b, before, after, destination(request.to, request.along))
         formulation = formulate(self, ends, request)
         formulated = perf_counter()
         certificate = self._find_path(formulation, watch)
@@ -290,7 +293,7 @@ class Engine(LearnedCorpus):
                 formulation.wished,
                 formulation.constrained,
                 request.fps,
-                request.duration,
+                request.length,
                 dict(zip(certificate.passed, formulation.through, strict=True)),
                 ends.leaving,
                 ends.arriving,
@@ -299,6 +302,15 @@ class Engine(LearnedCorpus):
                 request.moves is None,
                 0.0 if request.search.whole_body else request.liveliness,
                 formulation.place,
+                {
+                    move: seconds
+                    for move, (_, _, seconds) in zip(certificate.passed, request.vias, strict=True)
+                    if seconds is not None
+                },
+                resolve_reaches(self.corpus.skeleton, request.reach),
+                formulation.route,
+                resolve_stays(self.corpus.skeleton, request.stay),
+                request.accents,
             ),
         )
 
@@ -368,6 +380,10 @@ class Engine(LearnedCorpus):
             detail=found,
             left_out=synthesised.left_out,
             gave=synthesised.residuals,
+            reached=find_reached(motion, request.reach),
+            accented=find_accented(motion, request),
+            travelled=find_travelled(motion, request.to, request.along, formulation.route),
+            stayed=find_stayed(motion, request.stay),
             expansions=certificate.expansions,
             peak_nodes=certificate.peak_nodes,
             costs=costs,

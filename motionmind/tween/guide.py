@@ -91,6 +91,7 @@ def find_detour(
     ends: tuple[Posture, Posture],
     stops: tuple[Stop, Stop],
     duration: float,
+    route: Floats | None = None,
 ) -> Floats | None:
     """Return a detour that fills spare time in usual moves [T + 1, J, 4]: see `motionmind.synthesis.detour`.
 
@@ -102,11 +103,12 @@ def find_detour(
         ends: postures A and B on its skeleton.
         stops: the stops at A and B.
         duration: total seconds.
+        route: the path over the floor from A to B [P, 2], metres; None for any.
     """
     seconds, displacement = usual(learned.grammar.transitions), way_between(*ends)
-    if displacement.parts.max() < ZERO_DISPLACEMENT_RAD:  # equal ends: hold still
+    if route is None and displacement.parts.max() < ZERO_DISPLACEMENT_RAD:  # equal ends: hold still
         return None
-    (own,) = (time.median for time in usual_times(learned, ends))
+    (own,) = (time.median for time in usual_times(learned, ends, route))
     if np.log(duration / own) <= 2.0 * learned.pace.spread:  # dancers take longer one time in forty
         return None
     walked = max(1, round(duration / seconds))

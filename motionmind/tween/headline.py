@@ -68,6 +68,10 @@ def beyond(tween: Tween) -> list[str]:
         for one in tween.gave
         if one.most > _RESIDUAL_WORDS.get(one.term, ("", math.inf))[1]
     ]
+    flaws += [str(one) for one in tween.reached if not one.is_met]
+    flaws += [str(one) for one in tween.accented if not one.is_met]
+    flaws += [f"travels {tween.travelled}"] if tween.travelled and not tween.travelled.is_met else []
+    flaws += [str(one) for one in tween.stayed if not one.is_met]
     followed = [bridge for bridge in tween.bridges if _is_followed(tween, bridge)]
     far = max(followed, key=lambda bridge: bridge.degrees, default=None)
     if far is not None and far.degrees >= NOTICEABLE_BRIDGE_DEG:

@@ -5,7 +5,8 @@ The command line's options, the report's `asked` and the options that `vary` acc
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from numbers import Integral
 from types import MappingProxyType
@@ -24,11 +25,17 @@ from motionmind.body.rates import MAX_FPS
 from motionmind.errors import MotionMindError, WrongTypeError
 from motionmind.footing.corrections import Correction
 from motionmind.grammar.schemes import Scheme, Weights
+from motionmind.tween.counts import COUNTS_RANGE, TEMPO_RANGE_BPM
 
 MAX_MOVES = 10_000  # more is a typing error, and exceeds memory
 MAX_NODES = 1_000_000_000
+MAX_PATH_POINTS = 10_000
+MAX_PATH_M = 200.0  # through the largest stage
+MAX_REACH = 1e4  # metres and seconds; more is a typing error
 PACE_RANGE = 0.05, 20.0  # multiples of the corpus's pace
 
+ReachOption = tuple[str, Sequence[float], float]  # joint, place in metres, seconds
+StayOption = tuple[str, float, float]  # joint, shares of the duration
 _Rule = Callable[[str, Any], Any]  # check the value of a named option, and return it as the request keeps it
 
 
@@ -115,14 +122,87 @@ def _take_pins(name: str, value: Any) -> Any:
 
 
 def _take_vias(name: str, value: Any) -> Any:
-    """Check the moves of the postures to pass through."""
-    check_items(name, value, "postures, or pairs of a posture and a move")
+    """Check the moves or times of the postures to pass through."""
+    check_items(name, value, "postures, or pairs of a posture and a move or a time")
     vias = tuple(value)
     for number, via in enumerate(vias, start=1):
-        if isinstance(via, tuple):
+        if isinstance(via, tuple) and not isinstance(via[1], str):  # a time is checked with the tempo
             _, move = via
             _or_none(_whole(1, MAX_MOVES - 1))(f"via {number}: the move", move)
     return vias
+
+
+def _take_reaches(name: str, value: Any) -> Any:
+    """Check joints, each with a place and a time, and copy them."""
+    check_items(name, value, "a joint's name, its place and seconds each", tuple, list)
+    out = []
+    for item in value:
+        if len(item) != 3:
+            raise WrongTypeError(f"{name}: give a joint's name, its place and seconds, not {described(item)}")
+        joint, place, seconds = item
+        check_text(f"{name}: the joint", joint)
+        place = tuple(place) if isinstance(place, Iterable) and not isinstance(place, str) else (place,)
+        for number in (*place, seconds):
+            check_real(f"{name} {joint}", number)
+            if not abs(number) <= MAX_REACH:
+                raise MotionMindError(
+                    f"{name} {joint}: metres and seconds are numbers up to {MAX_REACH:g}, not {number}"
+                )
+        if len(place) != 3:
+            raise MotionMindError(f"{name} {joint}: a place has three coordinates, x, y and z, not {len(place)}")
+        if not seconds > 0.0:
+            raise MotionMindError(f"{name} {joint}: the time must be more than 0 s, A's, not {seconds} s")
+        out.append((joint, place, seconds))
+    return tuple(out)
+
+
+def _take_place(name: str, value: Any) -> Any:
+    """Check where B stands, x, z and perhaps its facing, and copy it."""
+    wanted = "x and z in metres, and perhaps a facing in degrees"
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        raise WrongTypeError(f"{name} must be {wanted}, not {described(value)}")
+    place = tuple(value)
+    for number in place:
+        check_real(name, number)
+    if len(place) not in (2, 3) or not all(abs(number) <= MAX_REACH for number in place):
+        raise MotionMindError(f"{name} must be {wanted}, up to {MAX_REACH:g} each, not {', '.join(map(str, place))}")
+    return place
+
+
+def _take_path(name: str, value: Any) -> Any:
+    """Check the points of a path, each x and z, and copy them."""
+    check_items(name, value, "points, each x and z")
+    points = tuple(tuple(point) if isinstance(point, Iterable) else (point,) for point in value)
+    if not 1 <= len(points) <= MAX_PATH_POINTS:
+        raise MotionMindError(f"{name} must have 1 to {MAX_PATH_POINTS} points, not {len(points)}")
+    far = 0.0
+    for number, point in enumerate(points, start=1):
+        for coordinate in point:
+            check_real(f"{name}: point {number}", coordinate)
+        if len(point) != 2 or not all(abs(coordinate) <= MAX_REACH for coordinate in point):
+            shown = ", ".join(map(str, point))
+            raise MotionMindError(f"{name}: point {number} must be x, z in metres, up to {MAX_REACH:g}, not {shown}")
+        far += 0.0 if number == 1 else math.dist(points[number - 2], point)
+    if far > MAX_PATH_M:
+        raise MotionMindError(f"{name}: the path is {far:g} m long, and a tween may travel up to {MAX_PATH_M:g} m")
+    return points
+
+
+def _take_stays(name: str, value: Any) -> Any:
+    """Check joints, each with the shares of the duration between which it stays, and copy them."""
+    check_items(name, value, "a joint's name and two shares of the duration each", tuple, list)
+    out = []
+    for item in value:
+        if len(item) != 3:
+            raise WrongTypeError(f"{name}: give a joint's name and two shares of the duration, not {described(item)}")
+        joint, begins, ends = item
+        check_text(f"{name}: the joint", joint)
+        for share in (begins, ends):
+            _number(0.0, 1.0)(f"{name} {joint}: a share of the duration", share)
+        if not begins < ends:
+            raise MotionMindError(f"{name} {joint}: it must end after it begins, not at {begins:g} and {ends:g}")
+        out.append((joint, float(begins), float(ends)))
+    return tuple(out)
 
 
 _nats = _number(0.0, 1e6, " of nats")  # larger sums lose the other costs to rounding, and then overflow
@@ -134,11 +214,19 @@ OPTIONS: Mapping[str, _Rule] = {
     "moves": _or_none(_take_moves),
     "max_moves": _whole(1, MAX_MOVES),
     "duration": _or_none(_checked(check_real)),
+    "tempo": _or_none(_number(*TEMPO_RANGE_BPM, " of counts a minute")),
+    "counts": _or_none(_number(*COUNTS_RANGE)),
     "pace": _number(*PACE_RANGE),
+    "accent": _items("counts", int, float, each=_number(*COUNTS_RANGE)),
+    "accent_kind": _choice(("fast", "still")),
     "pin": _take_pins,
     "hold": _items("joints' names", str),
     "avoid": _items("pairs of a joint's name and a state", tuple, list),
     "via": _take_vias,
+    "reach": _take_reaches,
+    "to": _or_none(_take_place),
+    "along": _or_none(_take_path),
+    "stay": _take_stays,
     "unlike": _items("tweens"),
     "differ": _share,
     "within": _share,
@@ -162,6 +250,13 @@ OPTIONS: Mapping[str, _Rule] = {
     "without": _items("corrections' names", str, each=_choice(get_args(Correction))),
     "fps": _number(0.01, MAX_FPS, " of frames a second"),
 }
+
+
+def check_time(joint: str, seconds: float, lasts: float, remedy: str = "") -> None:
+    """Check that the time of a reach lies between A and B."""
+    if not 0.0 < seconds < lasts:
+        between = f"{seconds:g} s is not between A and B: the movement lasts {lasts:.2f} s"
+        raise MotionMindError(f"reach {joint}: {between}{remedy}")
 
 
 def take_options(options: Any) -> None:

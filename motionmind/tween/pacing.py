@@ -27,6 +27,7 @@ import numpy as np
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion, Posture
 from motionmind.display import displayed
+from motionmind.geometry.polylines import length_of
 from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.nearest import postures_near
 from motionmind.learned.pace import N_NEIGHBORS, over_seconds, way_between, way_of
@@ -50,13 +51,16 @@ class UsualTime:
     slowest: str
 
 
-def usual_times(learned: LearnedCorpus, stops: Sequence[Posture]) -> tuple[UsualTime, ...]:
-    """Return the corpus's usual time from each posture to the next."""
+def usual_times(learned: LearnedCorpus, stops: Sequence[Posture], route: Floats | None = None) -> tuple[UsualTime, ...]:
+    """Return the corpus's usual time from each posture to the next; each covers an equal share of a route [P, 2]."""
     parts = _parts(learned)
     resting = find_resting_speeds(learned, np.stack([posture.rotations for posture in stops]))
     out = []
     for (a, first), (b, last) in pairwise(zip(stops, resting, strict=True)):
         displacement = way_between(a, b)
+        if route is not None:
+            heights = length_of(route) / (learned.corpus.skeleton.height or 1.0)
+            displacement = displacement._replace(travel=np.asarray(heights / (len(stops) - 1)))
         needs = PEAK_SPEED_RATIO * displacement.parts / learned.pace.fastest
         slowest = int(needs.argmax())
         median = float(learned.pace.expected(displacement, (first, last)))

@@ -19,8 +19,11 @@ from motionmind.files import FilePath, read_bytes
 from motionmind.learned.plausibility import Sighting
 from motionmind.search.length import LengthChoice
 from motionmind.solver.residual import Residual
+from motionmind.tween.accents import Accented
 from motionmind.tween.certificate import Bridge, Source, Wait
 from motionmind.tween.pacing import Tempo
+from motionmind.tween.reaches import Reached, Stayed
+from motionmind.tween.travel import Travelled
 from motionmind.tween.what_if import WhatIf
 
 
@@ -80,6 +83,10 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
             small corpus.
         gave: the largest residual of each term of the synthesis (balance, gravity, joint limits...), with its unit and
             its time in seconds.
+        reached: how near the motion comes to each requested place.
+        accented: how far each accent is from its count.
+        travelled: how near it keeps to the requested path and place of B; null if none was requested.
+        stayed: how far each joint that stays in its place drifts.
         shown: the motion's greatest "balance", "bounce", "flight", "crossed_limbs" and "pace" beside the corpus's.
         times: times of the moves [T + 1], seconds.
         names: names of the states [T + 1][L].
@@ -131,6 +138,10 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     detail: list[Source]
     left_out: float
     gave: list[Residual]
+    reached: list[Reached] = []
+    accented: list[Accented] = []
+    travelled: Travelled | None = None
+    stayed: list[Stayed] = []
     shown: dict[str, Sighting]
     times: list[float]
     names: list[list[str]]

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
 
 from motionmind.arguments import check_options, check_type
 from motionmind.errors import MotionMindError
 from motionmind.footing.corrections import Correction
 from motionmind.grammar.schemes import Scheme, Weights
-from motionmind.tween.options import OPTIONS, SearchOptions, take_options
+from motionmind.synthesis.accent_times import AccentKind, Accents
+from motionmind.tween.counts import counts_to_seconds, parse_time, seconds_to_count
+from motionmind.tween.options import OPTIONS, ReachOption, SearchOptions, StayOption, check_time, take_options
 
 if TYPE_CHECKING:
     from motionmind._typing import States
@@ -30,11 +33,15 @@ class SeamOptions(TypedDict, total=False):
 
     moves: int | tuple[int, int] | None
     duration: float | None
+    tempo: float | None
+    counts: float | None
     pace: float
+    accent: Sequence[float]
+    accent_kind: AccentKind
     pin: Mapping[str, str]
     hold: Sequence[str]
     avoid: Sequence[tuple[str, int | str]]
-    via: Sequence[Posture | tuple[Posture, int]]
+    via: Sequence[Posture | tuple[Posture, int | str]]
     differ: float
     novelty: float
     liveliness: float
@@ -66,6 +73,10 @@ class SmoothOptions(SeamOptions, total=False):
 class TweenOptions(SmoothOptions, total=False):
     """All options of a tween."""
 
+    reach: Sequence[ReachOption]
+    to: Sequence[float] | None
+    along: Sequence[Sequence[float]] | None
+    stay: Sequence[StayOption]
     unlike: Sequence[HasPath]
     what_if: bool
     whole_body: bool
@@ -79,13 +90,28 @@ class TweenRequest:
         moves: number of moves, or the least and the greatest number; None lets the search find the best number.
         duration: exact length of the motion in seconds; if `moves` is None it also fixes the number of moves, each of
             the corpus's usual length.
+        tempo: counts a minute, for `counts` and for the times of `via`.
+        counts: exact length of the motion in counts, in place of `duration`.
         pace: factor on the motion's natural speed, where `duration` is open: 1.2 takes 1/1.2 of the time for the same
             moves.
+        accent: counts, with a tempo and a length, on which the movement has its accents: peaks of speed or moments of
+            rest. The path's movement is retimed for it, within the corpus's pace; the report says how far each is off.
+        accent_kind: "fast" for the greatest speed, "still" for the least.
         pin: joints pinned to an end: "A" keeps A's state until the last move, "B" has B's from the first move on.
         hold: joints that keep their state from A to B, such as a standing leg; A and B must agree there.
         avoid: joints, each with a state to avoid between A and B, by number or name.
-        via: postures to pass through in this order, each after any move, or after a given one as (posture, move); the
-            first move is 1.
+        via: postures to pass through in this order, each after any move, or after a given one as (posture, move), from
+            1 on, or at a time as (posture, "1.5s") or (posture, "count 4"). Count 1 is A. A time needs a duration or
+            counts, and the motion passes the posture on the frame nearest to it.
+        reach: joints, each with a place [3], metres in the space where A and B stand, and a time, seconds from A:
+            ("right_wrist", (0.3, 1.4, 0.5), 1.2). The motion is there to 1 cm, or reports the distance.
+        to: where B stands: x and z on the floor, metres, as in a floor plan, and its facing, degrees to the left of the
+            audience; (x, z) keeps B's own facing. None leaves B where it stands.
+        along: points x, z of a path over the floor, metres, that the body follows from A to B; without `to`, B stands
+            at the last. The motion keeps to it within 10 cm, or reports the distance.
+        stay: joints, each with the shares of the duration between which it keeps its place in the room, and does not
+            turn: ("left_wrist", 0.25, 0.5). One that stays until the end, but not from the start, keeps its place in
+            B; one that stays from start to end leaves just in time for B.
         unlike: tweens to differ from; all have the same number of moves, as does this one.
         differ: least share of the joints' states between A and B that must differ from each tween in `unlike`, compared
             move by move, from 0 to 1.
@@ -115,11 +141,19 @@ class TweenRequest:
 
     moves: int | tuple[int, int] | None = None
     duration: float | None = None
+    tempo: float | None = None
+    counts: float | None = None
     pace: float = 1.0
+    accent: Sequence[float] = ()
+    accent_kind: AccentKind = "fast"
     pin: Mapping[str, str] = field(default_factory=dict)
     hold: Sequence[str] = ()
     avoid: Sequence[tuple[str, int | str]] = ()
-    via: Sequence[Posture | tuple[Posture, int]] = ()
+    via: Sequence[Posture | tuple[Posture, int | str]] = ()
+    reach: Sequence[ReachOption] = ()
+    to: Sequence[float] | None = None
+    along: Sequence[Sequence[float]] | None = None
+    stay: Sequence[StayOption] = ()
     unlike: Sequence[HasPath] = ()
     differ: float = 0.2
     what_if: bool = False
@@ -133,8 +167,10 @@ class TweenRequest:
     def __post_init__(self) -> None:
         take_options(self)
         check_type("search", self.search, SearchOptions)
-        if self.duration is not None and self.pace != 1.0:
-            raise MotionMindError("a duration says how fast to move; leave out pace")
+        self._check_time()
+        self._check_accents()
+        for joint, _, seconds in self.reach if self.length is not None else ():
+            check_time(joint, seconds, float(self.length or 0.0))
         if self.unlike:
             self._check_unlike()
         narrowed = self.pin or self.hold or self.avoid or self.via or self.unlike or self.search.sample or self.passage
@@ -142,6 +178,42 @@ class TweenRequest:
             raise MotionMindError(
                 "whole_body moves whole postures alone: no pin, hold, avoid, via, unlike, sample or passage"
             )
+
+    def _check_time(self) -> None:
+        if self.counts is not None and (self.tempo is None or self.duration is not None):
+            raise MotionMindError("counts need a tempo, and take the place of a duration")
+        if self.length is not None and self.pace != 1.0:
+            raise MotionMindError("a duration says how fast to move; leave out pace")
+        times = [seconds for _, _, seconds in self.vias if seconds is not None]
+        if not times:
+            return
+        if self.length is None or self.moves is not None:
+            raise MotionMindError("a via at a time needs a duration or counts, and no number of moves")
+        for before, after in pairwise([0.0, *times, self.length]):
+            if after < before + 1.0 / self.fps:
+                raise MotionMindError(
+                    f"via: the times {', '.join(f'{time:g}' for time in times)} s must increase by a frame or more, "
+                    f"from 0 to the duration of {self.length:g} s"
+                )
+
+    @property
+    def accents(self) -> Accents | None:
+        """The accents, with their times; None for none."""
+        if not self.accent or self.tempo is None:
+            return None
+        return Accents(tuple(counts_to_seconds(one - 1.0, self.tempo) for one in self.accent), self.accent_kind)
+
+    def _check_accents(self) -> None:
+        if not self.accent:
+            return
+        if self.tempo is None or self.length is None or self.moves is not None:
+            raise MotionMindError("accents on counts need a tempo, a duration or counts, and no number of moves")
+        last = seconds_to_count(self.length, self.tempo)
+        for one in self.accent:
+            if not 1.0 <= one <= last + 1e-9:
+                raise MotionMindError(f"accent: count {one:g} is not between A, count 1, and B, count {last:g}")
+        if sorted(set(self.accent)) != list(self.accent):
+            raise MotionMindError(f"accent: the counts {', '.join(f'{one:g}' for one in self.accent)} must increase")
 
     def _check_unlike(self) -> None:
         if self.what_if:
@@ -188,7 +260,14 @@ class TweenRequest:
     @property
     def fixes_length(self) -> bool:
         """Whether the number of moves or the duration is given, so that the body moves even if A equals B."""
-        return self.moves is not None or self.duration is not None
+        return self.moves is not None or self.length is not None
+
+    @property
+    def length(self) -> float | None:
+        """Length of the motion, seconds; None if it is open."""
+        if self.counts is None or self.tempo is None:
+            return self.duration
+        return counts_to_seconds(self.counts, self.tempo)
 
     @property
     def paced(self) -> bool:
@@ -196,9 +275,16 @@ class TweenRequest:
         return not self.search.whole_body and "pace" not in self.without
 
     @property
-    def vias(self) -> list[tuple[Posture, int | None]]:
-        """The postures to pass through, each with its move or None."""
-        return [given if isinstance(given, tuple) else (given, None) for given in self.via]
+    def vias(self) -> list[tuple[Posture, int | None, float | None]]:
+        """The postures to pass through, each with its move and its time in seconds, or None."""
+        out: list[tuple[Posture, int | None, float | None]] = []
+        for number, given in enumerate(self.via, start=1):
+            posture, place = given if isinstance(given, tuple) else (given, None)
+            if isinstance(place, str):
+                out.append((posture, None, parse_time(f"via {number}", place, self.tempo)))
+            else:
+                out.append((posture, place if place is None else int(place), None))
+        return out
 
     @property
     def takes_passages(self) -> bool:
@@ -221,9 +307,14 @@ class TweenRequest:
             "moves": list(self.moves) if isinstance(self.moves, tuple) else self.moves,
             "pin": dict(self.pin),
             "hold": list(self.hold),
+            "accent": list(map(float, self.accent)),
             "without": list(self.without),
             "avoid": [list(pair) for pair in self.avoid],
-            "via": [None if move is None else int(move) for _, move in self.vias],
+            "via": [move if seconds is None else f"{seconds:g}s" for _, move, seconds in self.vias],
+            "reach": [[joint, list(map(float, place)), float(seconds)] for joint, place, seconds in self.reach],
+            "to": None if self.to is None else list(map(float, self.to)),
+            "along": None if self.along is None else [list(map(float, point)) for point in self.along],
+            "stay": [list(one) for one in self.stay],
             "unlike": len(self.unlike),
             "node_budget": self.search.nodes(chains),
         }

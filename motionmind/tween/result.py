@@ -18,11 +18,14 @@ from motionmind.search.length import LengthChoice
 from motionmind.search.problem import Problem, Via
 from motionmind.search.solve import Status
 from motionmind.solver.residual import Residual
+from motionmind.tween.accents import Accented
 from motionmind.tween.certificate import Bridge, CostBreakdown, Source, Wait, gap_of
 from motionmind.tween.changes import name_parts
 from motionmind.tween.pacing import Tempo, UsualTime
+from motionmind.tween.reaches import Reached, Stayed
 from motionmind.tween.report import PassedPosture, ReportedCosts, TweenReport, plain
 from motionmind.tween.request import TweenRequest
+from motionmind.tween.travel import Travelled
 from motionmind.tween.what_if import WhatIf
 
 
@@ -57,6 +60,10 @@ class Tween:
         left_out: approximate share of the corpus walks that begin or end in postures represented by others, for the
             body part where it is greatest; 0 for a small corpus, where every posture counts.
         gave: the largest residual of each term of the synthesis (balance, gravity, joint limits...).
+        reached: how near the motion comes to each requested place.
+        accented: how far each accent is from its count.
+        travelled: how near it keeps to the requested path and place of B; None if none was requested.
+        stayed: how far each joint that stays in its place drifts.
         expansions: nodes that A* expanded.
         peak_nodes: greatest number of nodes that A* held.
         costs: the cost, joint by joint and move by move.
@@ -100,6 +107,10 @@ class Tween:
     detail: tuple[Source, ...]
     left_out: float
     gave: tuple[Residual, ...]
+    reached: tuple[Reached, ...]
+    accented: tuple[Accented, ...]
+    travelled: Travelled | None
+    stayed: tuple[Stayed, ...]
     expansions: int
     peak_nodes: int
     costs: CostBreakdown
@@ -206,6 +217,10 @@ def report_of(tween: Tween, motion_sha256: str | None = None) -> TweenReport:
         sources=[list(row) for row in tween.sources],
         detail=list(tween.detail),
         gave=list(tween.gave),
+        reached=list(tween.reached),
+        accented=list(tween.accented),
+        travelled=tween.travelled,
+        stayed=list(tween.stayed),
         left_out=tween.left_out,
         shown=tween.shown,
         times=tween.motion.insertions[0].times.tolist(),

@@ -59,7 +59,7 @@ def find_what_if(asked: Answer, answer: Callable[[TweenRequest], Answer]) -> tup
         answer: answers another request between the same ends. Stop after an interrupted search.
     """
     out, open_length = [], asked.problem.tolls is not None and not asked.request.fixes_length
-    stops = [(posture, move) for (posture, _), move in zip(asked.request.vias, asked.certificate.passed, strict=True)]
+    stops = [(posture, move) for (posture, *_), move in zip(asked.request.vias, asked.certificate.passed, strict=True)]
     placed = replace(asked.request, moves=_moves(asked), via=stops) if open_length else asked.request
     alikes = (alike for _, alike in _without_each(asked._replace(request=placed)))
     for (name, request), alike in zip(_without_each(asked), alikes, strict=False):  # `placed` gives the length, too
@@ -88,12 +88,15 @@ def _without_each(asked: Answer) -> Iterator[tuple[str, TweenRequest]]:
         yield f"hold {joint}", replace(request, hold=_all_but(request.hold, i))
     for i, (joint, state) in enumerate(request.avoid):
         yield f"avoid {joint}={state}", replace(request, avoid=_all_but(request.avoid, i))
-    for i, (_, move) in enumerate(request.vias):
+    for i, (_, move, seconds) in enumerate(request.vias):
         name = f"via {i + 1}" + ("" if move is None else f" after move {move}")
+        name += "" if seconds is None else f" at {seconds:g} s"
         yield name, replace(request, via=_all_but(request.via, i))
     if request.fixes_length:
         longest = max(request.search.max_moves, _moves(asked))
-        yield _length_name(request), TweenRequest.of(request, moves=None, duration=None, max_moves=longest)
+        untimed = [posture if move is None else (posture, move) for posture, move, _ in request.vias]
+        freed = TweenRequest.of(request, moves=None, duration=None, counts=None, via=untimed, max_moves=longest)
+        yield _length_name(request), freed
 
 
 def _length_name(request: TweenRequest) -> str:
@@ -102,6 +105,8 @@ def _length_name(request: TweenRequest) -> str:
     if request.moves is not None:
         least, most = request.move_range
         names.append(f"moves {least}" if least == most else f"moves {least}..{most}")
+    if request.counts is not None:
+        names.append(f"counts {request.counts:g}")
     if request.duration is not None:
         names.append(f"duration {request.duration:g}")
     return " and ".join(names)
@@ -112,7 +117,7 @@ def _compare(name: str, asked: Answer, freed: Answer, moves: int) -> WhatIf:
 
     Every path that keeps a restriction is also valid without it, so the difference is never negative.
     """
-    same = _moves(asked) == _moves(freed) and asked.request.duration == freed.request.duration
+    same = _moves(asked) == _moves(freed) and asked.request.length == freed.request.length
     compared: Compared = "cost" if same else "haste and pace"
     if asked.problem.tolls is None and not same:
         compared = "cost" if asked.problem.guide is None else "costs without the guide"

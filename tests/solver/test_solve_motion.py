@@ -290,6 +290,7 @@ def test_what_is_left_out_is_what_has_an_infinite_standard_deviation(
     np.testing.assert_allclose(left_out.root, worth_nothing.root, atol=1e-9)
 
 
+@pytest.mark.long
 def test_a_term_that_is_left_out_gives_nothing_and_changes_the_movement() -> None:
     q = crouching()
     inward = np.sin(np.linspace(0.0, np.pi, len(q)))[:, None]
@@ -396,3 +397,15 @@ def test_each_term_gives_its_largest_residual_at_a_time_of_the_movement() -> Non
         assert one.most > 0.0
         assert one.unit
         assert np.any(one.at == toy.times)
+
+
+def test_of_many_joints_those_with_the_longest_reach_are_free() -> None:
+    count = 3 * module.MAX_FREE_JOINTS
+    offsets = np.tile([0.0, 0.1, 0.0], (count, 1))
+    names = tuple(f"joint{number}" for number in range(count))
+    chain = Skeleton("chain", names, tuple(range(-1, count - 1)), offsets)
+    turned = rot.exp(np.random.default_rng(0).normal(0.0, 0.1, (4, count, 3)))
+    for fixed in ([], [0, 7]):
+        still = np.isin(np.arange(count), fixed)
+        free = np.setdiff1d(np.flatnonzero(~still), 1)[: module.MAX_FREE_JOINTS]  # joint1 is like a collarbone
+        np.testing.assert_array_equal(module._freedom(chain, still, turned).joints, np.repeat(free, 3))

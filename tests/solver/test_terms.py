@@ -18,6 +18,7 @@ from motionmind.solver import collision as module
 from motionmind.solver.collision import Collision
 from motionmind.solver.kinematics import Freedom, State, body_of
 from motionmind.solver.one_sided import Balance, Floor, Limits, OneSided
+from motionmind.solver.reaches import Reaches
 from motionmind.solver.speed_bounds import Speed, Travel
 from motionmind.solver.system import Normal
 from motionmind.solver.terms import Ballistic, Contacts, Smoothness, Term, Track
@@ -58,6 +59,13 @@ def contacts(state: State, off: float, sds: Floats, **changes: Any) -> Contacts:
     return Contacts(frames, points, targets, sds, stands, np.array([3, 4, POINTS - 1]), moves, slips, **changes)
 
 
+def reaching(state: State, off: float) -> Reaches:
+    """Joints that are to be about so far from where they are, at and between frames."""
+    first, joints = np.array([1, 1, 3]), np.array([5, 9, 14])
+    places = state.places[first, joints] + off * np.random.default_rng(1).normal(size=(3, 3))
+    return Reaches(first, np.array([[1.0, 0.0], [0.3, 0.7], [0.5, 0.5]]), joints, places, 0.01, 0.02)
+
+
 ALIKE = np.tile(RNG.uniform(0.01, 0.1, (4 * N, 1)), 3)
 LEVEL_FREE = np.where([True, False, True], np.inf, ALIKE)
 SOME = RNG.random(N) < 0.4
@@ -72,6 +80,8 @@ SMOOTH: dict[str, Callable[[State], Term]] = {
     "contacts far": lambda state: contacts(state, 0.2, ALIKE),
     "contacts far, height firmer": lambda state: contacts(state, 0.2, ALIKE * [1.0, 0.1, 1.0]),
     "contacts far, free": lambda state: contacts(state, 0.2, LEVEL_FREE),
+    "reaches near": lambda state: reaching(state, 0.001),
+    "reaches far": lambda state: reaching(state, 0.5),
     "floor": lambda _: Floor(np.linspace(-0.5, 0.5, N), 0.01),
     "speed": lambda _: Speed(FASTEST, float(FASTEST[0]), FPS, 0.05),
     "travel": lambda _: Travel(1, LEVEL, 20.0, SOME[1:], FPS, 0.02),
@@ -226,6 +236,7 @@ def test_legs_that_have_come_apart_stay_on_their_sides() -> None:
     np.testing.assert_array_equal(term._planes, planes)
 
 
+@pytest.mark.long
 def test_the_cost_of_legs_that_come_near_does_not_jump() -> None:
     """A thousandth of a step changes it by a thousandth, or a few; else whole steps are refused."""
     state, term = crossing(), collision()

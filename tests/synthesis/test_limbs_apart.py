@@ -178,6 +178,7 @@ def test_a_hand_goes_round_the_thigh() -> None:
     assert rot.angle(out, apart(swing, without=["limbs"]))[:, hip].max() < np.radians(15.0)
 
 
+@pytest.mark.long
 def test_tweens_keep_their_legs_apart_unless_told_otherwise() -> None:
     """Random pairs of ballet postures; without the correction some legs pass through each other."""
     engine = Engine.load("ballet")

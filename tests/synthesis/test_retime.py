@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -53,11 +54,11 @@ def slow_down(
     most: Floats,
     moving: tuple[bool, bool],
     slides: float = np.inf,
-    keeps_length: bool = False,
+    kept: Sequence[float] = (),
 ) -> tuple[Motion, Timeline]:
     """The movement on a clock that slows down up to three times, and that clock."""
     for _ in range(3):
-        slower = slower_steps(motion, most, moving, slides, keeps_length)
+        slower = slower_steps(motion, most, moving, slides, kept)
         if slower.max() < 1.0 + MIN_CLOCK_CHANGE_RATIO:
             break
         times = motion.times
@@ -164,14 +165,24 @@ def test_a_foot_that_is_too_fast_near_the_floor_is_slowed_and_one_above_it_is_no
 @pytest.mark.parametrize("top", [2.5, 3.0])
 def test_what_is_too_fast_takes_its_time_from_the_rest_where_the_whole_lasts_as_long(top: float) -> None:
     motion, clock = bent(quick(top))
-    slower, later = slow_down(motion, clock, most(2.0), STILL, keeps_length=True)
+    slower, later = slow_down(motion, clock, most(2.0), STILL, kept=[motion.times[-1]])
     assert (len(slower), slower.times[-1], later.moves[-1]) == (91, motion.times[-1], motion.times[-1])
     assert speeds(slower).max() < 2.0 * 1.06 < speeds(motion).max()
     assert speeds(slower)[0] > speeds(motion)[0]
     np.testing.assert_array_equal(slower.rotations[[0, -1]], motion.rotations[[0, -1]])
     # Who has no time to spare stays as fast.
     hurries, clock = bent(np.linspace(0.0, 9.0, 91))
-    assert slow_down(hurries, clock, most(2.0), STILL, keeps_length=True) == (hurries, clock)
+    assert slow_down(hurries, clock, most(2.0), STILL, kept=[hurries.times[-1]]) == (hurries, clock)
+
+
+@pytest.mark.parametrize("middle", [45, 70])
+def test_a_time_that_is_kept_stays_however_the_steps_around_it_change(middle: int) -> None:
+    motion, _ = bent(quick(3.0))
+    slower = slower_steps(motion, most(2.0), STILL, kept=motion.times[[middle, -1]])
+    assert slower.max() > 1.1
+    steps = np.diff(motion.times)
+    assert slower[:middle] @ steps[:middle] == pytest.approx(motion.times[middle])
+    assert slower @ steps == pytest.approx(motion.times[-1])
 
 
 @pytest.mark.parametrize("end", [0, 1])

@@ -209,6 +209,7 @@ def test_posterior_marginals_are_sums_over_all_walks(seed: int) -> None:
     np.testing.assert_allclose(posterior_marginals(begins, ends, shares, clusters, weights, near), expected, atol=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("signs", list(product((1.0, -1.0), repeat=3)))
 def test_the_mean_of_rotations_about_one_axis_whatever_their_signs(signs: tuple[float, float, float]) -> None:
     q = rot.about_vertical(np.radians([10.0, 30.0]))[:, None] * np.reshape(signs[:2], (2, 1, 1))
@@ -233,6 +234,7 @@ def test_the_mean_of_rotations_takes_each_in_the_hemisphere_of_what_it_is_about(
         np.testing.assert_allclose(mean_rotations(weights, q, np.arange(2), about), expected, atol=1e-12)
 
 
+@pytest.mark.long
 def test_parts_are_as_far_from_postures_as_their_joints_are_in_the_mean() -> None:
     rng = np.random.default_rng(5)
     shown, postures = rot.normalise(rng.normal(size=(7, 4, 4))), rot.normalise(rng.normal(size=(2, 3, 4)))
@@ -324,6 +326,7 @@ def walking(request: pytest.FixtureRequest) -> Learned:
     return learned(walk(), request.param)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fps", [30.0, 120.0, 24.0, 7.0])
 @pytest.mark.parametrize("rows", [[3, 4], [3, 4, 5, 6, 7], [3, 4, 5, 5, 6, 20, 21]])
 def test_the_ends_are_a_and_b_bit_by_bit_and_frames_are_even(walking: Learned, rows: list[int], fps: float) -> None:
@@ -341,6 +344,7 @@ def test_the_ends_are_a_and_b_bit_by_bit_and_frames_are_even(walking: Learned, r
     assert abs(found.times[-1] - durations(walking.states[rows], walking.transitions).sum()) <= 0.5 / fps + 1e-9
 
 
+@pytest.mark.long
 def test_a_motion_is_within_what_is_asked_of_its_states_at_each_move(walking: Learned) -> None:
     """But for the legs, which feet that stand may bend; and the path is not followed closer than that."""
     motion, rows = walk(), [5, 6, 7, 20, 21, 30, 8, 9]
@@ -355,6 +359,7 @@ def test_a_motion_is_within_what_is_asked_of_its_states_at_each_move(walking: Le
         assert off.max() > 0.99 * FIRM_PULL_RATIO * within
 
 
+@pytest.mark.long
 def test_given_postures_are_not_bent_to_their_states_nor_does_the_movement_leap_from_them(walking: Learned) -> None:
     """Ends and a posture on the way are all far from the states that the path has for them."""
     motion, rows, rng = walk(), [5, 6, 7, 8, 9, 10, 11], np.random.default_rng(0)
@@ -411,6 +416,7 @@ def test_a_body_whose_floor_is_below_zero_stays_on_it(walking: Learned) -> None:
     np.testing.assert_allclose(heights, np.linspace(-0.11, 0.0, len(heights)), atol=0.03)
 
 
+@pytest.mark.long
 def test_a_jump_of_the_corpus_is_jumped_and_its_floor_is_not_its_zero() -> None:
     jumping = walk(sink=0.4)
     root = jumping.root.copy()

@@ -294,6 +294,7 @@ def paths_of(toy: Toy, moves: int) -> dict[bytes, float]:
     return {path: w / sum(weight.values()) for path, w in weight.items()}
 
 
+@pytest.mark.long
 def test_paths_are_drawn_as_often_as_they_are_likely() -> None:
     tried = 0
     for seed in range(24):
@@ -348,6 +349,7 @@ def chain_of(tween: Tween, joint: str) -> Int32s:
     return tween.path[:, tween.joints.index(joint)]
 
 
+@pytest.mark.long
 def test_a_range_of_moves_is_kept_and_its_best_is_the_best_of_its_numbers(engine: Engine, plain: Tween) -> None:
     found, *narrower = (join(engine, moves=moves) for moves in ((6, 8), (6, 7), (7, 8)))
     price = min(other.length.cost for other in narrower if other.length)
@@ -361,6 +363,7 @@ def test_a_range_of_moves_is_kept_and_its_best_is_the_best_of_its_numbers(engine
     assert join(engine, moves=(1, 60)).cost == pytest.approx(plain.cost, abs=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("duration", [1.6, 2.0, 2.719])
 def test_a_motion_lasts_as_long_as_is_asked_for(engine: Engine, duration: float) -> None:
     found = join(engine, duration=duration)
@@ -373,6 +376,7 @@ def test_a_motion_lasts_as_long_as_is_asked_for(engine: Engine, duration: float)
     assert (slower.motion.times[-1], slower.moves) == (duration, 5)
 
 
+@pytest.mark.long
 def test_a_pinned_joint_is_in_the_state_of_its_end(engine: Engine, plain: Tween) -> None:
     for joint in ("left_wrist", "right_elbow"):
         at_a, at_b = join(engine, pin={joint: "A"}), join(engine, pin={joint: "B"})
@@ -382,6 +386,7 @@ def test_a_pinned_joint_is_in_the_state_of_its_end(engine: Engine, plain: Tween)
         assert {at_a.status, at_b.status} == {"optimal"}
 
 
+@pytest.mark.long
 def test_a_held_joint_stays_and_one_that_cannot_is_refused(engine: Engine, plain: Tween) -> None:
     alike = [joint for joint in plain.joints if chain_of(plain, joint)[0] == chain_of(plain, joint)[-1]]
     found = join(engine, hold=alike[:3])
@@ -391,6 +396,7 @@ def test_a_held_joint_stays_and_one_that_cannot_is_refused(engine: Engine, plain
         join(engine, hold=["left_ankle"])
 
 
+@pytest.mark.long
 def test_an_avoided_state_is_not_on_the_way_by_number_or_by_name(engine: Engine, plain: Tween) -> None:
     chain = plain.joints.index("left_knee")
     state = int(plain.path[1, chain])
@@ -401,6 +407,7 @@ def test_an_avoided_state_is_not_on_the_way_by_number_or_by_name(engine: Engine,
     assert by_number.cost > plain.cost
 
 
+@pytest.mark.long
 def test_postures_are_passed_in_order_and_shown_as_they_are(engine: Engine, plain: Tween) -> None:
     passe, plie = posture("passe"), posture("plie")
     found = join(engine, via=[passe, plie])
@@ -416,6 +423,7 @@ def test_postures_are_passed_in_order_and_shown_as_they_are(engine: Engine, plai
         assert np.degrees(rot.angle(exact.motion.rotations[frame, 1:], stop.rotations[1:])).max() < 0.5
 
 
+@pytest.mark.long
 def test_novelty_0_is_the_default_exactly_and_1_weighs_all_that_is_attested_alike(engine: Engine, plain: Tween) -> None:
     same = join(engine, novelty=0.0)
     np.testing.assert_array_equal(same.path, plain.path)
@@ -430,6 +438,7 @@ def test_novelty_0_is_the_default_exactly_and_1_weighs_all_that_is_attested_alik
     assert join(engine, novelty=1.0).status == "optimal"
 
 
+@pytest.mark.long
 def test_a_path_is_drawn_by_its_seed_under_all_that_was_asked(engine: Engine, plain: Tween) -> None:
     asked = {"via": [posture("passe")], "pin": {"left_wrist": "A"}, "moves": 9}
     best, *drawn = join(engine, **asked), *(join(engine, sample=True, seed=seed, **asked) for seed in (1, 1, 2))
@@ -444,12 +453,14 @@ def test_a_path_is_drawn_by_its_seed_under_all_that_was_asked(engine: Engine, pl
         assert evaluate(tween.problem(), tween.path, tween.joints) == pytest.approx(tween.cost, abs=1e-3)
 
 
+@pytest.mark.long
 def test_without_coordination_joints_move_each_on_its_own(engine: Engine) -> None:
     alone, free = join(engine, coordination="none"), join(engine, lambda_=0.0)
     assert alone.cost == free.cost
     assert alone.asked["coordination"] == "none"
 
 
+@pytest.mark.long
 def test_the_report_adds_up_to_the_cost_whatever_was_asked(engine: Engine, plain: Tween) -> None:
     for asked in (
         {"novelty": 0.7, "pin": {"left_wrist": "B"}},
@@ -521,6 +532,7 @@ def test_a_via_is_on_the_corpus_skeleton_and_at_a_move(engine: Engine) -> None:
         join(engine, via=[(posture("passe"), 0)])
 
 
+@pytest.mark.long
 def test_the_report_says_what_was_asked(engine: Engine) -> None:
     found = join(engine, via=[(posture("passe"), 4)], avoid=[("left_knee", "passe 139")], novelty=0.25, memory=10**7)
     asked = json.loads(json.dumps(found.report()))["asked"]
@@ -535,6 +547,7 @@ def test_the_report_says_what_was_asked(engine: Engine) -> None:
 A, B = POSTURES / "arabesque.json", POSTURES / "fifth.json"
 
 
+@pytest.mark.long
 def test_everything_can_be_asked_on_the_command_line(run: Run, engine: Engine) -> None:
     via = f"{POSTURES / 'passe.json'}@4"
     asked = ["--moves", "6..9", "--pin", "left_wrist", "--pin", "right_wrist=B", "--avoid", "left_knee=plie 56"]
@@ -563,6 +576,7 @@ def test_everything_can_be_asked_on_the_command_line(run: Run, engine: Engine) -
     assert "\nvia 1     after move 4, " in table
 
 
+@pytest.mark.long
 def test_alternatives_go_to_files_of_their_own(run: Run) -> None:
     ran = run("tween", A, B, "--corpus", "ballet", "--alternatives", 3, "-o", "out.json", "--report", "r.json")
     assert ran.code == 0, ran.err
@@ -610,6 +624,7 @@ def test_no_path_is_exit_code_3_and_names_what_was_asked(run: Run) -> None:
     assert "hold left_ankle: A and B have different states there" in ran.err
 
 
+@pytest.mark.long
 def test_ctrl_c_writes_what_was_found(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     """The signal comes while the search is at its first piece of work."""
     watched = Interruption.watch

@@ -89,6 +89,7 @@ def test_what_would_join_all_is_what_would_join_each(found: Found) -> None:
     assert joints_apart
 
 
+@pytest.mark.long
 def test_what_is_said_to_help_does(few: Engine, found: Found) -> None:
     backwards, both_sides = fit(reverse=1.0), fit(mirror=True)
     tried: dict[str, int] = {}

@@ -183,6 +183,7 @@ def speeds(motion: Motion) -> tuple[Floats, Floats]:
     return turned, np.asarray((motion.root[[1, -1]] - motion.root[[0, -2]]) / step)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "number"), WINDOWS)
 def test_a_motion_leaves_and_arrives_with_the_velocities_of_its_ends(name: str, number: int) -> None:
     """Within what a frame leaves of it: the error falls with the length of a frame. Legs also hold their feet."""
@@ -205,6 +206,7 @@ def test_a_motion_leaves_and_arrives_with_the_velocities_of_its_ends(name: str, 
     assert fine[carried].max() < 0.4 * coarse[carried].max() + 1e-3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "number"), WINDOWS)
 def test_one_end_may_move_and_the_other_not(name: str, number: int) -> None:
     engine = Engine.load(name)
@@ -226,6 +228,7 @@ def test_the_root_leaves_and_arrives_nearly_as_its_ends_move(name: str, number: 
     assert np.linalg.norm(off, axis=1).max() < 0.1 * np.linalg.norm(given, axis=1).max() + 0.03
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "number"), WINDOWS)
 @pytest.mark.parametrize("row", [1, 4])
 def test_postures_are_passed_exactly_however_near_to_an_end_that_moves(name: str, number: int, row: int) -> None:
@@ -238,6 +241,7 @@ def test_postures_are_passed_exactly_however_near_to_an_end_that_moves(name: str
     assert np.degrees(rot.angle(passed.rotations[0], via.rotations)).max() < 0.1
 
 
+@pytest.mark.long
 def test_a_body_that_runs_on_goes_on_for_a_while(ballet: Engine) -> None:
     """The movement after A goes the way that the body moved, and further than without."""
     before, _, a, b = window(ballet, 2)
@@ -252,6 +256,7 @@ def test_a_body_that_runs_on_goes_on_for_a_while(ballet: Engine) -> None:
     assert gone[0] > gone[1]
 
 
+@pytest.mark.long
 def test_names_of_moving_postures_move(ballet: Engine) -> None:
     """A ~ counts in Python as on the command line."""
     still = ballet.tween(*map(ballet.posture, ("ballet/adagio@23", "ballet/adagio@40")))

@@ -113,6 +113,7 @@ def test_six_segments_are_joined_from_a_to_b(joined: Tween) -> None:
     assert joined.motion.times[-1] >= 0.1 * joined.moves - 0.02  # longer where it would be too fast
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pair", [(0, 20), (5, 11), (29, 2)])
 def test_people_are_joined_from_a_to_b(person: Engine, pair: tuple[int, int]) -> None:
     a, b = dance("one", 1).posture(pair[0]), dance("two", 2).posture(pair[1])
@@ -275,6 +276,10 @@ REPORT = [
     "detail",
     "left_out",
     "gave",
+    "reached",
+    "accented",
+    "travelled",
+    "stayed",
     "shown",
     "times",
     "names",
@@ -535,6 +540,7 @@ assert not heavy, heavy
 """
 
 
+@pytest.mark.long
 def test_fresh_processes_write_the_same_bytes_and_import_nothing_heavy(six_segments: Engine, tmp_path: Path) -> None:
     from motionmind.formats import write_posture
 
@@ -564,6 +570,7 @@ except ModuleNotFoundError as error:
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("library", ["pgmpy", "networkx"])
 def test_a_corpus_is_learned_with_pgmpy_and_networkx_and_a_tween_found_without(
     six_segments: Engine, tmp_path: Path, library: str
@@ -604,6 +611,7 @@ def ballet(recorded: list[Motion]) -> Engine:
     return Engine.fit([own_skeleton(motion) for motion in recorded], name="cmu-05", rate=5.0, skip=1)
 
 
+@pytest.mark.long
 def test_recorded_postures_are_joined_mostly_by_what_was_recorded(ballet: Engine) -> None:
     rng, corpus = np.random.default_rng(5), ballet.corpus
     tweens = []
@@ -623,6 +631,7 @@ def test_postures_on_the_files_own_joints_are_taken_to_human23(ballet: Engine, r
     assert_sound(tween, own_skeleton(raw.posture(100)), own_skeleton(raw.posture(160)))
 
 
+@pytest.mark.long
 def test_any_file_is_learned_from_or_refused_by_name(shared_data: Path) -> None:
     learned, refused = [], []
     for path in sorted((shared_data / "importer").glob("*.bvh")):

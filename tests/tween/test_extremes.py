@@ -47,6 +47,7 @@ def assert_sound(tween: Tween, a: Posture, b: Posture) -> None:
     assert np.abs(motion.root - motion.root[0]).max() < reach
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "options",
     [
@@ -79,6 +80,7 @@ def test_ends_are_exact_and_numbers_finite_however_hasty_or_slow(name: str, opti
             assert tween.motion.times[-1] == pytest.approx(options["duration"])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("facing", ["free", "stage"])
 @pytest.mark.parametrize("frames", [2, 3])
 def test_a_corpus_of_one_clip_of_few_postures(facing: Facing, frames: int) -> None:
@@ -105,6 +107,7 @@ def chain(joints: int, rng: np.random.Generator) -> Skeleton:
     return Skeleton("any", tuple(f"joint{k}" for k in range(joints)), parents, offsets)
 
 
+@pytest.mark.long
 @settings(max_examples=20)
 @given(st.integers(0, 10_000), st.sampled_from(["free", "stage"]))
 def test_any_body_moves_in_any_corpus_from_any_end(seed: int, facing: Facing) -> None:
@@ -142,6 +145,7 @@ def test_any_body_moves_in_any_corpus_from_any_end(seed: int, facing: Facing) ->
             assert_sound(tween, first, last)
 
 
+@pytest.mark.long
 def test_an_ant_s_tween_is_as_small_as_an_ant() -> None:
     rng, body = np.random.default_rng(3), ant()
     times = np.arange(30) * 0.1

@@ -50,6 +50,7 @@ def degrees_from(engine: Engine, tween: Tween, states: Floats) -> Floats:
 # --- what is asked is seen --------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["ballet", "karate", "walk-hexapod"])
 def test_a_held_joint_stays_where_it_would_have_moved(name: str) -> None:
     """Of any joint that starts and ends in one state, and that the free movement takes away from it, legs and all."""

@@ -69,6 +69,7 @@ def test_each_ingredient_of_a_tween_is_what_its_report_says(request_: dict[str, 
     assert found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("coordination", ["posture", "progression"])
 def test_each_ingredient_is_reported_on_the_way_through_other_postures(coordination: str) -> None:
     engine = engine_of("ballet")

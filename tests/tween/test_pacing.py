@@ -85,6 +85,7 @@ def test_in_the_least_time_the_smoothest_movement_has_the_fastest_speeds(engine:
     assert (parts / fastest).argmax() == slowest
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("by", [(1.0, 0.0), (0.0, 1.0)])
 def test_the_farther_the_longer(engine: Engine, by: tuple[float, float]) -> None:
     a, b = ends(engine)
@@ -97,6 +98,7 @@ def test_the_farther_the_longer(engine: Engine, by: tuple[float, float]) -> None
     assert taken[-1] > 1.2 * taken[0]
 
 
+@pytest.mark.long
 def test_it_takes_about_as_long_as_the_corpus_does(engine: Engine) -> None:
     off = []
     for seed in range(8):
@@ -106,12 +108,14 @@ def test_it_takes_about_as_long_as_the_corpus_does(engine: Engine) -> None:
     assert abs(np.median(off)) < 0.25
 
 
+@pytest.mark.long
 def test_without_pace_fewer_moves_are_made(engine: Engine) -> None:
     own = [tween_of(engine, *ends(engine, seed)).moves for seed in range(4)]
     fewer = [engine.tween(*ends(engine, seed), without=["pace"]).moves for seed in range(4)]
     assert np.mean(fewer) < np.mean(own)
 
 
+@pytest.mark.long
 def test_the_choice_does_not_depend_on_what_else_might_have_been_chosen(engine: Engine) -> None:
     own = tween_of(engine, *ends(engine))
     more = engine.tween(*ends(engine), max_moves=2 * own.moves + 30)
@@ -122,6 +126,7 @@ def test_the_choice_does_not_depend_on_what_else_might_have_been_chosen(engine: 
     assert engine.tween(*ends(engine), moves=(own.moves + 1, own.moves + 4)).moves == own.moves + 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("asked", [{"guide": 0.0}, {"coordination": "progression"}, {"pin": {"left_wrist": "A"}}])
 def test_it_is_chosen_in_the_same_way_whatever_else_is_asked(ballet: Engine, asked: dict[str, Any]) -> None:
     found = ballet.tween(*ENDS, **asked)
@@ -131,6 +136,7 @@ def test_it_is_chosen_in_the_same_way_whatever_else_is_asked(ballet: Engine, ask
     assert found.status == "optimal"
 
 
+@pytest.mark.long
 def test_each_segment_between_vias_has_its_time(ballet: Engine) -> None:
     near, far = read_posture(PASSE), moved(read_posture(PASSE), 2.0, 0.0)
     usual = ballet.tween(*ENDS, via=[near])
@@ -142,6 +148,7 @@ def test_each_segment_between_vias_has_its_time(ballet: Engine) -> None:
     assert legs[1].sum() > legs[0].sum()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pace", [0.5, 1.25, 2.0])
 def test_pace_scales_the_time_and_not_the_moves(engine: Engine, pace: float) -> None:
     own, other = (tween_of(engine, *ends(engine), pace=one) for one in (1.0, pace))
@@ -154,6 +161,7 @@ def test_pace_scales_the_time_and_not_the_moves(engine: Engine, pace: float) -> 
     assert seconds(given) == pytest.approx(seconds(tween_of(engine, *ends(engine), moves=4)) / pace, abs=FRAMES)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pace", [0.5, 0.3, 0.15])
 @pytest.mark.parametrize("name", ["karate", "ballet"])
 def test_who_is_slower_takes_no_longer_than_in_proportion(name: str, pace: float) -> None:
@@ -166,6 +174,7 @@ def test_who_is_slower_takes_no_longer_than_in_proportion(name: str, pace: float
         assert 0.85 < other * pace / own < 1.1
 
 
+@pytest.mark.long
 def test_nothing_sinks_into_the_floor_before_the_end() -> None:
     known = Engine.load("karate")
     clips = {clip.label: known.corpus.motion(clip) for clip in known.corpus.clips}
@@ -176,6 +185,7 @@ def test_nothing_sinks_into_the_floor_before_the_end() -> None:
         assert low.min() > min(low[0], low[-1], 0.0) - 0.0035
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("long", [7.0, 12.0, 30.0])
 def test_who_has_time_is_nowhere_faster_than_the_corpus(ballet: Engine, long: float) -> None:
     tween = ballet.tween(*ENDS, duration=long)
@@ -190,6 +200,7 @@ def test_a_pace_that_cannot_be_is_refused(asked: dict[str, float]) -> None:
         TweenRequest.of(**asked)  # type: ignore[arg-type]
 
 
+@pytest.mark.long
 def test_insertions_of_variations_take_it(ballet: Engine) -> None:
     piece = ballet.corpus.motion(ballet.corpus.clips[0])
     times = {}
@@ -201,6 +212,7 @@ def test_insertions_of_variations_take_it(ballet: Engine) -> None:
     np.testing.assert_allclose(times[1.0], np.multiply(2.0, times[2.0]), atol=FRAMES)
 
 
+@pytest.mark.long
 def test_the_command_line_takes_it(run: Run) -> None:
     own, fast, old = (
         run("tween", A, B, "--corpus", "ballet", *asked, "--report", "-").json
@@ -215,6 +227,7 @@ def test_the_command_line_takes_it(run: Run) -> None:
 # --- forced --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_duration_that_its_moves_cannot_make_is_made_from_the_fewest_that_can(engine: Engine) -> None:
     usual = float(np.median(engine.corpus.moves.seconds))
     more = 0
@@ -249,6 +262,7 @@ def test_who_is_hurried_is_told_of_it_by_part(ballet: Engine) -> None:
     assert [one.times for one in tween.tempo.faster] == sorted((one.times for one in tween.tempo.faster), reverse=True)
 
 
+@pytest.mark.long
 def test_what_takes_its_own_time_is_not_faster_than_the_corpus(engine: Engine) -> None:
     """Of the corpus's own frames a hundredth is; what holds the feet moves the legs as it must."""
     shares = []
@@ -264,6 +278,7 @@ def test_what_takes_its_own_time_is_not_faster_than_the_corpus(engine: Engine) -
     assert shares[0] < 0.01 < 0.5 * shares[1]
 
 
+@pytest.mark.long
 def test_no_joint_is_much_faster_than_nearly_all_of_the_corpus(ballet: Engine) -> None:
     """Of the adagio's postures, between which steps that the feet take are quick."""
     corpus, (start,) = ballet.corpus, [clip.start for clip in ballet.corpus.clips if clip.name == "adagio"]
@@ -274,6 +289,7 @@ def test_no_joint_is_much_faster_than_nearly_all_of_the_corpus(ballet: Engine) -
         assert (speeds / ballet.pace.fastest)[:, : len(corpus.skeleton)].max() < 1.02 * JOINT_SPEED_RATIO
 
 
+@pytest.mark.long
 def test_who_has_too_much_time_fills_it_as_the_corpus_does(engine: Engine) -> None:
     still, filled = [], []
     for seed in range(4):

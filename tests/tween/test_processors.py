@@ -47,6 +47,7 @@ def run(folder: Path, files: list[Path], **environment: str) -> dict[str, np.nda
         return dict(found)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("subject", ["", "cmu-05"])
 def test_tweens_are_the_same_with_and_without_avx2(
     subject: str, tmp_path: Path, request: pytest.FixtureRequest

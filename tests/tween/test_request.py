@@ -61,6 +61,15 @@ def test_a_request_cannot_be_changed() -> None:
         ({"lambda_": -1.0}, "lambda must be"),
         ({"tau": float("inf")}, "tau must be"),
         ({"via": [(FIRST, 0)]}, "via 1: the move"),
+        (
+            {"reach": [("left_wrist", (0.0, float("nan"), 0.0), 1.0)]},
+            "reach left_wrist: metres and seconds are numbers",
+        ),
+        ({"reach": [("left_wrist", (0.0, 1.0), 1.0)]}, "three coordinates, x, y and z, not 2"),
+        ({"stay": [("left_wrist", 0.5, 0.5)]}, "stay left_wrist: it must end after it begins, not at 0.5 and 0.5"),
+        ({"stay": [("left_wrist", -0.1, 0.5)]}, "a share of the duration must be a number from 0 to 1, not -0.1"),
+        ({"reach": [("left_wrist", (0.0, 1.0, 0.0), 0.0)]}, "the time must be more than 0 s"),
+        ({"reach": [("left_wrist", (0.0, 1.0, 0.0), 2.0)], "duration": 2.0}, "2 s is not between A and B"),
         ({"whole_body": True, "sample": True}, "whole_body"),
         ({"whole_body": True, "coordination": "progression"}, "whole_body"),
     ],
@@ -79,7 +88,7 @@ def test_an_option_that_is_none_is_named_with_the_nearest() -> None:
 def test_the_command_line_offers_every_field_with_its_default(command: str) -> None:
     options = {option.name: option for option in app.commands[command].params}
     defaults = {field.name: field.default for field in (*fields(TweenRequest), *fields(SearchOptions))}
-    asked = OPTIONS.keys() - {"unlike", "what_if"}  # those of `tween` alone
+    asked = OPTIONS.keys() - {"unlike", "what_if", "reach", "stay", "to", "along"}  # those of `tween` alone
     assert asked <= options.keys()
     for name in asked - {"pin", "hold", "avoid", "via", "node_budget"}:
         assert options[name].default == defaults[name], name

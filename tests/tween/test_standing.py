@@ -108,6 +108,7 @@ def on_one_leg(engine: Engine, side: str, count: int) -> Iterator[tuple[Posture,
         count -= 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "within"), [("ballet", 0.006), ("karate", 0.03)])
 def test_bodies_on_one_leg_stay_on_it_whatever_else_they_do(name: str, within: float) -> None:
     """Of default tweens; the foot's end that slides least counts, for a foot may turn on its ball or on its tip."""
@@ -125,6 +126,7 @@ def test_bodies_on_one_leg_stay_on_it_whatever_else_they_do(name: str, within: f
     assert np.mean(slid) < within  # it is twice as far where nothing holds them
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["ballet", "karate", "walk-hexapod"])
 def test_no_frame_is_below_the_floor(name: str) -> None:
     """The floor is at 0, or as low as the ends are; legs at their joints' limits may leave a foot a little in it."""
@@ -189,6 +191,7 @@ def test_from_one_posture_to_the_next_a_body_turns_the_near_way_round(facings: l
     assert np.ptp(headings) < np.ptp(np.cumsum([0.0, *turns])) + 40.0
 
 
+@pytest.mark.long
 def test_a_body_that_stands_on_the_same_leg_at_both_ends_does_not_leave_the_floor() -> None:
     """It may put down the other foot to turn."""
     engine = engine_of("ballet")

@@ -74,6 +74,7 @@ def test_the_types_of_gathering_are_those_of_gather() -> None:
     assert types_of(Gathering) == {name: one.annotation for name, one in parameters.items() if name not in own}
 
 
+@pytest.mark.long
 def test_a_type_checker_reports_misspelt_and_wrongly_typed_options_alone(tmp_path: Path) -> None:
     (tmp_path / "snippet.py").write_text(SNIPPET)
     check = [sys.executable, "-m", "mypy", "--strict", "--ignore-missing-imports", "--follow-imports=silent"]

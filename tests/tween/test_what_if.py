@@ -104,6 +104,7 @@ def test_on_toys_the_true_difference_lies_between_the_bounds() -> None:
     assert 0.0 < np.mean(early) < 0.9  # those of other lengths are searched anew
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("budget", [1, 200_000])
 @pytest.mark.parametrize(
     "asked",
@@ -128,7 +129,7 @@ def test_a_price_is_the_difference_to_the_tween_without_the_restriction(
             assert freed.length is not None
             difference = choose_length(best.search_problem).cost - freed.length.cost
         else:
-            stops = zip((via for via, _ in found.request.vias), found.passed, strict=True)
+            stops = zip((via for via, *_ in found.request.vias), found.passed, strict=True)
             alike = without(asked | {"via": [*stops]}, one.without) | {"moves": best.moves}
             difference = best.cost - tween_of(ballet, **alike).cost
         assert 0.0 <= one.least <= one.most

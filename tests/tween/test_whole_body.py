@@ -111,6 +111,7 @@ def test_a_long_way_may_be_the_cheapest_where_moves_cost_less_than_nothing() -> 
 # --- recorded bodies --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_it_goes_through_whole_postures_in_their_order_and_is_never_cheaper(insects: Engine) -> None:
     rng, joints = np.random.default_rng(2), len(insects.corpus.skeleton)
     moves = insects.corpus.moves
@@ -194,6 +195,7 @@ def test_the_nearest_posture_has_the_least_sum_of_squares() -> None:
     assert nearest_posture(pair.corpus, rest) == 1
 
 
+@pytest.mark.long
 def test_the_command_takes_it_and_refuses_the_problem_with_it(run: Run) -> None:
     ran = run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "--whole-body", "--report", "-")
     assert ran.code == 0
