@@ -13,6 +13,7 @@ ORDERS: tuple[By, ...] = get_args(By)
 RANDOM: tuple[By, ...] = ("shuffle", "chunks", "quadrants")
 # Without a limit, insertions take 52 to 75 % of the time (macarena, medley, cmu-05 in its own corpus and in ballet).
 DEFAULT_INSERTED_SHARE = 0.3
+MAX_EVERY = 64  # beats from one on which a stretch may start to the next
 
 _UNTRACED = dict.fromkeys(
     ("flow", "nudge", "depart", "start", "skip", "step", "transient", "inserted", "stretch"), "follows no trajectory"

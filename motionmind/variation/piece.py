@@ -27,6 +27,7 @@ from motionmind.variation.arguments import check_number
 _CLOCK_TOLERANCE_S = 1e-9
 LONE_POSTURE_S = 1.0  # duration of the only posture of a piece
 _HORIZONTAL = np.array([1.0, 0.0, 1.0])
+_SAME_FACING_RAD = 1e-6  # rounding errors of postures that face the same way are smaller
 _LEAD_S = 0.2  # of the piece's movement on either side of a transition
 # Frames farther apart do not show how fast the piece passes them: a second between two positions may be spent mostly at
 # rest. Between nearer keyframes the piece moves in a straight line, which gives its velocity.
@@ -202,12 +203,13 @@ class Piece:
     def arrange(self, order: Ints, insertions: Mapping[int, Motion]) -> Arrangement:
         """Put the piece's postures in another order.
 
-        The piece's own insertions stay marked if a chunk contains them whole.
+        Where an insertion travels or turns from A to B, all that follows does so with it. The piece's own insertions
+        stay marked if a chunk contains them whole.
 
         Args:
             order: numbers of postures [L].
-            insertions: movement from the n-th posture of the order to the next, between their `ends`, by n. At a seam
-                without an insertion, the next posture follows at once.
+            insertions: movement from the n-th posture of the order to the next, between their `ends`, by n; B may stand
+                elsewhere. At a seam without an insertion, the next posture follows at once.
         """
         starts, stops = self.chunks(order)
         motion, parts = self.motion, Parts()
@@ -229,8 +231,15 @@ class Piece:
                 rotations, root, times = inserted.rotations[inner], inserted.root[inner], inserted.times[inner]
                 parts.add(rotations, root, times, inserted.insertions, Placement(heading, end), now)
                 now += float(inserted.times[-1])
+                end = end + rot.mul_vec(rot.about_vertical(np.asarray(heading)), inserted.root[-1] * _HORIZONTAL)
+                heading += self._turn_in(inserted)
             place, clock = self._continue(order[stop], end, heading, now)
         return parts.join(motion)
+
+    def _turn_in(self, inserted: Motion) -> float:
+        """Return how far an insertion turns a piece of free facing, radians."""
+        turn = float(rot.heading(inserted.rotations[-1, 0])) if self.facing == "free" else 0.0
+        return turn if abs(turn) > _SAME_FACING_RAD else 0.0
 
     def _continue(self, posture: int, end: Floats, heading: float, now: float) -> tuple[Placement, float]:
         """Return the placement and clock offset of a chunk that begins with a posture at `end` [3] and time `now`."""

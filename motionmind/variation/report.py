@@ -17,6 +17,7 @@ from motionmind.variation.controls import Control
 from motionmind.variation.course import Course
 from motionmind.variation.departure import departure
 from motionmind.variation.limits import Kept, Limits, inserted_share
+from motionmind.variation.on_beat import Part
 from motionmind.variation.piece import Piece
 from motionmind.variation.review import Decision, Seam
 from motionmind.variation.seams import AbruptJoint, Candidate
@@ -80,6 +81,19 @@ class CountsReport(msgspec.Struct, frozen=True):
     inserted_share: float
 
 
+class OnBeatReport(msgspec.Struct, frozen=True):
+    """The parts of a variation on the beat, in order, and what they cost in length.
+
+    `every` is the interval between possible starts, counts; `own_seconds` is the length with each part at its own pace,
+    `seconds` on the beat.
+    """
+
+    every: int
+    own_seconds: float
+    seconds: float
+    parts: list[Part]
+
+
 class CandidateReport(msgspec.Struct, frozen=True):
     """A candidate (see `InsertionCandidate`): its length in moves and seconds, its certificate, and its credits."""
 
@@ -123,6 +137,7 @@ class VariationReport(msgspec.Struct, frozen=True):
         credits: sources of the movement, by share.
         limits: limits of its first order; null for none.
         control: the control of its first order; null for the attractor's own.
+        on_beat: its parts, which start on beats; null if they start at any time.
         motion_sha256: hash of the movement's file, written with the report; null if there is none.
     """
 
@@ -135,6 +150,7 @@ class VariationReport(msgspec.Struct, frozen=True):
     credits: Ledger
     limits: Limits | None = None
     control: Control | None = None
+    on_beat: OnBeatReport | None = None
     motion_sha256: str | None = None
 
 
@@ -148,6 +164,7 @@ def report_of(
     edits: int,
     kept: Kept | None,
     shares: tuple[Credit, ...],
+    on_beat: OnBeatReport | None,
 ) -> VariationReport:
     """Return the report of a variation.
 
@@ -161,6 +178,7 @@ def report_of(
         edits: number of its edits.
         kept: its first order within limits, if any.
         shares: its credits.
+        on_beat: its parts on the beat, if it has a beat.
     """
     return VariationReport(
         PieceReport(piece.motion.name, len(piece), piece.facing),
@@ -172,6 +190,7 @@ def report_of(
         ledger_of(shares),
         kept.limits if kept else None,
         control,
+        on_beat,
     )
 
 

@@ -365,12 +365,12 @@ def _with_candidates(transition: Transition, tweens: Iterable[Tween]) -> Transit
     first = next(iter(distinct.values()))
     return msgspec.structs.replace(
         transition,
-        candidates=tuple(map(_candidate_of, distinct.values())),
+        candidates=tuple(map(candidate_of, distinct.values())),
         options=msgspec.to_builtins(first.asked, enc_hook=np.generic.item),
     )
 
 
-def _candidate_of(tween: Tween) -> Candidate:
+def candidate_of(tween: Tween) -> Candidate:
     """Return the part of a tween that a variation keeps."""
     return Candidate(
         replace(tween.motion, name=""),

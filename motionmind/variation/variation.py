@@ -14,10 +14,12 @@ from motionmind._cells import html_of
 from motionmind._typing import Ints
 from motionmind.arguments import as_integers, check_flag, check_function, check_items, check_options, check_type
 from motionmind.body.motion import Motion
+from motionmind.body.stage import check_stage
 from motionmind.chaos.flows import Flow
 from motionmind.chaos.reorder import Itinerary
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
+from motionmind.music.beats import Beats
 from motionmind.search.solve import Watch
 from motionmind.tween.engine import Engine
 from motionmind.tween.request import SeamOptions, SmoothOptions
@@ -34,9 +36,10 @@ from motionmind.variation.limits import (
     keep_within,
 )
 from motionmind.variation.nudge import MAX_LENGTH, find_course
+from motionmind.variation.on_beat import OnBeat, check_on_beat, find_on_beat, least_stretch, retime
 from motionmind.variation.orders import DEFAULT_INSERTED_SHARE, By, check_taken
 from motionmind.variation.piece import Arrangement, Piece
-from motionmind.variation.report import report_of
+from motionmind.variation.report import OnBeatReport, report_of
 from motionmind.variation.review import (
     Approve,
     Cut,
@@ -56,6 +59,7 @@ from motionmind.variation.seams import (
     TransitionTest,
     judge_and_smooth,
 )
+from motionmind.variation.staging import put_on_stage
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +76,7 @@ class Variation:
         edits: the edits, in order.
         kept: the order within limits, which replaces `order`; None without limits.
         control: the control of the order; None for the attractor's own.
+        on_beat: the beats on which its stretches and insertions start; None for any time.
 
     >>> from motionmind import Engine, vary
     >>> engine = Engine.load("ballet")
@@ -88,6 +93,7 @@ class Variation:
     edits: tuple[Edit, ...] = ()
     kept: Kept | None = None
     control: Control | None = None
+    on_beat: OnBeat | None = None
 
     def __post_init__(self) -> None:
         check_type("piece", self.piece, Piece)
@@ -96,6 +102,9 @@ class Variation:
         check_items("edits", self.edits, "edits", Approve, Discard, Replace, Cut, Smooth)
         check_type("kept", self.kept, Kept, or_none=True)
         check_type("control", self.control, Control, or_none=True)
+        check_type("on_beat", self.on_beat, OnBeat, or_none=True)
+        if self.on_beat is not None:
+            check_on_beat(self.on_beat)
         if (self.course is not None) != (self.control is None or self.control.needs_trajectory):
             raise MotionMindError(f"a variation by {self.by} has {'no' if self.course else 'a'} course")
         if self.control and (self.control.seed is not None) != self.control.is_random:
@@ -153,8 +162,16 @@ class Variation:
 
     def arrange(self) -> Arrangement:
         """Return the movement (see `motion`) and the frame of each posture."""
+        return self._arrange()[0]
+
+    def _arrange(self) -> tuple[Arrangement, OnBeatReport | None]:
         insertions = {seam.at: seam.insertion.motion for seam in self.seams if seam.insertion}
-        return self.piece.arrange(self.postures, insertions)
+        arranged = self.piece.arrange(self.postures, insertions)
+        if self.on_beat is None:
+            return arranged, None
+        retimed, parts = retime(arranged, self.seams, self.on_beat)
+        own, now = (float(one.motion.times[-1] - one.motion.times[0]) for one in (arranged, retimed))
+        return retimed, OnBeatReport(self.on_beat.every, own, now, parts)
 
     def around(self, seam: int, alternative: int | None = None, *, seconds: float = 1.0) -> Motion:
         """Return the movement around a seam.
@@ -183,6 +200,7 @@ class Variation:
 
     def report(self) -> dict[str, Any]:
         """Return everything but the movement as plain values for JSON: the fields of `VariationReport`."""
+        (motion, _), on_beat = self._arrange()
         report: dict[str, Any] = msgspec.to_builtins(
             report_of(
                 self.piece,
@@ -193,7 +211,8 @@ class Variation:
                 self.seams,
                 len(self.edits),
                 self.kept,
-                self.motion().credits,
+                motion.credits,
+                on_beat,
             )
         )
         return report
@@ -324,6 +343,9 @@ def vary(
     length: int | None = None,
     inserted: float | None = None,
     stretch: int | None = None,
+    beats: Beats | None = None,
+    on_beat: int | None = None,
+    stage: tuple[float, float] | None = None,
     alternatives: int = 3,
     whole_body: bool = False,
     on_progress: OnProgress | None = None,
@@ -357,7 +379,13 @@ def vary(
             order that inserts least is taken. 1 is no limit. None for 0.3 with an engine, unless `nudge` or `depart` is
             given or there are more than 4,000 postures; this default gives way where all else is the piece itself.
         stretch: the least number of postures in each stretch of the piece; None for 4 if insertions are limited (for a
-            fifth of the postures if they are fewer than 20), or 1.
+            fifth of the postures if they are fewer than 20), or 1; with `on_beat`, as many as fill its interval.
+        beats: the beats of its music; count 1 comes with the first frame.
+        on_beat: the counts from one beat to the next on which a stretch or an insertion may start; all do, played
+            faster or slower (see `motionmind.variation.on_beat`). None to leave their times as they are.
+        stage: width and depth of the stage around the origin, metres: the variation is turned and moved to stay on it,
+            as a whole, or else insertions travel between runs that fit; None leaves it where it goes. See
+            `motionmind.plots.find_overstep` for what is left.
         alternatives: see `Variation.smooth`, as for `whole_body`, `on_progress` and `watch`.
         options: fields of `TweenRequest` and `SearchOptions`, for the tweens that smooth seams.
 
@@ -385,6 +413,10 @@ def vary(
     trajectory |= {"skip": skip, "step": step, "transient": transient}
     check_taken(by, trajectory | {"length": length, "inserted": inserted, "stretch": stretch})
     piece = piece if isinstance(piece, Piece) else Piece.of(piece)
+    at_beats = find_on_beat(beats, on_beat)
+    if at_beats and stretch is None and (control is None or control.needs_trajectory):
+        stretch = max(least_stretch(at_beats, piece), 4 if len(piece) >= 20 else 1)
+    stage = None if stage is None else check_stage(stage)
     length = check_whole("length", len(piece) if length is None else length, 1, MAX_LENGTH)
     is_default = engine is not None and control is None and inserted is nudge is depart is None
     is_default &= max(len(piece), length) <= MAX_LIMITED_POSTURES
@@ -402,10 +434,10 @@ def vary(
         if is_default and limits is not None:
             within = partial(estimate_order, limits, durations=piece.durations, seconds=seconds)
         course, found = find_course(len(piece), length, limits, within, **trajectory)
-        variation = Variation(piece, course, found.indices)
+        variation = Variation(piece, course, found.indices, on_beat=at_beats)
     else:
         piece, order = control.of_piece(piece)
-        variation = Variation(piece, None, order, control=control)
+        variation = Variation(piece, None, order, control=control, on_beat=at_beats)
     smooth: Smoothing | None = None
     if engine is not None:
         smooth = partial(
@@ -424,12 +456,28 @@ def vary(
             limits, found, piece.durations, seconds, None if control else smooth, leaves=is_default
         )
         variation = replace(variation, kept=kept, transitions=transitions)
-        if control is None:
-            return variation
     if found is not None and control is not None:
         variation = _in_order_of(control, variation, found)
-    pairs = list(dict.fromkeys((seam.start, seam.end) for seam in variation.seams))
-    return replace(variation, transitions=smooth(pairs)) if smooth else variation
+    if smooth and not (control is None and variation.kept):
+        pairs = list(dict.fromkeys((seam.start, seam.end) for seam in variation.seams))
+        variation = replace(variation, transitions=smooth(pairs))
+    if stage is None:
+        return variation
+    return _on_stage(variation, stage, engine, watch, {"whole_body": whole_body, "seed": seed, **options})
+
+
+def _on_stage(
+    variation: Variation,
+    stage: tuple[float, float],
+    engine: Engine | None,
+    watch: Watch | None,
+    options: dict[str, Any],
+) -> Variation:
+    """Return a variation turned and moved so that it stays on the stage, as far as it can."""
+    staged = put_on_stage(variation.piece, variation.arrange(), variation.seams, stage, engine, watch, **options)
+    news = {(one.start, one.end): one for one in staged.transitions}
+    judged = tuple(news.get((one.start, one.end), one) for one in variation.transitions)
+    return replace(variation, piece=staged.piece, transitions=judged, edits=(*variation.edits, *staged.edits))
 
 
 def _in_order_of(control: Control, variation: Variation, found: Itinerary) -> Variation:

@@ -11,13 +11,15 @@ A file is motion JSON (`motionmind.formats.motion_json`) with one more field:
                  "candidates": [{"motion": {...}, "status": "optimal", "cost": 131.2, ...}], "failure": ""}, ...],
       "edits": [{"edit": "approve", "seams": [1, 3]}, {"edit": "cut", "first": 10, "last": 14, "before": 30}, ...],
       "kept": {"order": [0, 1, 2, 3, 64, ...], "limits": {"inserted": 0.3, "stretch": 4}},
-      "control": {"by": "chunks", "seed": 0}
+      "control": {"by": "chunks", "seed": 0},
+      "on_beat": {"every": 2, "times": [0.0, 1.0, 2.0, ...]}
     }
 
 `piece` is the original with the frame of each of its postures, `order` the postures in the trajectory's order,
 `joins` the judged transitions, and `edits` the decisions, from which all else follows. With limits, `kept` is the order
 that replaces the trajectory's. With a control, `control` names it; `course` is null if it follows no trajectory, and
-the piece of quadrants has `"composed": true`. Numbers keep all their bits.
+the piece of quadrants has `"composed": true`. `on_beat` has the beats on which stretches and insertions start.
+Numbers keep all their bits.
 """
 
 from __future__ import annotations
@@ -30,18 +32,21 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from motionmind._typing import Floats
 from motionmind.arguments import check_path, check_type
-from motionmind.body.motion import Motion
+from motionmind.body.motion import Motion, Posture
 from motionmind.corpus.corpus import Facing
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.files import FilePath, read_bytes
 from motionmind.formats import _json
 from motionmind.formats._json import InsertionSchema
 from motionmind.formats.motion_json import FramesSchema, MotionSchema, motion_of, write_motion_json
+from motionmind.geometry import rotations as rot
 from motionmind.variation.controls import Control
 from motionmind.variation.course import Course
 from motionmind.variation.limits import Kept
-from motionmind.variation.piece import Piece
+from motionmind.variation.on_beat import OnBeat
+from motionmind.variation.piece import Piece, Placement
 from motionmind.variation.review import Approve, Cut, Discard, Edit, Replace, Smooth
 from motionmind.variation.seams import Candidate, Index, InsertionCandidate, JudgedTransition, Transition
 from motionmind.variation.variation import Variation
@@ -74,6 +79,7 @@ class VariationSchema(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=
     edits: list[Approve | Discard | Replace | Cut | Smooth[FileTransition]]
     kept: Kept | None = None
     control: Control | None = None
+    on_beat: OnBeat | None = None
 
 
 class _EditHead(msgspec.Struct):
@@ -117,7 +123,8 @@ def read_variation(path: FilePath) -> Variation:
         ]
         transitions = _read_transitions(schema.joins, "joins", piece, path)
         order = np.array(schema.order)
-        return Variation(piece, schema.course, order, transitions, tuple(edits), schema.kept, schema.control)
+        rest = tuple(edits), schema.kept, schema.control, schema.on_beat
+        return Variation(piece, schema.course, order, transitions, *rest)
     except FormatError:
         raise
     except MotionMindError as error:
@@ -157,6 +164,7 @@ def write_variation(path: FilePath, variation: Variation) -> None:
         ],
         variation.kept,
         variation.control,
+        variation.on_beat,
     )
     write_motion_json(path, variation.motion(), {"variation": msgspec.json.encode(schema)})
 
@@ -235,8 +243,16 @@ def _read_candidate(
     ends = piece.ends(transition.start, transition.end)
     for word, frame, end in zip(("start", "end"), (0, -1), ends, strict=True):
         rotations, root = motion.rotations[frame], motion.root[frame]
+        if word == "end":
+            rotations, root = _turned_back(piece, end, rotations), root * (0.0, 1.0, 0.0)
         apart = np.minimum(np.abs(rotations - end.rotations), np.abs(rotations + end.rotations))  # q and -q are one
         if max(apart.max(), np.abs(root - end.root).max()) > 1e-6:  # of a quaternion, and metres
             posture = getattr(transition, word)
             raise FormatError(f"variation: {where}: does not {word} at posture {posture} of the piece", path=path)
     return file.with_movement(motion, np.array(file.path, dtype=np.int32))
+
+
+def _turned_back(piece: Piece, end: Posture, rotations: Floats) -> Floats:
+    """Return local rotations [J, 4], turned to the facing of a posture if the piece may face anywhere."""
+    turn = float(rot.heading(end.rotations[0]) - rot.heading(rotations[0])) if piece.facing == "free" else 0.0
+    return Placement(turn, np.zeros(3)).turn(rotations) if turn else rotations

@@ -80,6 +80,7 @@ def _with_parameters(x: np.ndarray, sigma: float, rho: float, beta: float) -> tu
     return sigma * (x[1] - x[0]), x[0] * (rho - x[2]) - x[1], x[0] * x[1] - beta * x[2]
 
 
+@pytest.mark.long
 def test_any_function_is_a_flow_compiled_or_not() -> None:
     given = {"sigma": 10.0, "rho": 28.0, "beta": 8.0 / 3.0}
     known = find_flow("lorenz", **given)
@@ -94,6 +95,7 @@ def test_any_function_is_a_flow_compiled_or_not() -> None:
     assert Flow("array", _lorenz, known.start, known.step).dimensions == ("x1", "x2", "x3")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("flow", "start"),
     [

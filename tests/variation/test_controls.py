@@ -32,6 +32,8 @@ from motionmind.variation.posture_names import name_postures
 from motionmind.variation.variation import Variation, vary
 from motionmind.variation.variation_json import read_variation, write_variation
 
+pytestmark = pytest.mark.long
+
 CONTROLS = ORDERS[1:]
 RANDOM = tuple(name for name in CONTROLS if name != "dabby")
 SEEDS = st.integers(0, 10_000)

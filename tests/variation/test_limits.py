@@ -24,7 +24,7 @@ from motionmind.formats import write_motion
 from motionmind.learned.plausibility import MEASURES
 from motionmind.tween.engine import Engine
 from motionmind.variation.departure import departure
-from motionmind.variation.insertion_times import estimate_insertions
+from motionmind.variation.insertion_times import estimate_insertions, estimate_pairs
 from motionmind.variation.piece import Piece
 from motionmind.variation.seams import TransitionTest, judge_transitions
 from motionmind.variation.stretches import cheapest_order
@@ -134,6 +134,15 @@ def test_seams_that_a_corpus_knows_are_estimated_to_insert_nothing_and_no_others
     assert 0.0 < (seconds == 0.0).mean() < 0.5
 
 
+def test_pairs_of_postures_are_estimated_like_all_of_them(short: Piece, karate: Engine) -> None:
+    test = TransitionTest(karate)
+    seconds = estimate_insertions(short, test)
+    chosen = [(i, k) for i in range(0, len(short), 7) for k in range(0, len(short), 3)]
+    pairs = [(short.ends(i, i)[0], short.ends(k, k)[0], float(short.durations[i])) for i, k in chosen]
+    np.testing.assert_allclose(estimate_pairs(pairs, test), [seconds[pair] for pair in chosen], rtol=1e-5)
+    assert estimate_pairs([], test).shape == (0,)
+
+
 # --- variations -----------------------------------------------------------------------------------------------------
 
 
@@ -152,6 +161,7 @@ def test_limits_hold(short: Piece, karate: Engine, flow: str, share: float, stre
     assert counts["departed"] > 0.0 or share == 0.0
 
 
+@pytest.mark.long
 def test_of_insertions_no_more_is_given_up_than_needed(kata: Piece, karate: Engine) -> None:
     def varied(inserted: float | None = None) -> Variation:
         return vary(kata, karate, nudge=0.3, stretch=2, alternatives=1, length=70, inserted=inserted)
@@ -192,6 +202,7 @@ def test_a_variation_within_limits_is_read_as_it_was_written(kata: Piece, within
     assert b'"kept"' not in (tmp_path / "free.json").read_bytes()
 
 
+@pytest.mark.long
 def test_what_cannot_be_reached_is_refused_in_a_line(
     kata: Piece, karate: Engine, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -81,6 +81,7 @@ def seen(variation: Variation) -> list[object]:
     return [report, [id(seam.insertion) for seam in variation.seams]]
 
 
+@pytest.mark.long
 @settings(max_examples=10)
 @given(edits=edits)
 def test_undo_takes_back_one_edit_after_another(
@@ -161,6 +162,7 @@ def test_cut_and_paste_moves_postures_and_loses_none(variation: Variation, cut: 
     assert np.array_equal(motion.rotations[frames, 1:], found.piece.motion.rotations[found.postures, 1:])
 
 
+@pytest.mark.long
 def test_new_seams_are_not_judged_until_they_are_smoothed(variation: Variation, karate: Engine) -> None:
     found = variation.cut(5, 9, 60)
     old = {(seam.start, seam.end) for seam in variation.seams}
@@ -191,6 +193,7 @@ def test_what_changes_nothing_is_no_edit(variation: Variation) -> None:
         assert again is one
 
 
+@pytest.mark.long
 def test_nobody_has_approved_what_is_put_in_later(variation: Variation, karate: Engine) -> None:
     bare = vary(variation.piece, flow=FLOWS["rossler"], nudge=1.0, length=LENGTH)
     found = bare.approve(*(seam.number for seam in bare.seams)).smooth(karate, alternatives=1)
@@ -221,6 +224,7 @@ def test_a_discarded_insertion_is_made_anew_and_is_open(variation: Variation, ka
     assert without.smooth(karate, strict=True, max_moves=1) is without
 
 
+@pytest.mark.long
 def test_what_stands_elsewhere_is_not_made_anew(variation: Variation, karate: Engine) -> None:
     seam = next(one for one in variation.seams if one.insertion)
     order = np.array([seam.start, seam.end, seam.start, seam.end])
@@ -269,6 +273,7 @@ def file(variation: Variation, tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_review_on_the_command_line_is_review_from_python(run: Run, file: Path, variation: Variation) -> None:
     first, second, third, *_ = inserted(variation)
     two = next(seam.number for seam in variation.seams if seam.transition and len(seam.transition.candidates) == 2)

@@ -33,6 +33,8 @@ from motionmind.variation.variation import Variation, vary
 from motionmind.variation.variation_json import read_variation, write_variation
 from motionmind.walks.headings import SPIN_RADPS
 
+pytestmark = pytest.mark.long
+
 DOCUMENT = Path(__file__).parents[2] / "docs" / "variations.md"
 
 
@@ -741,7 +743,7 @@ def test_what_the_documents_show_runs(run: Run) -> None:
     ("arguments", "message"),
     [
         (("nowhere.bvh",), "nowhere.bvh: cannot be read: there is no such file"),
-        (("karate",), "karate: holds 4 clips; choose one by --clip"),
+        (("karate",), "karate: holds 4 clips; name one, such as karate/taikyoku-shodan"),
         (("karate/nothing",), "karate: no posture or clip 'nothing'; there are yoi, "),
         (("karate/heian-shodan", "--clip", "heian-shodan"), "already names a clip; leave out --clip"),
         (("macarena", "--attractor", "moon"), "no flow 'moon'"),

@@ -30,6 +30,7 @@ def share_inserted(variation: Variation) -> float:
     return inserted / float(variation.motion().times[-1])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("flow", sorted(FLOWS))
 @pytest.mark.parametrize("count", sorted(PIECES))
 def test_a_variation_leaves_its_piece_and_is_mostly_the_piece(count: int, flow: str) -> None:
@@ -61,6 +62,7 @@ def test_where_an_insertion_takes_longer_than_the_piece_it_is_left_all_the_same(
     assert "note: within its limits the variation keeps the piece's order" in held.err
 
 
+@pytest.mark.long
 def test_a_chosen_nudge_is_named_and_a_given_one_is_followed_without_a_limit(run: Run) -> None:
     quick = ("vary", "ballet/promenade", "--length", 20, "--alternatives", 1, "-o", "v.json")
     done = run(*quick)
