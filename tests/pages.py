@@ -142,6 +142,16 @@ class Tabs:
         return tab
 
 
+def beside(tab: Any) -> Any:
+    """Return another tab of the same browser's user, of the same size.
+
+    Without that, its size is the one for which the context was begun, perhaps by a test of telephones.
+    """
+    other = tab.context.new_page()
+    other.set_viewport_size(tab.viewport_size)
+    return other
+
+
 class Chromium:
     """The browser, from when it is first asked for until it is closed; it is started anew when it is needed again.
 

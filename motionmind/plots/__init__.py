@@ -1,4 +1,4 @@
-"""Plots as SVG and PNG: joint graphs, joint angles over time, variations on their attractors, and gaps."""
+"""Plots as SVG and PNG: joint graphs, joint angles over time, variations on their attractors, floor plans, and gaps."""
 
 from __future__ import annotations
 

@@ -7,6 +7,8 @@ from functools import lru_cache
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Pixels
+from motionmind.body.mirror import MIDDLE
+from motionmind.body.palette import Colour
 from motionmind.geometry import rotations as rot
 from motionmind.render import raster
 from motionmind.render.body_solids import BodyShape
@@ -35,9 +37,10 @@ def draw(buffer: DepthBuffer, cones: Cones, balls: Ellipsoids, only: frozenset[i
     buffer.draw(cones, balls, numbers)
 
 
-def given_colours(body: BodyShape) -> Floats:
-    """Return the RGB [N, 3], 0 to 255, of a body's solids: warm on the left, cool on the right, the trunk neutral."""
-    return np.array([COLOURS[paint] for paint in body.paints], dtype=np.float64)
+def given_colours(body: BodyShape, trunk: Colour = COLOURS[MIDDLE]) -> Floats:
+    """Return the RGB [N, 3], 0 to 255, of a body's solids: warm left, cool right, by default a grey trunk."""
+    colours = {**COLOURS, MIDDLE: trunk}
+    return np.array([colours[paint] for paint in body.paints], dtype=np.float64)
 
 
 def inserted_colours(body: BodyShape) -> Floats:

@@ -5,6 +5,7 @@ Frames are drawn as they are encoded; memory holds two at most.
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 from collections.abc import Iterator
 from fractions import Fraction
@@ -18,9 +19,12 @@ from PIL import GifImagePlugin, Image
 
 from motionmind._typing import Floats, Int16s, Pixels
 from motionmind.body.motion import Motion
+from motionmind.ensemble.dancers import Ensemble
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.jit import jit
+from motionmind.music.sound import Sound
+from motionmind.render.group import GroupStage
 from motionmind.render.stage import Stage
 from motionmind.render.timing import HOLD_S, MIN_FPS, N_USUAL_FRAMES, film_rate, frame_rate, frame_times
 
@@ -30,7 +34,14 @@ _N_LEVELS = 256 >> _SHIFT_BITS  # of each channel that the lookup tells apart
 
 
 def write_film(
-    path: FilePath, motion: Motion, *, fps: float | None = None, view: str = "quarter", size: int = 480, first: int = 0
+    path: FilePath,
+    motion: Motion,
+    *,
+    fps: float | None = None,
+    view: str = "quarter",
+    size: int = 480,
+    first: int = 0,
+    sound: Sound | None = None,
 ) -> None:
     """Film a motion as `.gif`, which loops and holds its last posture for 0.8 s, or as `.mp4` (H.264).
 
@@ -46,23 +57,50 @@ def write_film(
         view: the name of one of `view.VIEWS`.
         size: height of the picture, pixels, from 120 to 2160; a flat movement makes it lower.
         first: number of the motion's first frame in the longer motion that it is a part of.
+        sound: sound of an MP4, which begins with the motion; None for a silent film.
 
     Raises:
         MotionMindError: the suffix is neither, a number is out of range, there would be more than four times that many
             frames, the extra for MP4 is not installed, or the file cannot be written.
     """
     suffix = Path(path).suffix.lower()
-    if suffix not in {".gif", ".mp4"}:
-        raise MotionMindError(f"{path}: a film is a .gif or an .mp4, not {suffix or 'a file without suffix'}")
-    # Frames a second, by default and at most: browsers play no GIF faster than 50.
-    usual, most = (25.0, 50.0) if suffix == ".gif" else (60.0, 120.0)
-    if fps is not None and not MIN_FPS <= fps <= most:
-        raise MotionMindError(f"{path}: a {suffix} has from {MIN_FPS:g} to {most:g} frames a second, not {fps:g}")
+    usual = _check_film(path, suffix, fps)
     # An MP4 has more, so that a film of a person (23 joints) keeps all recorded frames, however many.
     more = 0 if suffix == ".gif" else len(motion) * len(motion.skeleton) // 16
     rate = film_rate(motion, min(frame_rate(motion), usual), fps, N_USUAL_FRAMES + more)
     stage = Stage(motion, frame_times(motion, rate), view=view, size=size, first=first)
-    write_atomically(path, gif(stage) if suffix == ".gif" else mp4(stage, rate))
+    write_atomically(path, gif(stage) if suffix == ".gif" else mp4(stage, rate, sound))
+
+
+def write_group_film(
+    path: FilePath,
+    ensemble: Ensemble,
+    *,
+    fps: float | None = None,
+    view: str = "quarter",
+    size: int = 480,
+    sound: Sound | None = None,
+) -> None:
+    """Film an ensemble as `.gif` or `.mp4`; arguments and errors as of `write_film`."""
+    suffix = Path(path).suffix.lower()
+    usual = _check_film(path, suffix, fps)
+    seconds = ensemble.seconds
+    rate = fps or min(usual, max(MIN_FPS, N_USUAL_FRAMES / max(seconds, 1.0)))
+    if seconds * rate > 4 * N_USUAL_FRAMES:
+        raise MotionMindError(f"{path}: {seconds:.0f} s at {rate:g} frames a second are too many frames; give fewer")
+    stage = GroupStage(ensemble.motions(ensemble.times(rate)), view=view, size=size)
+    write_atomically(path, gif(stage) if suffix == ".gif" else mp4(stage, rate, sound))
+
+
+def _check_film(path: FilePath, suffix: str, fps: float | None) -> float:
+    """Check the suffix and the rate of a film; return the usual rate, frames a second."""
+    if suffix not in {".gif", ".mp4"}:
+        raise MotionMindError(f"{path}: a film is a .gif or an .mp4, not {suffix or 'a file without suffix'}")
+    # Browsers play no GIF faster than 50.
+    usual, most = (25.0, 50.0) if suffix == ".gif" else (60.0, 120.0)
+    if fps is not None and not MIN_FPS <= fps <= most:
+        raise MotionMindError(f"{path}: a {suffix} has from {MIN_FPS:g} to {most:g} frames a second, not {fps:g}")
+    return usual
 
 
 def write_still(path: FilePath, motion: Motion, *, view: str = "quarter", size: int = 480) -> None:
@@ -77,7 +115,7 @@ def write_still(path: FilePath, motion: Motion, *, view: str = "quarter", size: 
 # --- GIF --------------------------------------------------------------------------------------------------------------
 
 
-def gif(stage: Stage) -> bytes:
+def gif(stage: Stage | GroupStage) -> bytes:
     """Encode the film of a stage as a GIF; each frame holds only the box that changed, and in it the changed pixels."""
     palette, height, width = _palette(stage), stage.camera.height, stage.camera.width
     table = np.full(_N_LEVELS**3, -1, dtype=np.int16)
@@ -97,13 +135,13 @@ def gif(stage: Stage) -> bytes:
     return b"".join([*parts, b";"])
 
 
-def _delays(stage: Stage) -> list[int]:
+def _delays(stage: Stage | GroupStage) -> list[int]:
     """Return how long to show each frame, in hundredths of a second; rounding errors do not add up."""
     marks = np.round(100.0 * (stage.motion.times - stage.motion.times[0])).astype(int)
     return [*np.diff(marks).tolist(), round(100.0 * HOLD_S)]
 
 
-def _palette(stage: Stage) -> Pixels:
+def _palette(stage: Stage | GroupStage) -> Pixels:
     """Choose one palette [256, 3] for all frames, to avoid flicker, from a sample of them; its last colour is unused.
 
     A colour counts by the root of its frequency; otherwise paper and floor would leave no colours for small details.
@@ -181,36 +219,58 @@ def _index(
 # --- MP4 --------------------------------------------------------------------------------------------------------------
 
 
-def mp4(stage: Stage, rate: float) -> bytes:
+def mp4(stage: Stage | GroupStage, rate: float, sound: Sound | None = None) -> bytes:
+    """Encode the film of a stage as H.264 in an MP4; arguments and errors as of `encode_mp4`."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "film.mp4"
+        encode_mp4(path, stage, rate, stage.frames(), sound)
+        return path.read_bytes()
+
+
+def encode_mp4(
+    path: Path, stage: Stage | GroupStage, rate: float, pictures: Iterator[Pixels], sound: Sound | None = None
+) -> None:
     """Encode the film of a stage as H.264 in an MP4.
 
     Args:
+        path: the file.
         stage: the stage.
         rate: frames a second.
+        pictures: the pictures of its frames.
+        sound: sound that begins with the first frame; the film has as much of it as it lasts. None for a silent film.
 
     Raises:
         MotionMindError: the encoder is not installed, or fails.
     """
+    program = encoder_program()
+    if program is None:
+        raise MotionMindError('.mp4 needs an encoder: pip install "motionmind[film]"')
+    log, track = path.with_suffix(".log"), path.with_suffix(".wav")
+    try:
+        if sound:
+            track.write_bytes(sound.part(0.0, len(stage.motion) / rate).encode("WAV"))
+        command = [program, *_arguments(stage, rate, str(track) if sound else None), str(path)]
+        with log.open("w+b") as output, subprocess.Popen(command, stdin=subprocess.PIPE, stderr=output) as encoder:
+            _feed(encoder.stdin, pictures)
+    except OSError as error:
+        raise MotionMindError(f"the MP4 encoder cannot be run: {error}") from error
+    if encoder.returncode != 0:
+        lines = log.read_text(errors="replace").strip().splitlines() or ["no message"]
+        raise MotionMindError(f"the MP4 encoder failed: {lines[0]}")
+
+
+def encoder_program() -> str | None:
+    """Return the path of ffmpeg, from the extra `film` or else from this computer; None if it has none."""
     try:
         import imageio_ffmpeg
-    except ImportError:
-        raise MotionMindError('.mp4 needs an encoder: pip install "motionmind[film]"') from None
-    with TemporaryDirectory() as folder:
-        file, log = Path(folder) / "film.mp4", Path(folder) / "log"
-        try:
-            command = [imageio_ffmpeg.get_ffmpeg_exe(), *_arguments(stage, rate), str(file)]
-            with log.open("w+b") as output, subprocess.Popen(command, stdin=subprocess.PIPE, stderr=output) as encoder:
-                _feed(encoder.stdin, stage.frames())
-        except (RuntimeError, OSError) as error:
-            raise MotionMindError(f"the MP4 encoder cannot be run: {error}") from error
-        if encoder.returncode != 0:
-            lines = log.read_text(errors="replace").strip().splitlines() or ["no message"]
-            raise MotionMindError(f"the MP4 encoder failed: {lines[0]}")
-        return file.read_bytes()
+
+        return str(imageio_ffmpeg.get_ffmpeg_exe())
+    except (ImportError, RuntimeError):
+        return shutil.which("ffmpeg")
 
 
-def _arguments(stage: Stage, rate: float) -> list[str]:
-    """Return the encoder's arguments.
+def _arguments(stage: Stage | GroupStage, rate: float, track: str | None) -> list[str]:
+    """Return the encoder's arguments, for a film with the sound of the file `track`, if any.
 
     Colours are converted to BT.709 and declared so; otherwise players guess, and reds turn orange. A constant rate
     factor of 17 shows no blocks in drawn figures. The bytes depend on the number of threads, so it is fixed.
@@ -220,8 +280,10 @@ def _arguments(stage: Stage, rate: float) -> list[str]:
     video = "-c:v libx264 -preset medium -crf 17 -tune animation -threads 2"
     colour = "-colorspace bt709 -color_primaries bt709 -color_trc bt709 -color_range tv"
     convert = "-vf scale=out_color_matrix=bt709:out_range=tv,format=yuv420p"
-    whole = "-an -movflags +faststart -fflags +bitexact -flags:v +bitexact"
-    return f"-y -nostdin -loglevel error {raw} -i - {convert} {video} {colour} {whole}".split()
+    whole = "-movflags +faststart -fflags +bitexact -flags:v +bitexact"
+    start = f"-y -nostdin -loglevel error {raw} -i -".split()
+    sounding = ["-i", track, *["-c:a", "aac", "-b:a", "192k", "-flags:a", "+bitexact"]] if track else ["-an"]
+    return [*start, *sounding, *f"{convert} {video} {colour} {whole}".split()]
 
 
 def _feed(pipe: IO[bytes] | None, pictures: Iterator[Pixels]) -> None:

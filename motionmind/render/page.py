@@ -22,27 +22,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind._typing import Floats
+from motionmind.body.contact import find_feet
+from motionmind.body.mirror import sides_of
 from motionmind.body.motion import Motion
+from motionmind.body.skeleton import Skeleton
 from motionmind.credits.ledger import ledger_of, sections_of
 from motionmind.display import displayed
+from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
+from motionmind.music.sound import Sound
 from motionmind.render.body_shape import shape_of
 from motionmind.render.body_solids import BodyShape
 from motionmind.render.figure import bridge_balls
 from motionmind.render.markup import base64_of
 from motionmind.render.palette import BRIDGED, COLOURS, INK, INSERTED
 
+MAX_PAGE_SOUND_BYTES = 30_000_000  # of a page, as FLAC: about five minutes of stereo
 _PLAYER_DIR = Path(__file__).parent / "player"
 
 
-def page(motion: Motion, first: int = 0) -> str:
+def page(motion: Motion, first: int = 0, sound: Sound | None = None) -> str:
     """Build the HTML page that plays a motion.
 
     Args:
         motion: the motion, on any skeleton.
         first: number of the motion's first frame in the longer motion that it is a part of.
+        sound: sound that begins with the motion; the page holds as much of it as the motion lasts.
+
+    Raises:
+        MotionMindError: the sound is too large for a page.
     """
-    return _fill(motion, player_data(motion, first), "main")
+    seconds = float(motion.times[-1] - motion.times[0])
+    return _fill(motion, player_data(motion, first) | sound_data(motion.name, seconds, sound), "main")
 
 
 def page_beside(motion: Motion, folder: str, data: Mapping[str, Any]) -> str:
@@ -58,11 +69,24 @@ def page_beside(motion: Motion, folder: str, data: Mapping[str, Any]) -> str:
 
 
 def _fill(motion: Motion, data: Mapping[str, Any], start: str, style: str = "", beside: str = "") -> str:
-    """Fill the template of the page."""
+    """Fill the template of the page with a motion."""
     is_known = bool(motion.insertions or motion.recorded)
     data = {"credits": sections_of(ledger_of(motion.credits)) if is_known else {}, **data}
+    return fill_page(motion.name or motion.skeleton.name, data, start, style, beside)
+
+
+def fill_page(title: str, data: Mapping[str, Any], start: str, style: str = "", beside: str = "") -> str:
+    """Fill the template of the page.
+
+    Args:
+        title: the title.
+        data: the data that the player reads, as documented in player/README.md.
+        start: the module that starts the page.
+        style: style sheet after the player's own.
+        beside: HTML before the player.
+    """
     return Template(_text("page.html")).substitute(
-        title=html.escape(displayed(motion.name or motion.skeleton.name)),
+        title=html.escape(displayed(title)),
         style=_text("player.css") + style,
         beside=beside,
         modules=_modules(start),
@@ -72,13 +96,30 @@ def _fill(motion: Motion, data: Mapping[str, Any], start: str, style: str = "", 
     )
 
 
-def write_page(path: FilePath, motion: Motion, first: int = 0) -> None:
+def write_page(path: FilePath, motion: Motion, first: int = 0, sound: Sound | None = None) -> None:
     """Write the page that plays a motion; arguments as of `page`.
 
     Raises:
-        MotionMindError: the file cannot be written.
+        MotionMindError: the file cannot be written, or the sound is too large for it.
     """
-    write_atomically(path, page(motion, first).encode())
+    write_atomically(path, page(motion, first, sound).encode())
+
+
+def sound_data(name: str, seconds: float, sound: Sound | None) -> dict[str, str]:
+    """Return the sound of movement of so many seconds as the player reads it; nothing without sound or movement.
+
+    Raises:
+        MotionMindError: the sound is too large for a page.
+    """
+    if sound is None or seconds <= 0.0:
+        return {}
+    data = sound.part(0.0, seconds).encode("FLAC")
+    if len(data) > MAX_PAGE_SOUND_BYTES:
+        raise MotionMindError(
+            f"{name or 'motion'}: {len(data) / 1e6:.0f} MB of sound are too much for a page, which holds "
+            f"{MAX_PAGE_SOUND_BYTES / 1e6:.0f}: show a shorter part, or make an .mp4"
+        )
+    return {"sound": base64_of(data)}
 
 
 @cache
@@ -144,7 +185,16 @@ def _body_data(body: BodyShape) -> dict[str, Any]:
         "cones": [asdict(cone) for cone in body.cones],
         "balls": [asdict(ball) for ball in body.balls],
         "marks": marks.axes[:, 0, 0].tolist(),
+        "trails": _trails(body.skeleton),
     }
+
+
+def _trails(skeleton: Skeleton) -> dict[str, list[dict[str, Any]]]:
+    """Return the joints whose paths can be drawn, each with its paint, by body part; a foot without an ankle counts."""
+    sides, joints = sides_of(skeleton), range(len(skeleton))
+    wrists, ankles = ([one for one in joints if skeleton.names[one].endswith(end)] for end in ("wrist", "ankle"))
+    chosen = {"hands": wrists, "feet": ankles or find_feet(skeleton), "pelvis": [0]}
+    return {part: [{"joint": one, "paint": sides[one]} for one in ends] for part, ends in chosen.items()}
 
 
 def packed(rotations: Floats) -> NDArray[np.uint64]:

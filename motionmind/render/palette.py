@@ -74,3 +74,19 @@ class PlotColours:
 
 
 STAGE, SHEET, PLOT = StageColours(), SheetColours(), PlotColours()
+
+# Names, paths and trunks of dancers, in their order: Okabe and Ito's colours, distinct for every kind of colour vision;
+# first those unlike the colours of limbs and of inserted movement.
+_DANCERS: tuple[Colour, ...] = (
+    (0, 128, 96),
+    (120, 94, 0),
+    (40, 40, 40),
+    (160, 70, 130),
+    (0, 114, 178),
+    (213, 94, 0),
+)
+
+
+def dancer_ink(number: int) -> Colour:
+    """Return the colour of a dancer's name, path and trunk; after six they repeat."""
+    return _DANCERS[number % len(_DANCERS)]

@@ -9,7 +9,8 @@ from motionmind.arguments import check_integer, check_path, check_real, check_te
 from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
-from motionmind.render import PICTURES
+from motionmind.music.sound import Sound
+from motionmind.render import PICTURES, SOUNDING
 
 N_SHEET_POSTURES = 48  # postures on a sheet, at most
 _FILMED = (".gif", ".mp4", ".svg")
@@ -23,6 +24,7 @@ def draw_picture(
     view: str | None = None,
     size: int | None = None,
     first: int = 0,
+    sound: Sound | None = None,
 ) -> None:
     """Write a motion as a picture, a film or a page, as the file's suffix says.
 
@@ -40,6 +42,7 @@ def draw_picture(
         size: height of a film or of one posture, pixels, from 120 to 2160, by default 480; a flat movement makes the
             picture lower.
         first: number of the motion's first frame in the longer motion that it is a part of.
+        sound: sound of an MP4 or a page, which begins with the first frame and lasts as long as the motion.
 
     Raises:
         MotionMindError: the suffix is unknown, an option does not apply to it or is out of range, a film would have too
@@ -57,15 +60,16 @@ def draw_picture(
     check_text("view", view, or_none=True)
     check_integer("size", size, or_none=True)
     check_integer("first", first)
+    check_type("sound", sound, Sound, or_none=True)
     suffix = Path(path).suffix.lower()
     if suffix not in PICTURES:
         raise MotionMindError(f"{path}: suffix {suffix!r} is unknown; pictures end in {', '.join(PICTURES)}")
-    _check(path, suffix, len(motion), fps=fps, view=view, size=size)
+    _check(path, suffix, len(motion), fps=fps, view=view, size=size, sound=sound)
     options: dict[str, Any] = {key: value for key, value in (("view", view), ("size", size)) if value is not None}
     if suffix == ".html":
         from motionmind.render.page import write_page
 
-        write_page(path, motion, first)
+        write_page(path, motion, first, sound)
     elif suffix == ".svg":
         from motionmind.render.svg import write_svg
 
@@ -81,16 +85,19 @@ def draw_picture(
     else:
         from motionmind.render.film import write_film
 
-        write_film(path, motion, fps=fps, first=first, **options)
+        write_film(path, motion, fps=fps, first=first, sound=sound, **options)
 
 
 def _check(path: FilePath, suffix: str, frames: int, **options: object) -> None:
     """Refuse options that do not apply to a suffix, instead of silently ignoring them."""
     allowed = {"fps", "view", "size"} if suffix in _FILMED else set[str]()
+    allowed |= {"sound"} if suffix in SOUNDING else set()
     if suffix == ".png" and frames == 1:
         allowed = {"view", "size"}
     for name, value in options.items():
         if value is not None and name not in allowed:
             what = "a page" if suffix == ".html" else "one posture" if frames == 1 else "a sheet of postures"
+            if name == "sound":
+                raise MotionMindError(f"{path}: sound is for {' and '.join(SOUNDING)}")
             those = f"films ({', '.join(_FILMED)})" if name == "fps" else "films and single postures"
             raise MotionMindError(f"{path}: {name} is for {those}, not for {what}")

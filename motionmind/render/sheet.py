@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from io import BytesIO
 from math import ceil, sqrt
 from numbers import Integral
@@ -114,6 +114,18 @@ def row_sheet(motion: Motion, rows: Sequence[Row]) -> Image.Image:
     return sheet.rows(rows)
 
 
+def tiles(motion: Motion) -> Iterator[Image.Image]:
+    """Yield each posture of a motion as `draw_sheet` draws it, without a caption, all of one size."""
+    check_frames(motion, range(len(motion)))
+    sheet = _Sheet(motion, list(range(len(motion))), STAGE_RIGHT)
+    sheet.notes = [("", "")] * len(motion)
+    for at in range(len(motion)):
+        wide, tall = sheet.size()
+        picture = Image.new("RGB", (wide, tall), SHEET.paper)
+        sheet.tile(picture, ImageDraw.Draw(picture), at, (0, 0))
+        yield picture
+
+
 def png(picture: Image.Image) -> bytes:
     """Encode a contact sheet as PNG, in 256 colours."""
     data = BytesIO()
@@ -194,18 +206,18 @@ class _Sheet:
     def picture(self, columns: int | None) -> Image.Image:
         """Draw the whole sheet, `columns` postures a row, or about a screen's shape."""
         count = len(self.frames)
-        wide, tall = self._size()
+        wide, tall = self.size()
         columns = min(columns or max(1, round(sqrt(1.5 * count * tall / wide))), count)
         sheet, pen, header = self._paper(columns * wide, ceil(count / columns) * tall)
         for at in range(count):
             corner = at % columns * wide, header + at // columns * tall
-            self._tile(sheet, pen, at, corner)
+            self.tile(sheet, pen, at, corner)
             pen.rectangle((*corner, corner[0] + wide, corner[1] + tall), outline=SHEET.frame)
         return sheet
 
     def rows(self, rows: Sequence[Row]) -> Image.Image:
         """Draw the sheet in rows with headings, side by side so that it has about a screen's shape."""
-        wide, tall = self._size()
+        wide, tall = self.size()
         width, height = len(rows[0].frames) * wide, tall + _CAPTION_PX
         columns = min(max(1, round(sqrt(1.5 * len(rows) * height / width))), len(rows))
         sheet, pen, header = self._paper(columns * width, ceil(len(rows) / columns) * height)
@@ -217,12 +229,12 @@ class _Sheet:
             pen.text((x + 6, y + 4), heading, SHEET.text, font(12) if is_long else large)
             for place, frame in enumerate(row.frames):
                 if frame is not None:
-                    self._tile(sheet, pen, at, (x + place * wide, y + _CAPTION_PX))
+                    self.tile(sheet, pen, at, (x + place * wide, y + _CAPTION_PX))
                     at += 1
             pen.rectangle((x, y, x + width, y + height), outline=SHEET.frame)
         return sheet
 
-    def _size(self) -> tuple[int, int]:
+    def size(self) -> tuple[int, int]:
         """Return the width and the height of a posture's views, pixels."""
         tall = self.windows[0].height + max(self.plan.height if self.plan else 0, _CAPTION_PX)
         return sum(window.width for window in self.windows), tall
@@ -239,7 +251,7 @@ class _Sheet:
                 pen.text((x, _LINE_PX * (number + 1) + 9), words, ink, font(12))
         return sheet, pen, header
 
-    def _tile(self, sheet: Image.Image, pen: ImageDraw.ImageDraw, at: int, corner: tuple[int, int]) -> None:
+    def tile(self, sheet: Image.Image, pen: ImageDraw.ImageDraw, at: int, corner: tuple[int, int]) -> None:
         """Draw one posture, its views and its caption; `corner` is the upper left one, pixels."""
         x, y = corner
         for window in self.windows:

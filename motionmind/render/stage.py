@@ -6,9 +6,10 @@ the boxes of body and shadow are drawn, so the cost of a frame depends on the si
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -27,7 +28,7 @@ from motionmind.render.lettering import font
 from motionmind.render.palette import BRIDGED, PAPER, STAGE, VIOLET
 from motionmind.render.solids import EMPTY_CODE, Cones, Ellipsoids, bounding_box, posture_solids
 from motionmind.render.timing import SAME_TIME_S
-from motionmind.render.view import VIEWS, to_view
+from motionmind.render.view import VIEWS, View, to_view
 
 MIN_HEIGHT_PX, MAX_HEIGHT_PX = 120, 2160  # of a picture
 GHOST_OPACITY_SHARE = 0.22
@@ -66,6 +67,42 @@ class _Scene:
     ghosts: list[FigurePlate]
 
 
+class Extent(NamedTuple):
+    """The room that a movement takes.
+
+    Attributes:
+        roots: positions of the root [R, 3], metres.
+        world: least and greatest coordinates of the body in each frame [F, 2, 3], metres.
+        boxes: the same in the view's axes, from the world's origin [F, 2, 2], metres.
+        height: height of the body, metres.
+    """
+
+    roots: Floats
+    world: Floats
+    boxes: Floats
+    height: float
+
+
+def look(extents: Sequence[Extent], view: View, size: int, strip: int) -> tuple[Camera, Ground | None]:
+    """Aim a camera at all that moves; return it and the floor, if visible.
+
+    Args:
+        extents: the extent of each movement.
+        view: the direction to look from.
+        size: height of the picture, pixels.
+        strip: height of the caption, pixels.
+    """
+    roots, world, boxes = (np.concatenate(rows) for rows in zip(*(one[:3] for one in extents), strict=True))
+    height, axes = max(one.height for one in extents), view.axes
+    origin = 0.5 * (roots.min(axis=0) + roots.max(axis=0)) * [1.0, 0.0, 1.0]
+    low, high = world[:, 0].min(axis=0), world[:, 1].max(axis=0)
+    floor = bool(abs(low[1]) < high[1] - low[1])
+    under = ((roots * [1.0, 0.0, 1.0] - origin) @ axes.T)[:, :2] if floor else np.empty((0, 2))
+    least = 0.6 * height  # a body that curls up smaller is not magnified
+    camera = aim(view, origin, boxes - (origin @ axes.T)[:2], under, least, size, strip)
+    return camera, Ground(camera, low[[0, 2]], high[[0, 2]], height) if floor else None
+
+
 class Stage:
     """The scene of a motion on any skeleton.
 
@@ -74,6 +111,7 @@ class Stage:
         body: the body.
         camera: the camera, which sets the size of the picture.
         ground: the floor; None if it is too far away to leave room for the body.
+        extent: the room that the movement takes.
         line: width of the lines around a body's parts, samples.
         strip: height of the caption at the lower edge, with text and timeline, pixels; 0 without one.
         letters: size of the text, pixels.
@@ -81,21 +119,27 @@ class Stage:
     """
 
     def __init__(
-        self, motion: Motion, times: Floats | None = None, *, view: str = "quarter", size: int = 480, first: int = 0
+        self,
+        motion: Motion,
+        times: Floats | None = None,
+        *,
+        view: str | View = "quarter",
+        size: int = 480,
+        first: int = 0,
     ) -> None:
         """Set the stage for a motion.
 
         Args:
             motion: the motion.
             times: the times to draw [T], seconds, increasing, as from `frame_times`; its own times by default.
-            view: the name of one of `view.VIEWS`.
+            view: a view, or the name of one of `view.VIEWS`.
             size: height of the picture, pixels, from 120 to 2160; a flat movement makes it lower.
             first: number of the motion's first frame in the longer motion that it is a part of.
 
         Raises:
             MotionMindError: there is no such view, or the size is out of range.
         """
-        if view not in VIEWS:
+        if isinstance(view, str) and view not in VIEWS:
             raise MotionMindError(f"no view {view!r}; there are {', '.join(VIEWS)}")
         if not MIN_HEIGHT_PX <= size <= MAX_HEIGHT_PX or size != int(size):
             raise MotionMindError(
@@ -115,10 +159,16 @@ class Stage:
         self.line = max(SAMPLES_PER_PX, round(SAMPLES_PER_PX * size / 480))
         self.letters, self.thick = max(10, round(0.026 * size)), max(2, round(size / 160))
         self.strip = round(3.4 * self.letters) if len(self) > 1 or self.words(0) else 0
-        self.camera, self.ground = self._look(view, size)
+        direction = VIEWS[view] if isinstance(view, str) else view
+        self.extent = self._find_extent(direction)
+        self.camera, self.ground = look([self.extent], direction, size, self.strip)
 
     def __len__(self) -> int:
         return len(self.motion)
+
+    def dress(self, trunk: Colour) -> None:
+        """Give the body's trunk a colour of its own, except in inserted movement."""
+        self._paints = given_colours(self.body, trunk), self._paints[1]
 
     # --- pictures ---------------------------------------------------------------------------------------------------
 
@@ -133,13 +183,21 @@ class Stage:
         picture = scene.backdrop.copy()
         if shadow is not None:
             darken(picture, shadow, scene.bare)
-        self._paint(picture, self.drawing(number))
+        self.paint(picture, number)
         self._write(picture, number)
         return picture
+
+    def paint(self, picture: Pixels, number: int) -> None:
+        """Paint the body of a frame over a picture [H, W, 3], RGB, in place."""
+        self._paint(picture, self.drawing(number))
 
     def backdrop(self, number: int) -> Pixels:
         """Return paper, floor and ghosts of a frame [H, W, 3], RGB; shared, so do not write to it."""
         return self._scene(number).backdrop
+
+    def empty(self) -> Pixels:
+        """Return paper and floor [H, W, 3], RGB; shared, so do not write to it."""
+        return self._empty.backdrop
 
     def drawing(self, number: int) -> FigurePlate:
         """Draw the body of a frame, in violet if the engine inserted it."""
@@ -193,16 +251,15 @@ class Stage:
 
     # --- the body ---------------------------------------------------------------------------------------------------
 
-    def _look(self, view: str, size: int) -> tuple[Camera, Ground | None]:
-        """Aim the camera at the whole movement, ghosts and balls included; return it and the floor, if visible."""
+    def _find_extent(self, view: View) -> Extent:
+        """Find the extent of the whole movement, ghosts and balls included."""
         motions = [self.motion, *self._ends.values()]
         roots = np.concatenate([motion.root for motion in motions])
-        origin = 0.5 * (roots.min(axis=0) + roots.max(axis=0)) * [1.0, 0.0, 1.0]
         world, boxes = [], []
 
         def include(cones: Cones, balls: Ellipsoids) -> None:
             world.append(bounding_box(cones, balls).reshape(-1, 2, 3))
-            boxes.append(bounding_box(*to_view(cones, balls, VIEWS[view], origin)).reshape(-1, 2, 3)[..., :2])
+            boxes.append(bounding_box(*to_view(cones, balls, view, np.zeros(3))).reshape(-1, 2, 3)[..., :2])
 
         for motion in motions:
             for start in range(0, len(motion), _FILM_BLOCK_FRAMES):
@@ -210,13 +267,7 @@ class Stage:
                 include(*self.body.solids(motion.rotations[block], motion.root[block]))
         for number in np.flatnonzero(self._bridged.any(axis=1)).tolist():
             include(*self._solids(number))
-        reach = np.concatenate(world)
-        low, high = reach[:, 0].min(axis=0), reach[:, 1].max(axis=0)
-        floor = bool(abs(low[1]) < high[1] - low[1])
-        under = ((roots * [1.0, 0.0, 1.0] - origin) @ VIEWS[view].axes.T)[:, :2] if floor else np.empty((0, 2))
-        least = 0.6 * self.body.height  # a body that curls up smaller is not magnified
-        camera = aim(VIEWS[view], origin, np.concatenate(boxes), under, least, size, self.strip)
-        return camera, Ground(camera, low[[0, 2]], high[[0, 2]], self.body.height) if floor else None
+        return Extent(roots, np.concatenate(world), np.concatenate(boxes), self.body.height)
 
     def _solids(self, number: int) -> tuple[Cones, Ellipsoids]:
         """Place the solids of a frame in the world, balls at bridged joints after the body's own."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
+from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 
 HOLD_S = 0.8  # how long a film shows its last frame before it starts again
@@ -48,7 +49,7 @@ def film_rate(motion: Motion, usual: float, fps: float | None, frames: int = N_U
             "shorter part makes fewer)"
         )
     if fps is None and rate < usual:
-        _log.info("%s: %.3g frames a second, %.0f in all (--fps, or fps=, for others)", name, rate, count)
+        _log.info("%s: %.3g frames a second, %.0f in all (--fps, or fps=, for others)", displayed(name), rate, count)
     return rate
 
 

@@ -44,7 +44,7 @@ STAGE_LEFT = View(
 ABOVE = View("from above: the audience is below", (1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))
 
 
-def _view(name: str, azimuth: float, elevation: float) -> View:
+def view_from(name: str, azimuth: float, elevation: float) -> View:
     """Return the view `azimuth` degrees to the performer's left of the front and `elevation` degrees above."""
     a, e = radians(azimuth), radians(elevation)
     towards = (cos(e) * sin(a), sin(e), cos(e) * cos(a))
@@ -53,10 +53,10 @@ def _view(name: str, azimuth: float, elevation: float) -> View:
 
 # Views of films, by the name that `draw_picture` takes; a little from above, as from a raised seat, to show the floor.
 VIEWS: Mapping[str, View] = {
-    "quarter": _view("three quarters, from the audience's left", -32.0, 17.0),
-    "front": _view("from the front, as the audience sees it", 0.0, 9.0),
-    "side": _view("from stage right: the audience is to the right", -90.0, 9.0),
-    "left": _view("from stage left: the audience is to the left", 90.0, 9.0),
+    "quarter": view_from("three quarters, from the audience's left", -32.0, 17.0),
+    "front": view_from("from the front, as the audience sees it", 0.0, 9.0),
+    "side": view_from("from stage right: the audience is to the right", -90.0, 9.0),
+    "left": view_from("from stage left: the audience is to the left", 90.0, 9.0),
     "top": ABOVE,
 }
 

@@ -41,6 +41,8 @@ from motionmind.variation.piece import Piece
 from motionmind.variation.variation import Variation, vary
 from motionmind.variation.variation_json import write_variation
 
+pytestmark = pytest.mark.long
+
 MACARENA = Path(__file__).parents[2] / "corpora" / "macarena" / "macarena.score"
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -12,17 +12,29 @@ import pytest
 from pages import SIZE, Opened, Tabs
 
 from motionmind.body.motion import Motion
+from motionmind.ensemble.dancers import Ensemble
+from motionmind.music import Sound
+from motionmind.render.group_page import write_group_page
 from motionmind.render.page import write_page
 
 
 @pytest.fixture
 def show(tabs: Tabs, tmp_path: Path) -> Iterator[Callable[..., Opened]]:
-    """A function that opens a motion's page; afterwards, that it neither complained nor asked for anything."""
+    """A function that opens a page; afterwards, that it neither complained nor asked for anything."""
     opened: list[Opened] = []
 
-    def show(motion: Motion, ready: str = "window.motionmind", script: str = "", **options: Any) -> Opened:
+    def show(
+        motion: Motion | Ensemble,
+        ready: str = "window.motionmind",
+        script: str = "",
+        sound: Sound | None = None,
+        **options: Any,
+    ) -> Opened:
         path = tmp_path / f"{len(opened)}.html"
-        write_page(path, motion)
+        if isinstance(motion, Ensemble):
+            write_group_page(path, motion, sound=sound)
+        else:
+            write_page(path, motion, sound=sound)
         # Few pixels: drawing in software is most of a test's time. Tests that measure pictures ask for all of them.
         usual = {"viewport": SIZE, "reduced_motion": "reduce", "device_scale_factor": 0.5}
         said: list[str] = []

@@ -485,7 +485,7 @@ def test_without_its_extra_an_mp4_says_what_to_install(tmp_path: Path, monkeypat
 
 def test_an_encoder_that_fails_is_quoted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("imageio_ffmpeg")
-    monkeypatch.setattr(film, "_arguments", lambda stage, rate: ["-loglevel", "error", "-i", "nothing.avi"])
+    monkeypatch.setattr(film, "_arguments", lambda stage, rate, track: ["-loglevel", "error", "-i", "nothing.avi"])
     with pytest.raises(MotionMindError, match="No such file") as error:
         write_film(tmp_path / "a.mp4", movement(), size=SMALL)
     assert "\n" not in str(error.value)

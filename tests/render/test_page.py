@@ -20,6 +20,7 @@ from pages import FINE, SCREENS, SIZE, Opened, near, reachable_controls, readabl
 from PIL import Image
 
 from motionmind._typing import Bools, Floats, Indices
+from motionmind.body.contact import find_feet
 from motionmind.body.human import human23, human44
 from motionmind.body.motion import Insertion, Motion
 from motionmind.body.skeleton import Skeleton
@@ -114,6 +115,35 @@ def test_solids_are_where_python_puts_them(show: Callable[..., Opened], skeleton
         np.testing.assert_allclose(np.reshape(found["joints"], (-1, 3)), joints[frame], atol=1e-4)
 
 
+@pytest.mark.parametrize("skeleton", [human23(), hexapod().skeleton], ids=lambda skeleton: skeleton.name)
+def test_trails_lead_through_the_places_of_their_joints(show: Callable[..., Opened], skeleton: Skeleton) -> None:
+    random = random_motion(skeleton, 60)
+    motion = replace(random, times=np.arange(60) / 15.0)  # a trail has a place for each frame
+    tab = show(motion)
+    is_made = "motionmind.stage.trails !== undefined"
+    assert not tab.get(is_made)  # until one is shown, they cost nothing
+    named = {end: [at for at, name in enumerate(skeleton.names) if name.endswith(end)] for end in ("wrist", "ankle")}
+    wanted = {"hands": named["wrist"], "feet": named["ankle"] or find_feet(skeleton), "pelvis": [0]}
+    places = skeleton.positions(motion.rotations, motion.root)
+    for part, joints in wanted.items():
+        tab.get(f"motionmind.stage.show(2.03, {{ ends: false, onion: 0, trails: ['{part}'] }})")
+        if not joints:
+            assert not tab.get(is_made)
+            continue
+        count, *found = tab.get(
+            "(() => { const { places, geometry } = motionmind.stage.trails.tubes; const count = geometry.instanceCount;"
+            "return [count, ...places.array.slice(0, 8 * count)] })()"
+        )
+        assert count == 35 * len(joints)  # from 1.2 s before to 1.2 s after
+        ends = np.reshape(found, (35, len(joints), 2, 4))
+        np.testing.assert_allclose(ends[:, :, 0, :3], places[13:48, joints], atol=1e-4)
+        np.testing.assert_allclose(ends[:, :, 1, :3], places[14:49, joints], atol=1e-4)
+        thickest = ends[..., 3].max(axis=(1, 2)).argmax()
+        assert thickest in (16, 17, 18)  # now
+    tab.get("motionmind.stage.show(2.03, { ends: false, onion: 0 })")
+    assert not tab.get("motionmind.stage.trails.mesh.visible")
+
+
 def test_between_frames_rotations_are_slerped_and_the_root_is_linear(show: Callable[..., Opened]) -> None:
     motion = random_motion(human23(), 3)
     tab = show(motion)
@@ -152,6 +182,7 @@ def test_left_is_warm_and_on_the_right_of_the_front_view(show: Callable[..., Ope
     assert abs(warm.sum() - cool.sum()) < 0.1 * warm.sum()
 
 
+@pytest.mark.long
 def test_cameras_look_from_where_they_say(show: Callable[..., Opened]) -> None:
     tab = show(still(2), **FINE)
     extents = {}
@@ -178,6 +209,30 @@ def test_cameras_look_from_where_they_say(show: Callable[..., Opened]) -> None:
     assert 0.4 < extents["quarter"] < extents["front"]
 
 
+@pytest.mark.long
+def test_the_floor_plan_shows_path_and_facings_from_above(show: Callable[..., Opened]) -> None:
+    tab = show(bridged(), **FINE)
+    facing = (42, 148, 99)  # of plan.js
+    assert near(tab.picture(), facing).sum() == 0
+    for toggle in (lambda: tab.click("plan"), lambda: tab.press("f")):
+        toggle()
+        assert tab.get("document.getElementById('plan').ariaPressed") == "true"
+        assert tab.get("motionmind.stage.view") == "top"
+        assert near(tab.picture(), facing).sum() > 20
+        toggle()
+        assert tab.get("document.getElementById('plan').ariaPressed") == "false"
+        assert tab.get("motionmind.stage.view") == "quarter"
+        assert near(tab.picture(), facing).sum() == 0
+    found = tab.get("import('motionmind/plan').then(({ facings }) => facings(motionmind.motion))")
+    motion = bridged()
+    seconds = np.arange(int(motion.times[-1] - motion.times[0] + 1e-6) + 1)
+    there = motion.at(motion.times[0] + seconds)
+    headings = rot.heading(there.rotations[:, 0])
+    np.testing.assert_allclose([one["at"] for one in found], there.root[:, [0, 2]], atol=1e-4)
+    towards = np.stack([np.sin(headings), np.cos(headings)], axis=1)
+    np.testing.assert_allclose([one["towards"] for one in found], towards, atol=1e-3)
+
+
 def test_dragging_turns_the_camera_and_reset_brings_it_back(show: Callable[..., Opened]) -> None:
     tab = show(still(2))
     before = tab.get("motionmind.stage.camera.position.toArray()")
@@ -192,6 +247,7 @@ def test_dragging_turns_the_camera_and_reset_brings_it_back(show: Callable[..., 
     np.testing.assert_allclose(tab.get("motionmind.stage.camera.position.toArray()"), before, atol=1e-6)
 
 
+@pytest.mark.long
 def test_inserted_frames_are_violet_and_bridged_joints_emerald(show: Callable[..., Opened]) -> None:
     tab = show(bridged(), **FINE)
     tab.click("front")
@@ -214,6 +270,7 @@ def test_inserted_frames_are_violet_and_bridged_joints_emerald(show: Callable[..
     assert tab.page.inner_text("#bridged") == "bridged: left_elbow"
 
 
+@pytest.mark.long
 def test_ghosts_of_a_and_b_and_the_onion_skin_can_be_switched(show: Callable[..., Opened]) -> None:
     motion = bridged()
     moving = replace(motion, root=motion.root + np.outer(np.arange(12), [0.25, 0.0, 0.0]))
@@ -242,6 +299,7 @@ def test_ghosts_of_a_and_b_and_the_onion_skin_can_be_switched(show: Callable[...
     assert np.array_equal(tab.picture(), pictures["onion"])
 
 
+@pytest.mark.long
 def test_the_shadow_is_under_the_body_and_fades_as_it_rises(show: Callable[..., Opened]) -> None:
     motion = still(3)
     rising = replace(motion, root=motion.root + np.outer([0.0, 0.1, 1.0], [0.0, 1.0, 0.0]))
@@ -284,6 +342,7 @@ def test_all_words_can_be_read(show: Callable[..., Opened], scheme: str) -> None
     assert {"keys", "kbd", "dd"} <= readable_words(tab.page)
 
 
+@pytest.mark.long
 def test_the_legend_has_the_colours_that_are_seen(show: Callable[..., Opened]) -> None:
     paints: dict[str, list[tuple[int, int, int]]] = {
         "left": [COLOURS["left"]],
@@ -324,6 +383,7 @@ def test_a_small_page_begins_without_the_legend(show: Callable[..., Opened]) -> 
     assert "li" in readable_words(tab.page)
 
 
+@pytest.mark.long
 def test_it_is_dark_where_the_system_is_until_it_is_switched(show: Callable[..., Opened]) -> None:
     tab = show(still(2), color_scheme="dark", **FINE)
     dark = tab.picture()
@@ -526,6 +586,7 @@ def test_n_and_p_go_from_insertion_to_insertion_and_round(show: Callable[..., Op
         assert tab.time == time
 
 
+@pytest.mark.long
 def test_credits_are_shown_and_open_where_somebody_should_beware(show: Callable[..., Opened]) -> None:
     free = Credit(1.0, "<b>plies", "Ada", "ballet", licence="CC0-1.0")
     bound = Credit(1.0, "jump", "Eve", "other", licence="CC-BY-ND-4.0")
@@ -541,6 +602,7 @@ def test_credits_are_shown_and_open_where_somebody_should_beware(show: Callable[
 # --- in a frame -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rights", ["allow-scripts", "allow-scripts allow-downloads"])
 def test_it_works_in_a_frame_that_may_do_nothing_else(browser: Any, tmp_path: Path, rights: str) -> None:
     motion = bridged()
@@ -648,6 +710,7 @@ def test_without_webgl_it_says_so(show: Callable[..., Opened]) -> None:
     tab.said.clear()  # three.js says it too
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("screen", SCREENS)
 def test_it_fits_every_screen(show: Callable[..., Opened], screen: str) -> None:
     tab = show(replace(still(1500, bridged().insertions), name="x" * 60), **SCREENS[screen])
@@ -687,6 +750,7 @@ def test_every_control_has_a_name(show: Callable[..., Opened]) -> None:
     assert tab.get(labels) == [["Speed"], ["Apart"]]  # words that are seen
 
 
+@pytest.mark.long
 def test_the_sheet_of_keys_holds_all_that_act_and_each_acts(show: Callable[..., Opened]) -> None:
     tab = show(bridged())
     tab.press("?")
@@ -725,6 +789,7 @@ def test_the_sheet_of_keys_holds_all_that_act_and_each_acts(show: Callable[..., 
     assert not tab.get("motionmind.player.playing")
 
 
+@pytest.mark.long
 def test_keys_that_would_do_nothing_are_not_on_the_sheet(show: Callable[..., Opened]) -> None:
     listed = "[...document.querySelectorAll('#sheet dt')].map(one => one.innerText)"
     assert {"A", "N", "P", "Space", "1"} <= set(show(bridged()).get(listed))

@@ -52,6 +52,7 @@ def bodies() -> dict[str, Motion]:
     }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("suffix", PICTURES)
 @pytest.mark.parametrize("kind", bodies())
 def test_every_body_goes_into_every_picture(kind: str, suffix: str, tmp_path: Path) -> None:
@@ -64,6 +65,7 @@ def test_every_body_goes_into_every_picture(kind: str, suffix: str, tmp_path: Pa
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("suffix", PICTURES)
 def test_what_is_written_again_is_the_same_bytes(suffix: str, tmp_path: Path) -> None:
     path, motion = tmp_path / f"a{suffix}", bodies()["a person, some of it inserted"]
@@ -74,6 +76,7 @@ def test_what_is_written_again_is_the_same_bytes(suffix: str, tmp_path: Path) ->
     assert path.read_bytes() == data
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("suffix", PICTURES)
 def test_where_nothing_can_be_written_nothing_is_left(suffix: str, tmp_path: Path) -> None:
     (tmp_path / f"a{suffix}").mkdir()
@@ -84,6 +87,7 @@ def test_where_nothing_can_be_written_nothing_is_left(suffix: str, tmp_path: Pat
     assert [file.name for file in tmp_path.iterdir()] == [f"a{suffix}"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("view", ["quarter", "front", "side", "left", "top"])
 @pytest.mark.parametrize("suffix", [".png", ".gif"])
 def test_the_size_is_the_pictures_height_where_it_is_not_flat(view: str, suffix: str, tmp_path: Path) -> None:
@@ -123,6 +127,7 @@ def test_what_a_picture_has_not_is_refused(
 # --- the command ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_tween_becomes_any_picture_at_once_or_later(run: Run, tmp_path: Path) -> None:
     files = [word for suffix in (*PICTURES, ".json") for word in ("-o", f"tween{suffix}")]
     assert run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "--moves", 4, *files).code == 0
@@ -161,6 +166,7 @@ def check_alike(one: Path, other: Path) -> None:
                     assert np.any(pixels[0] != pixels[1], axis=-1).mean() < 1e-4
 
 
+@pytest.mark.long
 def test_postures_and_scores_become_pictures(run: Run, tmp_path: Path) -> None:
     commands = (
         ("render", ARABESQUE, "-o", "posture.png"),
@@ -176,6 +182,7 @@ def test_postures_and_scores_become_pictures(run: Run, tmp_path: Path) -> None:
     assert (tmp_path / "posture.png").read_bytes() == (tmp_path / "taken.png").read_bytes()
 
 
+@pytest.mark.long
 def test_a_sheet_of_a_part_keeps_the_numbers_of_the_whole(run: Run, tmp_path: Path) -> None:
     write_motion("clip.bvh", ballet_clip("adagio").resample(10.0))
     drawn = run("render", "clip.bvh", "-o", "few.png", "--from", 100, "--to", -1)
@@ -192,8 +199,8 @@ def test_a_sheet_of_a_part_keeps_the_numbers_of_the_whole(run: Run, tmp_path: Pa
         ("render a.json -o none/a.gif", r"none/a\.gif: cannot be written: there is no folder"),
         ("render none.json -o a.gif", r"none\.json: cannot be read: there is no such file"),
         ("render nan.json -o a.gif", r"nan\.json:"),
-        ("render a.json -o a.gif --clip b", r"a\.json: --clip is only for a score or a corpus"),
-        ("render walk-hexapod -o a.gif", r"walk-hexapod: holds 4 clips; choose one by --clip"),
+        ("render a.json -o a.gif --clip b", r"a\.json: --clip is only for a score, a corpus or a glTF file"),
+        ("render walk-hexapod -o a.gif", r"walk-hexapod: holds 4 clips; name one, such as walk-hexapod/tripod"),
         ("render walk-hexapod --clip tripd -o a.gif", r"no clip 'tripd'; did you mean tripod\?"),
         ("render a.json -o a.html --fps 5", r"a\.html: fps is for films"),
         ("render a.json -o a.gif --from 99", r"a\.json: frames are 0 to 5, there is no frame 99"),
@@ -213,6 +220,7 @@ def test_bad_input_is_one_line_and_writes_nothing(line: str, message: str, run: 
     assert sorted(tmp_path.iterdir()) == before
 
 
+@pytest.mark.long
 def test_what_a_file_has_no_place_for_is_said_by_all_who_write_it(run: Run) -> None:
     joined = run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "-o", "tween.bvh")
     lacks = r"(?m)^note: tween\.bvh: no place for the marks of frames that the engine made \(\d+\)"

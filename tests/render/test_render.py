@@ -394,6 +394,7 @@ def test_each_pixel_shows_the_nearest_solid(seed: int) -> None:
         )  # but for who touches it
 
 
+@pytest.mark.long
 @given(seeds)
 @settings(max_examples=30)
 def test_a_mirrored_posture_gives_the_mirrored_picture_with_the_colours_exchanged(seed: int) -> None:
@@ -590,6 +591,7 @@ def test_an_insect_has_six_legs_in_two_colours() -> None:
     assert (np.abs(pixels - COLOURS[FACE]).max(axis=-1) < 5).sum() == 0
 
 
+@pytest.mark.long
 def test_a_sheet_has_bounds() -> None:
     many = clip(1, ant())
     times = np.arange(MAX_SHEET_POSTURES + 1.0)
@@ -731,6 +733,7 @@ def test_the_command_draws_the_frames_that_are_asked_for(
     assert [text for _, _, text in words if text.isdigit()] == [str(frame) for frame in frames]
 
 
+@pytest.mark.long
 def test_the_file_has_the_colours_that_were_drawn(run: Run, jump: Path) -> None:
     assert run("sheet", jump, "-o", "jump.png")[0] == 0
     drawn = np.asarray(draw_sheet(read_motion(jump))).astype(int)
@@ -805,6 +808,7 @@ def test_bad_input_is_one_line(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 def test_a_long_clip_is_refused_before_it_is_drawn(run: Run, tmp_path: Path) -> None:
     write_motion("long.bvh", ballet_clip("plies").resample(100.0))
     code, _, err = run("sheet", "long.bvh", "-o", "sheet.png")
@@ -814,6 +818,7 @@ def test_a_long_clip_is_refused_before_it_is_drawn(run: Run, tmp_path: Path) -> 
     assert run("sheet", "long.bvh", "-o", "sheet.png", "--every", 100)[0] == 0
 
 
+@pytest.mark.long
 def test_a_score_is_drawn_clip_by_clip(run: Run, plies: Path) -> None:
     score = BALLET / "barre.score"
     code, out, err = run("sheet", score, "--clip", "plies", "-o", "one.png")
@@ -852,7 +857,7 @@ def test_a_corpus_is_drawn_clip_by_clip(by: str, run: Run, tmp_path: Path) -> No
         ((BALLET / "postures", "-o", "sheets"), r".*postures: is a folder, and no corpus"),
         (
             ("walk-hexapod", "-o", "x.png"),
-            r"x\.png: walk-hexapod holds 4 clips; choose one by --clip, or give a folder",
+            r"x\.png: walk-hexapod holds 4 clips, tripod, turn, wave, rest; choose one by --clip, or give a folder",
         ),
         (("walk-hexapod", "-o", "x.jpg"), r"x\.jpg: cannot be written: the name must end in one of \.png"),
         (
@@ -864,7 +869,7 @@ def test_a_corpus_is_drawn_clip_by_clip(by: str, run: Run, tmp_path: Path) -> No
         ((BALLET / "nothing.score", "-o", "sheets"), r"nothing\.score: cannot be read: there is no such file"),
         (
             (BALLET / "postures" / "fifth.json", "-o", "x.png", "--clip", "plies"),
-            r"--clip is only for a score or a corpus",
+            r"--clip is only for a score, a corpus or a glTF file",
         ),
     ],
 )

@@ -270,6 +270,7 @@ def test_all_that_is_referred_to_is_there_once() -> None:
     assert set(referred) == set(ids)
 
 
+@pytest.mark.long
 def test_what_is_written_is_text() -> None:
     text = "".join(ElementTree.fromstring(svg(tween(), fps=8)).itertext())
     for words in ("0.00 s", "1.00 s", "frame 3", "inserted", "bridged: left_elbow", "bridged: right_knee"):
@@ -297,12 +298,14 @@ def test_names_are_escaped() -> None:
     assert not list(root.iter(f"{SVG}script"))
 
 
+@pytest.mark.long
 def test_the_same_bytes_again(tmp_path: Path) -> None:
     for name in "ab":
         write_svg(tmp_path / f"{name}.svg", tween(), fps=4)
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
 
 
+@pytest.mark.long
 def test_a_file_is_small() -> None:
     """Four seconds, with ghosts all the while."""
     motion = tween()
@@ -344,6 +347,7 @@ def unlike(one: Floats, other: Floats) -> float:
     return float((np.abs(off).max(axis=-1) > 30.0).mean())
 
 
+@pytest.mark.long
 def test_a_browser_shows_the_picture(browser: Any, tmp_path: Path) -> None:
     motion = tween()
     write_svg(tmp_path / "tween.svg", motion, fps=4)
@@ -357,6 +361,7 @@ def test_a_browser_shows_the_picture(browser: Any, tmp_path: Path) -> None:
     assert unlike(pictures[0], shown[1]) > 0.05  # another posture is unlike
 
 
+@pytest.mark.long
 def test_who_wants_no_motion_sees_one_posture(browser: Any, tmp_path: Path) -> None:
     motion = tween()
     write_svg(tmp_path / "tween.svg", motion, fps=4)

@@ -1,12 +1,13 @@
 /** The volume of a body: where its round cones and ellipsoids are in a posture. It draws nothing. */
 
 export class Body {
-  /** @param {object} skeleton {parents, offsets}  @param {object} data {size, frames, cones, balls, marks} */
+  /** @param {object} skeleton {parents, offsets}  @param {object} data {size, frames, cones, balls, marks, trails} */
   constructor(skeleton, data) {
     this.size = data.size; // 1 for a person 1.70 m tall
     this.cones = data.cones;
     this.balls = data.balls;
     this.marks = data.marks; // radii of the balls that stand out around the joints, metres [J]
+    this.trails = data.trails; // by the part's name: joints whose path is drawn, each with its paint
     this.parents = skeleton.parents;
     this.offsets = skeleton.offsets;
     this.frames = data.frames;

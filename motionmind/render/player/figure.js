@@ -43,6 +43,7 @@ export function paperUniforms() {
 /** Segments about a solid's axis, and from its pole to its widest circle, or to that where cone and ball touch. */
 export const FINE = { cone: { around: 12, cap: 3 }, ball: { around: 16, cap: 5 } };
 export const COARSE = { cone: { around: 8, cap: 2 }, ball: { around: 12, cap: 4 } };
+export const TUBE = { cone: { around: 6, cap: 1 } };
 
 const STEP = 0.016; // metres by which something must stand before another for a line between them
 const HEAD_STEP = 0.06; // face and hair: a nose has no line round it, unless it is seen against something else
@@ -98,7 +99,7 @@ const PASSES = {
       }`,
     fragment: /* glsl */ `
       uniform vec3 paper, middle;
-      uniform float size;
+      uniform float depth;
       varying vec3 vPaint, vNormal, vSeen;
       varying float vStrength;
       void main() {
@@ -106,7 +107,7 @@ const PASSES = {
         vec3 light = normalize(vec3(0.0, 0.6, 0.0) + 0.8 * towards);
         float shade = 0.62 + 0.38 * max(dot(normalize(vNormal), light), 0.0);
         float nearer = vSeen.z - (viewMatrix * vec4(middle, 1.0)).z;
-        float haze = 0.30 * clamp(0.5 - nearer / (0.9 * size), 0.0, 1.0);
+        float haze = 0.30 * clamp(0.5 - nearer / (0.9 * depth), 0.0, 1.0);
         gl_FragColor = vec4(mix(paper, mix(vPaint * shade, vec3(1.0), haze), vStrength), 1.0);
       }`,
     options: { side: FrontSide, blending: NoBlending },
@@ -178,13 +179,14 @@ export class Figures {
    * @param {Body} body
    * @param {number} count of bodies, at most
    * @param {object} mesh FINE or COARSE
-   * @param {object} colours ink, bridged, and palettes by name: paint -> [red, green, blue], 0 to 255
+   * @param {object} colours ink, bridged, and palettes by name: paint -> [red, green, blue], 0 to 255; `dancers` is a
+   *   list of them
    * @param {object} papers what paperUniforms made
    */
   constructor(body, count, mesh, colours, papers) {
     this.body = body;
     this.palettes = {};
-    for (const [name, palette] of Object.entries({ given: colours.given, inserted: colours.inserted })) {
+    for (const [name, palette] of Object.entries({ given: colours.given, inserted: colours.inserted, ...colours.dancers })) {
       this.palettes[name] = {
         cone: body.cones.flatMap((cone) => palette[cone.paint].map((value) => value / 255)),
         ball: body.balls.flatMap((ball) => palette[ball.paint].map((value) => value / 255)),
@@ -192,6 +194,7 @@ export class Figures {
     }
     this.uniforms = {
       size: { value: body.size },
+      depth: { value: body.size }, // of all that is drawn, over which haze thickens
       middle: { value: new Vector3() },
       width: { value: 0 },
       ink: { value: new Vector3(...colours.ink).divideScalar(255) },
@@ -206,7 +209,7 @@ export class Figures {
 
   /**
    * Make the body at `index` the one that `body` is posed as.
-   * @param {string} palette "given" or "inserted"
+   * @param {string | number} palette "given", "inserted", or a dancer's number
    * @param {number} strength from 0, as pale as paper, to 1
    */
   set(index, palette, strength = 1) {
@@ -260,7 +263,7 @@ function steps(solids, size) {
 }
 
 /** The meshes of one kind of solid in up to `bodies` bodies: `solid`, `line` and `shadow` share one geometry. */
-class Instances {
+export class Instances {
   /** `step`, and `ahead` if it is not 0, are what each solid of a body has. */
   constructor(kind, bodies, mesh, uniforms, { step, ahead = step.map(() => 0) }) {
     const count = bodies * step.length;

@@ -3,6 +3,8 @@
 const inserted = (motion) => motion.insertions.length > 0;
 const joining = (motion) => motion.insertions.some((insertion) => motion.ends(insertion).length > 0);
 const moving = (motion) => motion.length > 1;
+const alone = (motion) => moving(motion) && !motion.dancers;
+const sounding = (motion) => Boolean(motion.sound);
 
 /** Each row: the keys, their labels, what they do, the name of the action, and the motions that have it. */
 export const KEYS = [
@@ -15,15 +17,17 @@ export const KEYS = [
   { keys: ["n"], shown: ["N"], does: "next insertion", action: "next", when: inserted },
   { shown: ["Tab", "←", "→"], does: "on the timeline: from insertion to insertion; Enter goes there", when: inserted },
   { keys: ["l"], shown: ["L"], does: "loop: restart at the end", action: "loop", when: moving },
+  { keys: ["s"], shown: ["S"], does: "sound on or off", action: "sound", when: sounding },
   { keys: ["1"], shown: ["1"], does: "from the front", action: "front" },
   { keys: ["2"], shown: ["2"], does: "from the side", action: "side" },
   { keys: ["3"], shown: ["3"], does: "from above", action: "top" },
   { keys: ["4"], shown: ["4"], does: "three quarters from the front, slightly from above", action: "quarter" },
+  { keys: ["f"], shown: ["F"], does: "floor plan: the path and the facings, from above", action: "plan", when: alone },
   { keys: ["r"], shown: ["R"], does: "reset the view", action: "reset" },
   { shown: ["Shift", "arrows"], does: "rotate, like dragging" },
   { shown: ["+", "-"], does: "zoom, like scrolling" },
   { keys: ["a"], shown: ["A"], does: "the end postures A and B", action: "ends", when: joining },
-  { keys: ["o"], shown: ["O"], does: "onion skin: frames before and after", action: "onion", when: moving },
+  { keys: ["o"], shown: ["O"], does: "onion skin: frames before and after", action: "onion", when: alone },
   { keys: ["c"], shown: ["C"], does: "legend of the colours", action: "legend" },
   { keys: ["d"], shown: ["D"], does: "dark or light background", action: "dark" },
   { keys: ["?"], shown: ["?"], does: "these keys", action: "help" },

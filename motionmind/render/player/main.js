@@ -3,11 +3,14 @@
 import { Body } from "motionmind/body";
 import { writeCredits } from "motionmind/credits";
 import { Filming } from "motionmind/filming";
+import { Ensemble, GroupStage, writeDancers } from "motionmind/group";
 import { listen, writeKeys } from "motionmind/keys";
 import { writeLegend } from "motionmind/legend";
 import { MOMENT, Motion } from "motionmind/motion";
 import { Pictures } from "motionmind/pictures";
+import { Plan } from "motionmind/plan";
 import { Player } from "motionmind/player";
+import { Sound } from "motionmind/sound";
 import { Stage } from "motionmind/stage";
 import { Theme } from "motionmind/theme";
 import { Timeline } from "motionmind/timeline";
@@ -19,21 +22,23 @@ const $ = (id) => document.getElementById(id);
 
 function start() {
   const data = JSON.parse($("data").textContent);
-  const motion = new Motion(data);
-  const body = new Body(data.skeleton, data.body);
+  const motion = data.dancers ? new Ensemble(data) : new Motion(data);
+  const body = motion.body ?? new Body(data.skeleton, data.body);
   const player = new Player(motion);
   const pictures = new Pictures(player, () => {
     if (filming.running) return;
     stage.show(player.time, ghosts());
-    stage.render(player.playing);
+    stage.render(player.playing, pictures.late);
   });
   const stage = makeStage(motion, body, data.colours, () => pictures.ask());
   if (!stage) return;
   const timeline = new Timeline($("timeline"), player, data.colours);
   const moving = motion.length > 1;
   for (const element of document.querySelectorAll(".moving")) element.hidden = !moving;
+  if (motion.dancers) writeDancers($("dancers"), motion, () => pictures.ask());
+  if (motion.dancers) for (const id of ["ghosts", "plan"]) $(id).hidden = true; // of one body
   $("ends").hidden = motion.insertions.every((insertion) => motion.ends(insertion).length === 0);
-  writeLegend($("legend").querySelector("ul"), motion, body, data.colours);
+  writeLegend($("legend").querySelector("ul"), motion.painted ?? motion, body, data.colours);
   writeCredits($("credits"), data.credits);
   $("legend").open = $("stage").clientWidth >= ROOMY.width && $("stage").clientHeight >= ROOMY.height;
   writeKeys($("sheet").querySelector("dl"), motion);
@@ -52,7 +57,8 @@ function start() {
   };
   theme.addEventListener("change", colour);
   colour();
-  bind(player, stage, theme, refresh);
+  const sound = motion.sound && makeSound(player, motion.sound);
+  bind(player, stage, theme, sound, refresh);
   const ghosts = () => ({ ends: pressed("ends"), onion: pressed("onion") ? Number($("apart").value) : 0 });
   const filming = new Filming($("film"), $("filming"), stage, player, ghosts);
 
@@ -60,25 +66,35 @@ function start() {
   refresh();
   if (!matchMedia("(prefers-reduced-motion: reduce)").matches) player.play();
 
-  window.motionmind = { motion, body, player, stage, theme, timeline, solids: (frame) => solids(motion, body, frame) };
+  window.motionmind = { motion, body, player, sound, stage, theme, timeline, solids: (...which) => solids(motion, body, ...which) };
 }
 
 /** Make the stage; if the browser cannot draw it, show a message and return undefined. */
-function makeStage(...things) {
+function makeStage(motion, ...things) {
   try {
-    return new Stage($("canvas"), ...things);
+    return new (motion.dancers ? GroupStage : Stage)($("canvas"), motion, ...things);
   } catch (error) {
     $("message").hidden = false;
     $("message").textContent =
       "This browser cannot show the movement: WebGL 2 is not available. " +
       "Turn on hardware acceleration in its settings, or open the page in another browser.";
-    for (const element of document.querySelectorAll("footer, #views, #page, #legend, #credits, #canvas")) element.hidden = true;
+    for (const element of document.querySelectorAll("footer, #views, #page, #dancers, #legend, #credits, #canvas")) element.hidden = true;
     return undefined;
   }
 }
 
+/** Make the sound, and wake it with the first click or key. */
+function makeSound(player, file) {
+  const sound = new Sound(player, file);
+  $("sound").hidden = false;
+  sound.addEventListener("change", () => $("sound").setAttribute("aria-pressed", String(sound.audible)));
+  document.addEventListener("pointerup", (event) => event.target.closest("#sound") || sound.wake());
+  document.addEventListener("keydown", (event) => "s" === event.key.toLowerCase() || sound.wake());
+  return sound;
+}
+
 /** Buttons and keys. */
-function bind(player, stage, theme, refresh) {
+function bind(player, stage, theme, sound, refresh) {
   const switched = (id) => () => {
     $(id).setAttribute("aria-pressed", String(!pressed(id)));
     refresh();
@@ -88,13 +104,21 @@ function bind(player, stage, theme, refresh) {
     for (const name of VIEWS) $(name).setAttribute("aria-pressed", String(name === view));
     refresh();
   };
+  const plan = new Plan(stage);
+  const floorPlan = () => {
+    plan.shown = !plan.shown;
+    $("plan").setAttribute("aria-pressed", String(plan.shown));
+    look(plan.shown ? "top" : "quarter")();
+  };
   const actions = {
     play: () => player.toggle(),
     back: () => player.step(-1),
     forward: () => player.step(1),
     loop: () => (player.loop = !player.loop),
+    sound: () => sound?.toggle(),
     onion: switched("onion"),
     ends: switched("ends"),
+    plan: floorPlan,
     reset: look("quarter"),
     dark: () => theme.toggle(),
     help: () => $("sheet").showModal(),
@@ -153,11 +177,13 @@ function pressed(id) {
   return $(id).getAttribute("aria-pressed") === "true";
 }
 
-/** The solids of a frame, in the world: eight numbers a cone and twelve an ellipsoid, as Body writes them. */
-function solids(motion, body, frame) {
-  const rotations = new Float64Array(motion.joints.length * 4);
+/** The solids of a frame, in the world: eight numbers a cone and twelve an ellipsoid, as Body writes them; of a dancer. */
+function solids(motion, shared, frame, number = 0) {
+  const one = motion.dancers?.[number] ?? motion;
+  const body = one.body ?? shared;
+  const rotations = new Float64Array(body.parents.length * 4);
   const root = new Float64Array(3);
-  motion.sample(motion.times[frame], rotations, root);
+  one.sample(motion.times[frame], rotations, root);
   body.pose(rotations, root);
   const found = { cones: new Array(body.cones.length * 8), balls: new Array(body.balls.length * 12) };
   body.writeCones(found.cones);

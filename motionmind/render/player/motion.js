@@ -12,6 +12,7 @@ export class Motion {
     this.rotations = unpacked(new Uint32Array(decoded(data.rotations))); // x, y, z, w, local to the parent [T * J * 4]
     this.first = data.first; // the number of the first frame, where these are a part of something longer
     this.farthest = data.farthest; // frames in which the body reaches farthest in some direction
+    this.sound = data.sound && decoded(data.sound); // a sound file, or undefined
     this.insertions = data.insertions; // {times [M + 1], bridged: [{joint, move}]}, from the earliest to the latest
   }
 
@@ -80,7 +81,7 @@ export class Motion {
   }
 }
 
-function decoded(base64) {
+export function decoded(base64) {
   return Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0)).buffer;
 }
 

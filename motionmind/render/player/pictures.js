@@ -4,6 +4,7 @@ const LONGEST = 0.25; // seconds between pictures; a page that was hidden goes o
 
 export class Pictures {
   #asked = false;
+  #since = 0; // the time of the request
   /** @type {number | undefined} when the picture before was drawn, if another was to follow at once */
   #last;
 
@@ -14,6 +15,8 @@ export class Pictures {
   constructor(player, draw) {
     this.player = player;
     this.draw = draw;
+    /** Milliseconds from the request for the picture until it is drawn. */
+    this.late = 0;
     player.addEventListener("change", () => this.ask());
   }
 
@@ -21,6 +24,7 @@ export class Pictures {
   ask() {
     if (this.#asked) return;
     this.#asked = true;
+    this.#since = performance.now();
     this.#last ??= performance.now(); // after a rest, time starts now
     requestAnimationFrame((now) => this.#next(now));
   }
@@ -31,6 +35,7 @@ export class Pictures {
     player.advance(Math.min(Math.max((now - /** @type {number} */ (this.#last)) / 1000, 0), LONGEST));
     this.#asked = false; // what changes by going on is in this picture
     this.#last = player.playing ? now : undefined;
+    this.late = performance.now() - this.#since;
     this.draw();
     if (player.playing) this.ask();
   }

@@ -17,14 +17,19 @@ import {
 } from "three";
 import { OrbitControls } from "three/OrbitControls";
 import { COARSE, Figures, FINE, Marks, paperUniforms, PAPERS } from "motionmind/figure";
+import { Trails } from "motionmind/trails";
 
 const FIELD = 26; // degrees from the picture's lower edge to its upper one
 const SHARPEST = 2; // device pixels to a CSS pixel, at most
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i; // what browsers call drawing without a GPU
+const [SLOW, FAST] = [40, 22]; // milliseconds that a picture is late, which make moving ones coarser, or finer again,
+const [COARSER, COARSEST] = [0.8, 0.5]; // by this factor, down to so many pixels to a CSS pixel,
+const COUNT = 6; // as a mean of so many
 const SAMPLES = 150; // postures, at most, to find a path's extent, besides the ones that reach farthest
 const MARGIN = 0.12; // metres round the ends of limbs that a body 1.70 m tall takes up, and some air
 const PIECES = 16; // of a line of the floor's grid, along which it fades
 const GHOSTS = 0.34; // strength of A and B
+const WAYPOINTS = 8; // ghosts more than those, at most
 const ONION = [0.44, 0.3, 0.18]; // strength of the frames before and after, from the nearest on
 
 /** Directions to look from. At rest the body faces +z, the audience; its left is +x. */
@@ -36,6 +41,9 @@ const VIEWS = {
 };
 
 export class Stage {
+  #plain = 1; // share of the pixels along each side of what moves, without a GPU
+  #late = []; // milliseconds that the last moving pictures were late
+
   /**
    * @param {HTMLCanvasElement} canvas
    * @param {Motion} motion
@@ -75,7 +83,8 @@ export class Stage {
   take(motion, body, colours) {
     const same = this.body === body && this.colours === colours;
     Object.assign(this, { motion, body, colours, ghostsShown: "" });
-    if (!same) this.#embody();
+    if (!same) this.embody();
+    this.trails?.forget(); // of a movement that may have grown
     this.#measure();
     this.floor?.traverse((thing) => [thing.geometry, thing.material].forEach((part) => part?.dispose()));
     this.layers[0].clear();
@@ -126,20 +135,21 @@ export class Stage {
   /**
    * Put the body where it is at `time`.
    * @param {object} ghosts {ends: whether the A and B of the insertion that goes on are shown, onion: how many frames
-   *   the ghosts before and after are apart, 0 for none}
+   *   the ghosts before and after are apart, 0 for none, trails: whose paths are drawn, waypoints: times of more ghosts}
    */
-  show(time, { ends, onion }) {
-    this.#showGhosts(time, ends, onion);
-    this.#pose(time);
+  show(time, { ends, onion, trails = [], waypoints = [] }) {
+    this.#showGhosts(time, ends, onion, waypoints);
+    this.#showTrails(time, trails);
+    this.pose(time);
     this.figure.set(0, this.#palette(time));
     this.figure.show(1);
     this.figure.uniforms.middle.value.fromArray(this.root);
     this.marks.show(this.motion.bridgedAt(time));
   }
 
-  /** Draw it; `moving` says that the next picture is to follow at once. */
-  render(moving) {
-    this.#sharpen(moving || this.dragged);
+  /** Draw it; `moving` says that the next picture is to follow at once, `late` by how many milliseconds this one does. */
+  render(moving, late) {
+    this.#sharpen(moving || this.dragged, late);
     this.#draw();
   }
 
@@ -149,11 +159,11 @@ export class Stage {
     if (!value) this.#resize();
   }
 
-  /** Draw the body at `time` onto a canvas of the same shape, smoothed from twice as many pixels each way. */
+  /** Draw the body at `time` onto a canvas of the same shape; a GPU smooths it from twice as many pixels each way. */
   shoot(pen, time, ghosts) {
     const { width, height } = pen.canvas;
     this.show(time, ghosts);
-    const ratio = (2 * width) / this.renderer.getSize(new Vector2()).x;
+    const ratio = ((this.software ? 1 : 2) * width) / this.renderer.getSize(new Vector2()).x;
     if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
     this.#draw();
     pen.drawImage(this.canvas, 0, 0, width, height);
@@ -168,7 +178,7 @@ export class Stage {
   }
 
   /** Make what draws the body, its ghosts and its bridges. */
-  #embody() {
+  embody() {
     const { body, colours, motion } = this;
     for (const layer of this.layers ?? []) {
       layer.traverse((thing) => [thing.geometry, thing.material].forEach((part) => part?.dispose()));
@@ -176,8 +186,9 @@ export class Stage {
     this.rotations = new Float64Array(motion.joints.length * 4);
     this.root = new Float64Array(3);
     this.figure = new Figures(body, 1, FINE, colours, this.papers);
-    this.ghosts = new Figures(body, 2 + 2 * ONION.length, COARSE, colours, this.papers);
+    this.ghosts = new Figures(body, WAYPOINTS + 2 + 2 * ONION.length, COARSE, colours, this.papers);
     this.marks = new Marks(body, colours.bridged, this.figure.uniforms);
+    this.trails = undefined;
     this.ghosts.uniforms.middle = this.figure.uniforms.middle;
     this.figure.pixel = this.ghosts.pixel = this.pixel ?? 0;
     this.layers = [new Scene(), new Scene(), new Scene()];
@@ -185,9 +196,18 @@ export class Stage {
     this.layers[2].add(this.figure.group, this.marks.group);
   }
 
-  #showGhosts(time, ends, onion) {
+  /** Trails are made when they are first asked for. */
+  #showTrails(time, parts) {
+    if (!this.trails && parts.some((part) => this.body.trails[part]?.length > 0)) {
+      this.trails = new Trails(this.body, this.colours, this.figure.uniforms);
+      this.layers[2].add(this.trails.mesh);
+    }
+    this.trails?.show(this.motion, time, parts);
+  }
+
+  #showGhosts(time, ends, onion, waypoints) {
     const { times } = this.motion;
-    const ghosts = [];
+    const ghosts = waypoints.slice(0, WAYPOINTS).map((at) => [at, GHOSTS]);
     const insertion = ends && this.motion.insertionAt(time);
     if (insertion) for (const at of this.motion.ends(insertion)) ghosts.push([at, GHOSTS]);
     if (onion > 0) {
@@ -202,15 +222,26 @@ export class Stage {
     if (shown === this.ghostsShown) return;
     this.ghostsShown = shown;
     ghosts.forEach(([at, strength], index) => {
-      this.#pose(at);
+      this.pose(at);
       this.ghosts.set(index, this.#palette(at), strength);
     });
     this.ghosts.show(ghosts.length);
   }
 
-  #pose(time) {
+  pose(time) {
     this.motion.sample(time, this.rotations, this.root);
     this.body.pose(this.rotations, this.root);
+  }
+
+  /** Pose the body as it is in the frames that show how far the path leads, one after another. */
+  *poses() {
+    const step = Math.max(1, Math.ceil(this.motion.length / SAMPLES));
+    const frames = new Set(this.motion.farthest);
+    for (let frame = 0; frame < this.motion.length; frame += step) frames.add(frame);
+    for (const frame of frames) {
+      this.pose(this.motion.times[frame]);
+      yield this.body;
+    }
   }
 
   #palette(time) {
@@ -219,15 +250,11 @@ export class Stage {
 
   /** Find where the path leads: `cloud`, places in the body in many postures; its `middle`, its `reach` from there. */
   #measure() {
-    const step = Math.max(1, Math.ceil(this.motion.length / SAMPLES));
-    const [cones, balls] = [new Array(this.body.cones.length * 8), new Array(this.body.balls.length * 12)];
     this.cloud = [];
-    const frames = new Set(this.motion.farthest);
-    for (let frame = 0; frame < this.motion.length; frame += step) frames.add(frame);
-    for (const frame of frames) {
-      this.#pose(this.motion.times[frame]);
-      this.body.writeCones(cones);
-      this.body.writeBalls(balls);
+    for (const body of this.poses()) {
+      const [cones, balls] = [new Array(body.cones.length * 8), new Array(body.balls.length * 12)];
+      body.writeCones(cones);
+      body.writeBalls(balls);
       for (let i = 0; i < cones.length; i += 4) this.cloud.push(new Vector3().fromArray(cones, i));
       for (let i = 0; i < balls.length; i += 12) {
         const centre = new Vector3().fromArray(balls, i);
@@ -247,11 +274,25 @@ export class Stage {
     this.reach = this.body.size + most(this.cloud.map((place) => place.distanceTo(this.middle)));
   }
 
-  /** Without a GPU to smooth all edges takes longer than all else: there what moves is drawn plainly, what rests finely. */
-  #sharpen(moving) {
+  /**
+   * Without a GPU to smooth all edges takes longer than all else: there what moves is drawn plainly, and more so if pictures
+   * still come slowly; what rests is drawn finely.
+   */
+  #sharpen(moving, late) {
     const screen = window.devicePixelRatio; // below 1 where the page is zoomed out: more would not be seen
-    const ratio = Math.min(this.software ? (moving ? Math.min(screen, 1) : 2 * screen) : screen, SHARPEST);
+    if (moving) this.#hurry(late);
+    const ratio = Math.min(this.software ? (moving ? Math.min(screen, 1) * this.#plain : 2 * screen) : screen, SHARPEST);
     if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
+  }
+
+  /** Find how plainly to draw what moves, from how late the last pictures came. */
+  #hurry(late) {
+    this.#late.push(late);
+    if (this.#late.length < COUNT) return;
+    const mean = this.#late.reduce((sum, one) => sum + one) / COUNT;
+    this.#late = [];
+    if (mean > SLOW) this.#plain = Math.max(this.#plain * COARSER, COARSEST);
+    else if (mean < FAST) this.#plain = Math.min(this.#plain / COARSER, 1);
   }
 
   #resize() {
