@@ -173,18 +173,19 @@ def _place_postures(body: Anatomy, rows: list[Row]) -> _Placed:
     else:
         feet = _feet(body, settings, len(rows))
         toes, tips = np.array([np.take(body.foot(body.leg.toes, side), [0, -1]) for side in SIDES]).T
-        rests, weight = feet.stands | feet.touches, np.where(feet.stands, feet.weight, 0.0)
-        pivot = feet.pivot
+        rests = feet.stands | feet.touches | feet.planted
+        weight, pivot = np.where(feet.stands | feet.planted, feet.weight, 0.0), feet.pivot
         stance = place_legs(body, body.leg, rotations, feet)
         rotations, root, stands = stance.rotations, stance.root, feet.stands[:, 0] | feet.stands[:, 1]
-        _check_reach(rows, feet, stance.shortfall)
+        _check_feet(rows, feet, stance.shortfall)
         for t in np.flatnonzero(stance.imbalance > REACH_TOLERANCE_M)[:1]:
             raise rows[t].where.error("the weight cannot be brought over the feet")
         solved = body.degrees(rotations)
         for side in (0, 1):  # legs on the floor: the solved angles replace those written
             for joint in body.leg_joints(body.leg, SIDES[side]):
                 name = body.skeleton.names[joint]
-                degrees[name] = np.where(rests[:, side, None], solved[:, joint], degrees[name])
+                placed = feet.stands[:, side] | feet.touches[:, side]
+                degrees[name] = np.where(placed[:, None], solved[:, joint], degrees[name])
     _check_limits(body, rows, degrees)
     root[:, 1] += _lift(body, rows, rotations, root, stands)
     points = body.skeleton.positions_and_tips(rotations, root)
@@ -233,13 +234,15 @@ def _feet(body: Anatomy, settings: dict[tuple[str, str], list[Setting]], count: 
     def read(key: str, otherwise: float) -> Floats:
         return np.array([[limb[t].get(key, otherwise) for limb in legs] for t in range(count)])
 
-    stands = read("stand", 0.0) > 0.0
+    stands, planted = read("stand", 0.0) > 0.0, read("planted", 0.0) > 0.0
+    bears = stands | planted
     turn, knee, weight = read("turn", 0.0), read("knee", np.nan), read("weight", np.nan)
-    others = np.where(stands[:, ::-1] & ~np.isnan(weight[:, ::-1]), 100.0 - weight[:, ::-1], 50.0)
+    others = np.where(bears[:, ::-1] & ~np.isnan(weight[:, ::-1]), 100.0 - weight[:, ::-1], 50.0)
     lean = np.stack([_mean_over_legs(legs, key, count) for key in ("lean left", "lean ahead")], axis=-1)
     return Feet(
         stands=stands,
         touches=read("touch", 0.0) > 0.0,
+        planted=planted,
         out=read("out", 0.0) / 100.0,
         ahead=read("ahead", 0.0) / 100.0,
         turn=np.radians(turn),
@@ -284,11 +287,17 @@ def _lift(body: Anatomy, rows: list[Row], rotations: Floats, root: Floats, stand
     return np.where(stands, 0.0, up - lowest)
 
 
-def _check_reach(rows: list[Row], feet: Feet, shortfall: Floats) -> None:
-    """Raise FormatError if a leg cannot reach its place, or no foot bears weight."""
+def _check_feet(rows: list[Row], feet: Feet, shortfall: Floats) -> None:
+    """Raise FormatError if legs on the floor contradict each other, cannot reach it, or bear no weight."""
+    for t in np.flatnonzero(feet.planted.any(axis=1) & (feet.stands | feet.touches).any(axis=1))[:1]:
+        raise rows[t].where.error("one leg is planted, the other placed; give both their angles, or neither")
+    for t in np.flatnonzero(feet.planted.any(axis=1)):
+        if (up := rows[t].up) is not None:
+            raise rows[t].where.error(f"up {up:g}, but a leg is planted")
     for t in np.flatnonzero(feet.touches.any(axis=1) & ~feet.stands.any(axis=1))[:1]:
         raise rows[t].where.error("a leg touches the floor, but none stands on it")
-    weightless = feet.stands.any(axis=1) & ~(feet.stands & (feet.weight > 0.0)).any(axis=1)
+    bears = feet.stands | feet.planted
+    weightless = bears.any(axis=1) & ~(bears & (feet.weight > 0.0)).any(axis=1)
     for t in np.flatnonzero(weightless)[:1]:
         raise rows[t].where.error("no foot bears weight")
     for t, side in np.argwhere(shortfall > REACH_TOLERANCE_M):
@@ -345,7 +354,7 @@ def _steps(rows: list[Row], placed: _Placed, turn: Floats, centre: Floats) -> Fl
     """Return the displacement of the body from each row to the next [T - 1, 3], metres.
 
     Feet that bear weight before and after stay in place; if they disagree, their mean does. Without such feet, feet
-    that rest on the floor stay. Without these, the centre of mass moves by the row's `go`.
+    that rest on the floor stay. Those feet slide by the row's `go`. Without them, the centre of mass moves by it.
 
     Args:
         rows: the rows.
@@ -367,4 +376,4 @@ def _steps(rows: list[Row], placed: _Placed, turn: Floats, centre: Floats) -> Fl
     stay = (held[..., None] * (before - after)).sum(axis=1) / np.where(total > 0.0, total, 1.0)
     go = np.zeros((len(rows) - 1, 3))
     go[:, [0, 2]] = np.array([row.go for row in rows[1:]]).reshape(-1, 2) / 100.0
-    return np.where(total > 0.0, stay, centre[:-1] - centre[1:] + rot.mul_vec(turn[1:], go))
+    return np.where(total > 0.0, stay, centre[:-1] - centre[1:]) + rot.mul_vec(turn[1:], go)

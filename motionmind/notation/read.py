@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from unicodedata import normalize
@@ -47,6 +47,7 @@ STANDING = {
     "knee": (-180.0, 180.0),
     "pivot": (-50.0, 50.0),
 }
+PLANTED = ("weight", "pivot")  # those of a leg that is given by its angles
 LEAN = {
     "ahead": ("lean ahead", 1.0),
     "back": ("lean ahead", -1.0),
@@ -326,9 +327,11 @@ def _parse_setting(score: Score, layer: str, words: list[str], where: Where) -> 
         return {}
     leg = score.body.leg
     stands = leg is not None and leg.hip in score.body.layers[layer]
-    if first in (SUPPORTS[:2] if stands else SUPPORTS[2:] if leg is None else ()):
-        if first != "touch":
-            return {first: 1.0} | _parse_standing(words[1:], where)
+    if first in (SUPPORTS if stands else SUPPORTS[2:] if leg is None else ()):
+        if first == "planted":
+            return {"planted": 1.0} | _parse_standing(words[1:], where, PLANTED if stands else ())
+        if first == "stand":
+            return {"stand": 1.0} | _parse_standing(words[1:], where)
         if len(words) != 3 or words[1] != "towards":
             raise where.error("write touch towards DEGREES: 0 to the front, 90 to the side, 180 to the back")
         return {"touch": 1.0, "towards": number(words[2], "touch towards", where)}
@@ -363,18 +366,17 @@ def _parse_angles(score: Score, layer: str, words: list[str], where: Where) -> S
     return setting
 
 
-def _parse_standing(words: list[str], where: Where) -> dict[object, float]:
-    """Parse the words of a standing leg: name and number, or `lean`, direction and number."""
+def _parse_standing(words: list[str], where: Where, known: Sequence[str] = (*STANDING, "lean")) -> dict[object, float]:
+    """Parse the `known` words of a standing leg: name and number, or `lean`, direction and number."""
     setting: dict[object, float] = {}
     rest = iter(words)
     for word in rest:
         direction = next(rest, "") if word == "lean" else ""
         if word == "lean" and direction not in LEAN:
             raise where.error(f"lean {direction}: write lean, a direction (ahead, back, left, right) and centimetres")
-        known = (*STANDING, "lean")
         if word not in known:
-            hint = did_you_mean(word, known) or f"; words are {', '.join(known)}"
-            raise where.error(f"{quoted(word)} does not describe a standing leg{hint}")
+            hint = did_you_mean(word, known) or f"; words are {', '.join(known) or 'none'}"
+            raise where.error(f"{quoted(word)} does not describe a leg on the floor{hint}")
         value = number(next(rest, ""), f"{word} {direction}".strip(), where)
         least, most = STANDING.get(word, (-200.0, 200.0))
         if not least <= value <= most:

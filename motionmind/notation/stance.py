@@ -25,6 +25,7 @@ class Feet:
     Attributes:
         stands: whether a leg stands, with or without weight.
         touches: whether it rests on the floor without standing.
+        planted: whether it bears weight in the posture that its angles give; such legs are not placed.
         out, ahead: place of the ball of the foot relative to the point under its own hip, metres.
         turn: direction of the foot, outward, radians.
         knee: direction of the knee, outward, radians.
@@ -38,6 +39,7 @@ class Feet:
 
     stands: Bools
     touches: Bools
+    planted: Bools
     out: Floats
     ahead: Floats
     turn: Floats

@@ -478,7 +478,7 @@ SLIPS = {
     "an angle that is no number": ("legs\n  odd = hip flexion 2o @\n" + C, r"flexion 2o: expected a number"),
     "a huge angle": ("legs\n  odd = hip flexion 1000000 @\n" + C, r"flexion 1000000"),
     "not a number": ("legs\n  odd = hip flexion nan @\n" + C, r"flexion nan: expected a number"),
-    "a word of no leg": ("legs\n  odd = stand on 5 @\n" + C, r"'on' does not describe a standing leg"),
+    "a word of no leg": ("legs\n  odd = stand on 5 @\n" + C, r"'on' does not describe a leg on the floor"),
     "a word of a leg misspelt": ("legs\n  odd = stand trun 5 @\n" + C, r"'trun'.*did you mean turn\?"),
     "a bend below 0": ("legs\n  odd = stand bend -30 @\n" + C, r"bend -30"),
     "a heel below the floor": ("legs\n  odd = stand heel -20 @\n" + C, r"heel -20"),
@@ -486,7 +486,13 @@ SLIPS = {
     "lean nowhere": ("legs\n  odd = stand lean 5 @\n" + C, r"lean 5: write lean, a direction"),
     "touch nowhere": ("legs\n  odd = touch @\n" + C, r"touch towards DEGREES"),
     "an arm that stands": ("arms\n  odd = stand @\n" + C, r"'stand'"),
-    "a leg that is planted": ("legs\n  odd = planted @\n" + C, r"'planted'"),
+    "an arm that is planted": ("arms\n  odd = planted @\n" + C, r"'planted'"),
+    "a planted leg that bends": ("legs\n  odd = planted bend 5 @\n" + C, r"'bend'.*; words are weight, pivot"),
+    "a planted leg and a standing one": (
+        "legs\n  odd = planted / stand\n" + "clip c\n  start | odd left @\n",
+        "one leg is planted, the other placed",
+    ),
+    "a planted leg in the air": ("legs\n  odd = planted\nclip c\n  start up 5 | odd @\n", "up 5, but a leg is planted"),
     "a torso of two": ("torso\n  odd = neutral / neutral @\n" + C, r"a / separates two limbs"),
     "an unknown heading": ("arm @\n  bas = neutral\n" + C, r"'arm' is not a heading; did you mean arms\?"),
     "a heading with more": ("legs first @\n" + C, r"'first' after the heading legs"),
@@ -597,6 +603,7 @@ def test_includes_that_go_round_are_told_of(tmp_path: Path) -> None:
         read_score(write(tmp_path, "include b.score as b\n"))
 
 
+@pytest.mark.long
 def test_a_great_number_of_postures_is_refused_before_the_memory_is_full(tmp_path: Path) -> None:
     for how in ("1000 times, 1000 times, 1000 times", ", ".join(["there and back"] * 40)):
         with pytest.raises(FormatError, match="postures"):
@@ -732,6 +739,7 @@ START = "  start face 20 left | fifth right | bas / second | aside left | turned
 laws = settings(max_examples=15)
 
 
+@pytest.mark.long
 @given(lines(whole=True))
 @laws
 def test_the_other_side_twice_and_backwards_twice_are_the_phrase(folder: Path, said: list[str]) -> None:
@@ -756,6 +764,7 @@ def test_the_other_side_is_the_mirror_image(folder: Path, said: list[str]) -> No
     assert rot.angle(other.rotations, image.rotations).max() < 1e-4
 
 
+@pytest.mark.long
 @given(lines(whole=True))
 @laws
 def test_backwards_is_the_way_back(folder: Path, said: list[str]) -> None:
@@ -779,6 +788,7 @@ def test_a_phrase_that_goes_on_returns_to_where_it_began(folder: Path, said: lis
     np.testing.assert_array_equal(motion.rotations, motion.rotations[::-1])
 
 
+@pytest.mark.long
 @given(lines(whole=False), st.integers(1, 4))
 @laws
 def test_so_many_times_is_so_many_calls(folder: Path, said: list[str], times: int) -> None:
@@ -789,6 +799,7 @@ def test_so_many_times_is_so_many_calls(folder: Path, said: list[str], times: in
     same(called, moved(folder, f"clip c\n{START}" + written * times))
 
 
+@pytest.mark.long
 @given(lines(whole=False))
 @laws
 def test_a_phrase_that_goes_on_is_mirrored_where_it_stands(folder: Path, said: list[str]) -> None:
@@ -984,6 +995,7 @@ def test_an_included_clip_keeps_its_tempo_and_a_phrase_takes_that_of_its_caller(
     np.testing.assert_allclose(np.diff(found.times), [1.0, 1.0, 0.5, 0.5])
 
 
+@pytest.mark.long
 @given(stances(), st.integers(-180, 180))
 @settings(max_examples=20)
 def test_facing_elsewhere_is_the_same_body_turned(folder: Path, text: str, degrees: int) -> None:

@@ -61,7 +61,7 @@ def feet_of(count: int, **said: Any) -> Feet:
         shape = (count, 2)
         value = np.broadcast_to(np.asarray(said.get(field.name, 0.0), dtype=float), shape)
         match field.name:
-            case "stands" | "touches":
+            case "stands" | "touches" | "planted":
                 out[field.name] = value > 0.0
             case "turn" | "knee" | "heel" | "bend" | "towards":
                 out[field.name] = np.radians(value)

@@ -1,0 +1,7 @@
+"""Transcription: from a recording back to a score that a person can read, change and compose."""
+
+from __future__ import annotations
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,70 @@
+"""Choose the fewest key frames between which every frame is followed: a shortest path over frames.
+
+The problem says between which keys a frame is followed; nothing here knows about bodies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats, Ints
+
+N_STARTS = 256  # whose steps are tested together, to bound the memory
+_EARLY_SHARES = (0.5, 0.25, 0.75, 0.125, 0.375, 0.625, 0.875)  # of a step: most long steps fail at one of these frames
+
+# Whether movement from key `start` to key `end` follows frame `at`: three arrays of frames [N] -> [N].
+Follows = Callable[[Ints, Ints, Ints], Bools]
+
+
+def fewest_keys(count: int, longest: int, follows: Follows, dear: Floats) -> Ints:
+    """Return the fewest key frames, the first and the last frame among them, between which all frames are followed.
+
+    A step from a key to the next frame always follows. Of the choices with the fewest keys, the one whose keys are
+    least dear in total is returned. Both are exact: dynamic programming over the graph of all steps.
+
+    Args:
+        count: number of frames, at least 1.
+        longest: the most frames that a step spans.
+        follows: whether a step follows a frame within it.
+        dear: price of each frame as a key [count], not negative.
+    """
+    steps = _steps(count, longest, follows)
+    # total[t]: fewest keys up to t, then the least price of these; one number, for all prices together are below 1.
+    price = dear / (float(dear.sum()) + 1.0)
+    total, before = np.full(count, np.inf), np.zeros(count, dtype=np.int64)
+    total[0] = 1.0 + price[0]
+    for t in range(1, count):
+        spans = steps[t]
+        costs = total[t - spans]
+        best = int(costs.argmin())
+        total[t], before[t] = costs[best] + 1.0 + price[t], t - spans[best]
+    keys = [count - 1]
+    while keys[-1]:
+        keys.append(int(before[keys[-1]]))
+    return np.array(keys[::-1])
+
+
+def _steps(count: int, longest: int, follows: Follows) -> list[Ints]:
+    """Return, for each frame, the spans of the steps that may end there."""
+    ending: list[list[int]] = [[] for _ in range(count)]
+    for first in range(0, count, N_STARTS):
+        starts = np.arange(first, min(first + N_STARTS, count))
+        start = np.repeat(starts, max(longest - 1, 0))
+        span = np.tile(np.arange(2, longest + 1), len(starts))
+        inside = start + span < count
+        start, span = start[inside], span[inside]
+        for share in _EARLY_SHARES:
+            kept = follows(start, start + span, start + np.clip(np.round(share * span).astype(np.int64), 1, span - 1))
+            start, span = start[kept], span[kept]
+        for offset in range(1, longest):
+            long = np.flatnonzero(span > offset)
+            if len(long) == 0:
+                break
+            kept = np.ones(len(span), dtype=np.bool_)
+            kept[long] = follows(start[long], (start + span)[long], start[long] + offset)
+            start, span = start[kept], span[kept]
+        for end, one in zip((start + span).tolist(), span.tolist(), strict=True):
+            ending[end].append(one)
+    return [np.array([1, *spans]) for spans in ending]

@@ -1,0 +1,221 @@
+"""Transcribe a recording into a score: the fewest postures between which the movement stays within a tolerance."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from motionmind._typing import Bools, Ints
+from motionmind.arguments import check_real, check_text, check_type
+from motionmind.body.motion import Motion
+from motionmind.ensemble.dancers import Dancer, Ensemble
+from motionmind.errors import MotionMindError
+from motionmind.geometry import rotations as rot
+from motionmind.notation.compose import compose
+from motionmind.transcription.bones import CM_PER_DEG, deviations
+from motionmind.transcription.keys import fewest_keys
+from motionmind.transcription.recorded import Recorded, prepare
+from motionmind.transcription.text import ScoreWriter
+
+LONGEST_MOVE_S = 3.0  # between two postures; a longer hold takes several lines
+SLIDE_SHARE = 0.5  # of the tolerance, beyond which a standing foot's slip is written
+N_CHUNK = 8192  # moves that are tested together
+TOLERANCE_RANGE_DEG = (1.0, 90.0)
+
+
+class Deviation(msgspec.Struct, frozen=True):
+    """The deviation of a score's movement from its recording, frame by frame.
+
+    Attributes:
+        degrees: by body part, the deviation of a bone's direction, the worst of the part in each frame.
+        unwritten: by body part, the same of postures written out in full: what no score can say, such as a knee's twist
+            or an angle beyond the joint's limit.
+        centimetres: distance of the pelvis from its recorded place.
+    """
+
+    degrees: dict[str, list[float]]
+    unwritten: dict[str, list[float]]
+    centimetres: list[float]
+
+
+@dataclass(frozen=True, eq=False)
+class Transcription:
+    """A recording as a score.
+
+    Attributes:
+        text: the score.
+        tolerance: the deviation between its postures that was allowed, degrees.
+        keys: its postures' frames in `recording` [K].
+        recording: the recording with the score's proportions, on a level floor; at most 30 frames a second.
+        motion: the movement of the score.
+        deviation: how far that deviates from the recording.
+    """
+
+    text: str
+    tolerance: float
+    keys: Ints
+    recording: Motion
+    motion: Motion
+    deviation: Deviation
+
+    def report(self) -> bytes:
+        """Return the deviations as JSON, with the frames' rate and the numbers of the key frames."""
+        return msgspec.json.encode(
+            {
+                "tolerance": self.tolerance,
+                "frames_per_second": round(self.recording.fps, 6) if len(self.recording) > 1 else None,
+                "keys": self.keys.tolist(),
+                "deviation": self.deviation,
+            }
+        )
+
+    def compared(self) -> Ensemble:
+        """Return the recording and the score's movement as two dancers on one spot."""
+        start = float(self.recording.root[0, 0]), float(self.recording.root[0, 2])
+        return Ensemble(
+            self.motion.name,
+            (Dancer("recording", self.recording, start), Dancer("score", self.motion, start)),
+        )
+
+
+def transcribe(motion: Motion, tolerance: float = 6.0, *, tempo: float | None = None, name: str = "") -> Transcription:
+    """Transcribe a recording into a score.
+
+    The score has the fewest postures such that its movement, each bone turning evenly from posture to posture, follows
+    every frame within the tolerance; this is proven, as a shortest path over all frames. Of equally few postures, those
+    where the body moves least are chosen.
+
+    Args:
+        motion: the recording of a person.
+        tolerance: greatest deviation of a bone's direction, degrees; the pelvis may be off by half as many centimetres,
+            and the ends of short bones, too. The deviation of the postures themselves, as a score can write them, comes
+            on top (`Deviation.unwritten`).
+        tempo: counts per minute; None for counts of one second.
+        name: name of the score's clip; "" for the motion's.
+
+    Raises:
+        MotionMindError: the tolerance or the tempo is out of range, or the recording lasts more than 10 minutes.
+        SkeletonError: the movement is not of a person.
+
+    >>> import numpy as np
+    >>> from motionmind import Motion, human23
+    >>> from motionmind.transcription import transcribe
+    >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (31, 23, 1))
+    >>> still = Motion(human23(), at_rest, np.zeros((31, 3)), np.arange(31) / 30.0, "still")
+    >>> len(transcribe(still).keys)
+    2
+    """
+    check_type("motion", motion, Motion)
+    check_real("tolerance", tolerance)
+    check_real("tempo", tempo, or_none=True)
+    check_text("name", name)
+    least, most = TOLERANCE_RANGE_DEG
+    if not least <= tolerance <= most:
+        raise MotionMindError(f"a tolerance must be from {least:g} to {most:g} degrees, not {tolerance:g}")
+    counts = 60.0 if tempo is None else tempo  # a count is a second where no tempo is known
+    if not 1.0 <= counts <= 6000.0:
+        raise MotionMindError(f"a tempo must be from 1 to 6000 counts per minute, not {counts:g}")
+    recorded = prepare(motion, tolerance)
+    keys = _choose_keys(recorded, tolerance)
+    writer = ScoreWriter(recorded, keys)
+    clip, title = _clip_name(name or motion.name), _title(motion.name)
+    still = [(0, 0)] * len(keys)
+    composed = _compose(writer.text(recorded, keys, still, counts, clip, title))
+    text = writer.text(recorded, keys, _travel(recorded, keys, composed, tolerance), counts, clip, title)
+    composed = _compose(text)
+    return Transcription(text, tolerance, keys, recorded.motion, composed, _deviation(recorded, composed))
+
+
+def _clip_name(name: str) -> str:
+    """Return a name that a score allows, from a motion's."""
+    word = "".join(one if one.isalnum() else "-" for one in Path(name).name).strip("-")
+    return word if word and not word[0].isdigit() else f"clip-{word}".rstrip("-")
+
+
+def _title(name: str) -> str:
+    """Return a motion's name as a score's title: on one line, without a comment or a continuation."""
+    return " ".join(name.replace("#", " ").split()).rstrip(",") or "A recording"
+
+
+def _choose_keys(recorded: Recorded, tolerance: float) -> Ints:
+    """Return the frames of the score's postures."""
+    bones = recorded.bones
+    turned, root = recorded.written.turned(), recorded.root
+    directions = bones.directions(recorded.writable)
+    # In radians along the chord, for the inner loop.
+    allowed = 2.0 * np.sin(0.5 * np.radians(bones.allowed(tolerance)))
+    metres = 0.01 * (1.0 - SLIDE_SHARE) * CM_PER_DEG * tolerance
+
+    def follows(start: Ints, end: Ints, at: Ints) -> Bools:
+        share = ((at - start) / (end - start))[:, None]
+        out = rot.norm(root[start] + share * (root[end] - root[start]) - root[at]) <= metres
+        near = np.flatnonzero(out)
+        for first in range(0, len(near), N_CHUNK):
+            part = near[first : first + N_CHUNK]
+            between = rot.slerp(turned[start[part]], turned[end[part]], share[part])
+            off = rot.norm(bones.directions(between) - directions[at[part]])
+            out[part] = (off <= allowed).all(axis=1)
+        return np.asarray(out)
+
+    speed = np.zeros(len(turned))
+    if len(turned) > 1:
+        speed = rot.norm(np.gradient(directions, axis=0)).mean(axis=1)
+    longest = max(1, round(LONGEST_MOVE_S * recorded.motion.fps)) if len(turned) > 1 else 1
+    return fewest_keys(len(turned), longest, follows, speed)
+
+
+def _travel(recorded: Recorded, keys: Ints, composed: Motion, tolerance: float) -> list[tuple[int, int]]:
+    """Return the travel to write for each key's move, centimetres to the left and ahead of the body.
+
+    A standing foot keeps its place, so its slip in the recording is written only where it adds up.
+
+    Args:
+        recorded: the recording.
+        keys: its key frames [K].
+        composed: the score's movement without any travel written.
+        tolerance: of the score, degrees.
+    """
+    slip = SLIDE_SHARE * CM_PER_DEG * tolerance
+    missing = 100.0 * ((recorded.root[keys] - recorded.root[keys[0]]) - (composed.root - composed.root[0]))[:, [0, 2]]
+    facing = np.radians(recorded.written.facing[keys])
+    stays = np.zeros(len(keys), dtype=np.bool_)
+    stays[1:] = (recorded.stands[keys[1:]] & recorded.stands[keys[:-1]]).any(axis=1)
+    written, out = np.zeros(2), []
+    for row in range(len(keys)):
+        x, z = missing[row] - written
+        sine, cosine = np.sin(facing[row]), np.cos(facing[row])
+        left, ahead = round(float(x * cosine - z * sine)), round(float(x * sine + z * cosine))
+        if row == 0 or (stays[row] and np.hypot(x, z) <= slip):
+            left, ahead = 0, 0
+        written += np.array([left * cosine + ahead * sine, ahead * cosine - left * sine])
+        out.append((left, ahead))
+    return out
+
+
+def _compose(text: str) -> Motion:
+    """Compose the only clip of a score's text."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "transcribed.score"
+        path.write_text(text, encoding="utf-8")
+        return compose(path)
+
+
+def _deviation(recorded: Recorded, composed: Motion) -> Deviation:
+    """Return how far the score's movement deviates from the recording."""
+    motion, bones = recorded.motion, recorded.bones
+    played = composed.at(composed.times[0] + (motion.times - motion.times[0]))
+    directions = bones.directions(motion.rotations)
+    start = (motion.root[0] - played.root[0]) * [1.0, 0.0, 1.0]
+    degrees, unwritten = (
+        {layer: np.round(each[:, own].max(axis=1), 2).tolist() for layer, own in bones.layers.items()}
+        for each in (
+            deviations(bones.directions(played.rotations), directions),
+            deviations(bones.directions(recorded.writable), directions),
+        )
+    )
+    far = 100.0 * rot.norm(played.root + start - motion.root)
+    return Deviation(degrees, unwritten, np.round(far, 2).tolist())

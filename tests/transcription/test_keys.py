@@ -1,0 +1,72 @@
+"""The fewest key frames, against all choices of keys on small problems."""
+
+from __future__ import annotations
+
+from itertools import combinations, pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from motionmind._typing import Bools, Ints
+from motionmind.transcription.keys import fewest_keys
+
+
+class Table:
+    """Whether each frame within each step is followed, drawn at random."""
+
+    def __init__(self, count: int, share: float, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        self.followed = rng.random((count, count, count)) < share
+        self.dear = rng.random(count) * (rng.random(count) < 0.7)
+
+    def __call__(self, start: Ints, end: Ints, at: Ints) -> Bools:
+        assert np.all((start < at) & (at < end))
+        return np.asarray(self.followed[start, end, at])
+
+    def follows(self, start: int, end: int, longest: int) -> bool:
+        if end - start == 1:
+            return True
+        return end - start <= longest and bool(self.followed[start, end, start + 1 : end].all())
+
+    def best(self, longest: int) -> tuple[int, float]:
+        """The fewest keys, and their least price, by trying all choices."""
+        count = len(self.dear)
+        choices = [
+            [0, *inner, count - 1] for size in range(count - 1) for inner in combinations(range(1, count - 1), size)
+        ]
+        return min(
+            (len(keys), float(self.dear[keys].sum()))
+            for keys in choices
+            if all(self.follows(a, b, longest) for a, b in pairwise(keys))
+        )
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.integers(2, 9), st.sampled_from([0.3, 0.8, 0.95, 1.0]), st.integers(1, 8), st.integers(0, 10**6))
+def test_no_choice_of_keys_is_better(count: int, share: float, longest: int, seed: int) -> None:
+    table = Table(count, share, seed)
+    keys = fewest_keys(count, longest, table, table.dear)
+    assert keys[0] == 0
+    assert keys[-1] == count - 1
+    assert np.all(np.diff(keys) > 0)
+    assert all(table.follows(a, b, longest) for a, b in pairwise(keys))
+    fewest, least = table.best(longest)
+    assert len(keys) == fewest
+    assert table.dear[keys].sum() == pytest.approx(least, abs=1e-9)
+
+
+def test_one_frame_is_one_key() -> None:
+    assert fewest_keys(1, 5, Table(1, 1.0, 0), np.zeros(1)).tolist() == [0]
+
+
+def test_steps_are_tested_in_parts() -> None:
+    """More starts than are tested together: a straight line with corners needs the corners alone."""
+    heights = np.interp(np.arange(700), [0, 90, 333, 500, 699], [0.0, 5.0, -3.0, 4.0, 4.0])
+
+    def follows(start: Ints, end: Ints, at: Ints) -> Bools:
+        share = (at - start) / (end - start)
+        return np.abs(heights[start] + share * (heights[end] - heights[start]) - heights[at]) < 1e-9
+
+    assert fewest_keys(700, 699, follows, np.zeros(700)).tolist() == [0, 90, 333, 500, 699]
