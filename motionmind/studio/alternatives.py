@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 from typing import Any, Literal
 
 import msgspec
@@ -17,8 +18,8 @@ from motionmind._typing import Floats
 from motionmind.body.motion import Motion, Posture
 from motionmind.corpus.corpus import Corpus
 from motionmind.display import displayed
-from motionmind.errors import NoPathError
-from motionmind.geometry import rotations as rot
+from motionmind.errors import MotionMindError
+from motionmind.studio.differences import describe_difference, describe_joints
 from motionmind.tween.certificate import Source
 from motionmind.tween.engine import Engine
 from motionmind.tween.headline import attestation, beyond, feet_staying
@@ -29,6 +30,12 @@ MAX_ALTERNATIVES = 4
 # seconds for a typical duration; with proofs they would take six.
 COST_GAP_RATIO = 0.06
 
+# Least share of states in which alternatives differ. On ten pairs of ballet's postures, the two most alike of four
+# differ by 2.3 degrees in a joint's mean if all follow the best passage, by 8.2 if each follows another one, and by 9.6
+# with FAR_SHARE; each pair of postures gives the same order.
+FAR_SHARE = 0.8
+
+Spread = Literal["near", "usual", "far"]
 How = Literal["seen", "waits", "new", "between"]
 
 
@@ -60,7 +67,8 @@ class Account(msgspec.Struct, frozen=True):
 
     Attributes:
         words: summary in one line.
-        differs: difference from the first alternative; "" for the first.
+        differs: difference from the first alternative in a dancer's words; "" for the first.
+        details: joints in which it differs most, in degrees; "" for the first, or if no difference is visible.
         sure: how close to optimal it is proven to be.
         usual: how usual the movement is.
         beyond: flaws that a viewer may notice, a line each.
@@ -69,20 +77,34 @@ class Account(msgspec.Struct, frozen=True):
 
     words: str
     differs: str
+    details: str
     sure: str
     usual: str
     beyond: list[str]
     joints: dict[str, list[Stretch]]
 
+    def line(self) -> str:
+        """Return the summary, the difference, how usual it is, and the flaws in one line."""
+        return "; ".join(part for part in (self.words, self.differs, self.usual, *self.beyond) if part)
 
-def find(engine: Engine, a: Posture, b: Posture, count: int = MAX_ALTERNATIVES, **options: Any) -> Iterator[Tween]:
+
+def find(
+    engine: Engine,
+    a: Posture,
+    b: Posture,
+    count: int = MAX_ALTERNATIVES,
+    spread: Spread = "usual",
+    **options: Any,
+) -> Iterator[Tween]:
     """Find distinct movements from `a` to `b`, the best first, each within `COST_GAP_RATIO` of the best of its kind.
 
     Args:
         engine: the engine of the corpus.
         a: start posture.
         b: end posture.
-        count: how many to find; there are fewer if no other movement differs enough.
+        count: how many to find; there are fewer if no other movement differs enough and lasts until the last reach.
+        spread: how far the others go from the best: "near" are variants of it, "usual" ones follow other passages of
+            the corpus, and "far" ones also differ in `FAR_SHARE` of their states.
         options: further arguments of `Engine.tween`.
 
     Raises:
@@ -90,15 +112,24 @@ def find(engine: Engine, a: Posture, b: Posture, count: int = MAX_ALTERNATIVES, 
         MotionMindError: an option is out of its range.
     """
     found = 0
+    options = {"within": COST_GAP_RATIO} | ({"differ": FAR_SHARE} if spread == "far" else {}) | options
     try:
-        for tween in engine.alternatives(a, b, count, within=COST_GAP_RATIO, **options):
+        for tween in (partial(_variants, engine) if spread == "near" else engine.alternatives)(a, b, count, **options):
             found += 1
             yield tween
             if tween.moves < 2:
                 return  # a single move cannot differ
-    except NoPathError:
+    except MotionMindError:
         if not found:
             raise
+
+
+def _variants(engine: Engine, a: Posture, b: Posture, count: int, **options: Any) -> Iterator[Tween]:
+    """Find the best movement and variants of it, which follow no other passage; see `find`."""
+    found: list[Tween] = []
+    while len(found) < count:
+        found.append(engine.tween(a, b, unlike=tuple(found), **options))
+        yield found[-1]
 
 
 def account(tween: Tween, corpus: Corpus, own: Floats, first: Motion | None = None) -> Account:
@@ -111,13 +142,24 @@ def account(tween: Tween, corpus: Corpus, own: Floats, first: Motion | None = No
         first: the movement that was found first; None if it is this alternative.
     """
     if tween.moves == 0:
-        return Account("no movement: both postures are the same", "", "proven the best", "", [], {})
+        return Account("no movement: both postures are the same", "", "", "proven the best", "", [], {})
     seconds = float(tween.motion.times[-1] - tween.motion.times[0])
-    words = "; ".join([f"{seconds:.1f} s", *feet_staying(tween.motion)])
-    differs = "" if first is None else _describe_difference(tween.motion, first)
+    words = "; ".join([f"{seconds:.1f} s", *_describe_reaches(tween), *feet_staying(tween.motion)])
+    differs, details = "", ""
+    if first is not None:
+        details = describe_joints(tween.motion, first)
+        differs = describe_difference(tween.motion, first) or (
+            "much like the first" if details else "almost the same as the first"
+        )
     flaws = [line.replace("_", " ") for line in beyond(tween)]
     return Account(
-        words, differs, _describe_optimality(tween), _describe_usualness(tween, own), flaws, _stretches(tween, corpus)
+        words,
+        differs,
+        details,
+        _describe_optimality(tween, first is not None),
+        _describe_usualness(tween, own),
+        flaws,
+        _stretches(tween, corpus),
     )
 
 
@@ -154,25 +196,18 @@ def _clip(source: Source, corpus: Corpus) -> str:
     return f"{origin}{displayed(source.clip)}" + (f" ({changes})" if changes else "")
 
 
-def _describe_difference(motion: Motion, first: Motion) -> str:
-    """Describe in which joints a movement differs most from the first, by how much, and when."""
-    same_share = np.rint(np.linspace(0.0, len(first) - 1, len(motion))).astype(np.intp)
-    degrees = np.degrees(rot.angle(motion.rotations, first.rotations[same_share]))
-    frame = int(degrees.max(axis=1).argmax())
-    most = [int(joint) for joint in np.argsort(-degrees[frame], kind="stable")[:2]]
-    named = [
-        f"{displayed(motion.skeleton.names[joint]).replace('_', ' ')} by {degrees[frame, joint]:.0f}°"
-        for joint in most
-        if degrees[frame, joint] >= 10.0  # smaller differences are hard to see
-    ]
-    if not named:
-        return "almost the same as the first"
-    return f"differs from the first: {' and '.join(named)} at {motion.times[frame] - motion.times[0]:.1f} s"
+def _describe_reaches(tween: Tween) -> list[str]:
+    """Describe how many of the places of hands and feet are met, and how closely; `beyond` lists the others."""
+    met, count = [100.0 * one.distance for one in tween.reached if one.is_met], len(tween.reached)
+    if not met:
+        return []
+    which = "the place" if count == 1 else f"{len(met)} of {count} places"
+    return [f"reaches {which} to {max(*met, 0.1):.1f} cm"]
 
 
-def _describe_optimality(tween: Tween) -> str:
+def _describe_optimality(tween: Tween, is_other: bool) -> str:
     """Describe how close to optimal an alternative is proven to be."""
-    best = "the best that differs this much" if tween.differs else "the best"
+    best = "the best that differs this much" if tween.differs else "the best of its kind" if is_other else "the best"
     if tween.status == "optimal":
         return f"proven {best}"
     percent = max(1, math.ceil(100.0 * (tween.cost / tween.lower_bound - 1.0) - 1e-6)) if tween.lower_bound > 0 else 100

@@ -13,14 +13,16 @@ from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 from starlette.routing import BaseRoute, Route
 
+from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.render.page import player_data
-from motionmind.studio.edits import Edit
+from motionmind.studio.edits import Edit, SetReference, each
+from motionmind.studio.guard import is_looking
 from motionmind.studio.movements import STORED
-from motionmind.studio.piece import MIRRORED
+from motionmind.studio.neighbours import MIRRORED
 from motionmind.studio.project import RefusedError
 from motionmind.studio.studio import Studio
-from motionmind.studio.thumbnails import THUMBNAIL_HEIGHT_PX, thumbnail
+from motionmind.studio.thumbnails import THUMBNAIL_HEIGHT_PX
 
 T = TypeVar("T")
 Window = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_-]{1,40}\Z")]
@@ -82,9 +84,13 @@ def routes(studio: Studio) -> list[BaseRoute]:
 def _project_routes(studio: Studio) -> list[BaseRoute]:
     async def project(request: Request) -> Response:
         window = window_of(request)
+        if is_looking(request.scope):
+            with studio.previewing():
+                return json(studio.look())
         if window != "-":
             studio.project.greet(window)
-        return json(studio.view(window))
+        with studio.previewing():
+            return json(studio.view(window))
 
     def written(window: str, write: Callable[[], None]) -> Response:
         """Write, then return the window's view of the project."""
@@ -96,6 +102,10 @@ def _project_routes(studio: Studio) -> list[BaseRoute]:
 
     async def edits(request: Request) -> Response:
         given = await body_of(request, Edited)
+        # Only this computer may choose a file of it, by /api/reference.
+        videos = {one.path for one in each(given.edit) if isinstance(one, SetReference)}
+        if videos - {"", studio.project.state.reference.path}:
+            return error("open the reference video first: an edit only shifts or removes the one in the piece", 409)
         return written(given.window, lambda: studio.project.edit(given.window, given.edit))
 
     async def undo(request: Request) -> Response:
@@ -124,13 +134,15 @@ def _project_routes(studio: Studio) -> list[BaseRoute]:
             asyncio.get_running_loop().call_later(_WINDOW_GONE_S, leave, window)
 
     async def events(request: Request) -> Response:
-        window = window_of(request)
-        first: dict[tuple[str, str], Any] = {("project", ""): {"sequence": studio.project.sequence}}
+        looks = is_looking(request.scope)
+        window = "-" if looks else window_of(request)
+        project = {"sequence": studio.project.sequence, "notices": len(studio.project.words)}
+        first: dict[tuple[str, str], Any] = {("project", ""): project}
         if studio.has_stopped:
             first["smoothing", ""] = {"stopped": True}
         first |= {("job", job.id): job.view() for job in studio.workers.jobs}
         headers = {"cache-control": "no-store"}
-        stream = watched(window, studio.events.open(first))
+        stream = watched(window, studio.events.open(first, is_looking=looks))
         return StreamingResponse(stream, headers=headers, media_type="text/event-stream")
 
     async def job(request: Request) -> Response:
@@ -153,15 +165,20 @@ def _project_routes(studio: Studio) -> list[BaseRoute]:
 
 
 def _movement_routes(studio: Studio) -> list[BaseRoute]:
-    drawing = asyncio.Lock()  # draw one picture at a time: it leaves a processor to the engine
+    def is_hidden(request: Request, key: str) -> bool:
+        return is_looking(request.scope) and not studio.has_shown(key)
 
     async def movement(request: Request) -> Response:
         key = request.path_params["key"]
+        if is_hidden(request, key):
+            return error(f"the piece has no movement {displayed(key)}", 404)
         try:
-            motion = studio.movements.get(key)
+            with studio.previewing():
+                motion = studio.movements.get(key)
         except MotionMindError as missing:
             return error(str(missing), 404)
-        answer = json(player_data(motion) | {"name": studio.movements.title(key)})
+        with studio.previewing():
+            answer = json(player_data(motion) | {"name": studio.movements.title(key)})
         if key.lstrip(MIRRORED).startswith(STORED):
             answer.headers["cache-control"] = FOREVER
         return answer
@@ -169,15 +186,16 @@ def _movement_routes(studio: Studio) -> list[BaseRoute]:
     async def picture(request: Request) -> Response:
         key, frame = request.path_params["key"], number(request.path_params["frame"], "a frame")
         height = number(request.query_params.get("height", str(THUMBNAIL_HEIGHT_PX)), "the height")
+        if is_hidden(request, key):
+            return error(f"the piece has no movement {displayed(key)}", 404)
         stable = studio.project.state.stable(key)
         try:
-            motion = studio.movements.get(stable)
+            with studio.previewing():
+                motion = studio.movements.get(stable)
         except MotionMindError as missing:
             return error(str(missing), 404)
-        if (drawn := studio.thumbnails.find(stable, frame, height)) is None:
-            async with drawing:
-                drawn = await asyncio.to_thread(thumbnail, motion, frame, height)
-            studio.thumbnails.hold(stable, frame, height, drawn)
+        with studio.previewing():  # which the thread inherits
+            drawn = await studio.thumbnails.draw(stable, motion, frame, height)
         lasting = FOREVER if stable == key and stable.lstrip("~").startswith("m-") else "private, max-age=60"
         return Response(drawn, media_type="image/png", headers={"cache-control": lasting})
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from motionmind.display import displayed
 from motionmind.studio.edits import Arrange, Block, Decide, Decision, Several
-from motionmind.studio.piece import Finding, Found
+from motionmind.studio.findings import Finding, Found
 from motionmind.studio.project import Project
 from motionmind.studio.seams import why_abrupt
 from motionmind.variation.seams import Candidate

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.studio.edits import Arrange, Block, Edit, Insert, SavePosture, Trim, Wish, each
-from motionmind.studio.piece import OWN, State, key_of
+from motionmind.studio.neighbours import OWN, key_of
+from motionmind.studio.piece import State
 from motionmind.studio.placement import Marks
 
 

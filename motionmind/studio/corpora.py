@@ -114,29 +114,39 @@ def _is_own(name: str, folder: Path, home: Path | None) -> bool:
         return False
 
 
-def sheet_of(corpus: Corpus) -> dict[str, Any]:
-    """Return a corpus's clips with the frames to show of each, and the corpus's origin."""
+def list_clips(corpus: Corpus, name: str) -> list[dict[str, Any]]:
+    """List the clips of the corpus of a name, each with its key, size and duration."""
     clips = []
     for clip in corpus.clips:
-        count = len(clip)
-        step = corpus.detail.shape[1] + 1 if count > 1 else 1  # frames from one posture to the next
-        postures = np.unique(np.linspace(0, count - 1, min(6, count)).round().astype(int))
         times = corpus.times[clip.start : clip.stop]
         clips.append(
             {
-                "key": f"{corpus.name}/{clip.label}",
-                "name": displayed(clip.label),
+                "key": f"{name}/{clip.label}",
+                "title": displayed(clip.label),
                 "about": displayed(clip.about, _MAX_TITLE_LENGTH),
-                "frames": (count - 1) * step + 1,
-                "seconds": round(float(times[-1] - times[0]), 2),
-                "pictures": (postures * step).tolist(),
+                "frames": (len(clip) - 1) * _frames_per_posture(corpus) + 1,
+                "seconds": float(times[-1] - times[0]),
             }
         )
+    return clips
+
+
+def _frames_per_posture(corpus: Corpus) -> int:
+    """Return the number of a recording's frames from one of the corpus's postures to the next."""
+    return int(corpus.detail.shape[1]) + 1
+
+
+def sheet_of(corpus: Corpus, name: str) -> dict[str, Any]:
+    """Return the clips of the corpus of a name with the frames to show of each, and the corpus's origin."""
+    clips = []
+    for clip, listed in zip(corpus.clips, list_clips(corpus, name), strict=True):
+        postures = np.unique(np.linspace(0, len(clip) - 1, min(6, len(clip))).round().astype(int))
+        clips.append(listed | {"pictures": (postures * _frames_per_posture(corpus)).tolist()})
     about = {
         key: displayed(str(getattr(corpus, key)), _MAX_TITLE_LENGTH) for key in ("title", "author", "source", "licence")
     }
     body = f"{len(corpus.skeleton)} joints"
-    return {"name": corpus.name, **about, "body": body, "postures": len(corpus), "rate": corpus.rate, "clips": clips}
+    return {"name": name, **about, "body": body, "postures": len(corpus), "rate": corpus.rate, "clips": clips}
 
 
 def check_lesson(lesson: Lesson, home: Path | None) -> None:

@@ -5,20 +5,25 @@ An edit is plain data; `motionmind.studio.piece` applies it and `motionmind.stud
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 
+from motionmind.studio.asks import MAX_INSERTION_S, Ask, Frame, Key, Name, Passing, Pin, Reach
+
 MAX_BLOCKS = 10_000  # in a piece
+MAX_HOLD_S = 3600.0
+MAX_PIECE_NOTES = 2_000
 
 Id = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.-]{1,40}\Z")]  # of a block
-Key = Annotated[str, msgspec.Meta(min_length=1, max_length=400)]  # of a movement
-Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
-Frame = Annotated[int, msgspec.Meta(ge=0, lt=2**31)]
 Decision = Literal["open", "locked", "discarded"]
-Hold = Literal["start", "end", "throughout", "place"]
-Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
+NoteKind = Literal["note", "marker", "section"]
+Seconds = Annotated[float, msgspec.Meta(ge=0.0, le=MAX_HOLD_S)]  # of a held posture
+Pace = Annotated[float, msgspec.Meta(ge=0.5, le=2.0)]  # of a stretch: 2 is twice as fast as recorded
+Repeats = Annotated[int, msgspec.Meta(ge=1, le=100)]  # of a stretch
+Tempo = Annotated[float, msgspec.Meta(ge=20.0, le=300.0)]  # counts a minute
+Counts = Annotated[int, msgspec.Meta(ge=2, le=16)]  # of a phrase: dancers count eights
 Place = str | tuple[str, str]  # touched by an edit: a block's id, or the ids on both sides of a seam
 
 
@@ -39,6 +44,9 @@ class Block(_Struct, frozen=True):
         first: first frame of the movement.
         last: last frame of the movement, inclusive, no less than `first`.
         mirrored: whether left and right are exchanged.
+        hold: seconds in which a posture, a block of one frame, stands still; 0 for a block of several.
+        pace: its speed, as a multiple of the recorded one.
+        repeats: how many times it plays; 1 for a posture.
     """
 
     id: Id
@@ -46,50 +54,31 @@ class Block(_Struct, frozen=True):
     first: Frame
     last: Frame
     mirrored: bool = False
+    hold: Seconds = 0.0
+    pace: Pace = 1.0
+    repeats: Repeats = 1
 
 
-class Passing(_Struct, frozen=True):
-    """A posture that an insertion passes through: a frame of a movement."""
-
-    posture: Key
-    frame: Frame = 0
-
-
-class Pin(_Struct, frozen=True):
-    """A hand or a foot that stays during an insertion: in its limb's posture, or in place in the room.
+class Note(_Struct, frozen=True):
+    """A text at a moment of the movement; it stays with the movement when the piece changes.
 
     Attributes:
-        joint: the joint at the limb's end.
-        hold: "start" if the limb keeps its posture of the start until the end, "end" if it takes its posture of the end
-            at once, "throughout" if both ends agree and it keeps its posture; "place" if the hand or foot keeps its
-            place in the room and the limb compensates.
-        begins: share of the insertion's time at which "place" begins.
-        ends: share at which it ends, more than `begins`.
+        id: its name in the project.
+        kind: "note" for a remark, "marker" for a place to go to, "section" for the name of all up to the next section.
+        text: its text, which may be empty only in a marker.
+        block: the block that it is in.
+        frame: a frame of the block's movement.
+        after: seconds after that frame.
+        author: who wrote it, if it came as a comment; "" for the project's own.
     """
 
-    joint: Name
-    hold: Hold = "start"
-    begins: Share = 0.0
-    ends: Share = 1.0
-
-    def __post_init__(self) -> None:
-        """Check that `begins` is less than `ends`."""
-        if self.begins >= self.ends:
-            raise ValueError(f"begins must be less than ends, not {self.begins:g} and {self.ends:g}")
-
-
-class Ask(_Struct, frozen=True):
-    """A request for a seam's insertion.
-
-    Attributes:
-        seconds: its duration; None leaves that to the engine.
-        passing: postures to pass through, in this order.
-        pins: hands and feet that stay.
-    """
-
-    seconds: Annotated[float, msgspec.Meta(gt=0.0, le=600.0)] | None = None
-    passing: Annotated[tuple[Passing, ...], msgspec.Meta(max_length=20)] = ()
-    pins: Annotated[tuple[Pin, ...], msgspec.Meta(max_length=20)] = ()
+    id: Id
+    kind: NoteKind
+    text: Annotated[str, msgspec.Meta(max_length=1_000)]
+    block: Id
+    frame: Frame
+    after: Annotated[float, msgspec.Meta(ge=0.0, le=600.0)] = 0.0
+    author: Annotated[str, msgspec.Meta(max_length=80)] = ""
 
 
 class Insert(_Edit, frozen=True):
@@ -101,11 +90,14 @@ class Insert(_Edit, frozen=True):
     last: Frame
     mirrored: bool = False
     before: Id | None = None
+    hold: Seconds = 0.0
+    pace: Pace = 1.0
+    repeats: Repeats = 1
 
     @property
     def block(self) -> Block:
         """The new block."""
-        return Block(self.id, self.source, self.first, self.last, self.mirrored)
+        return msgspec.convert({name: getattr(self, name) for name in Block.__struct_fields__}, Block)
 
 
 class Move(_Edit, frozen=True):
@@ -116,19 +108,41 @@ class Move(_Edit, frozen=True):
 
 
 class Trim(_Edit, frozen=True):
-    """Change the first and last frames of a block."""
+    """Change the first and last frames of a block; several frames are not held, and a single one does not repeat."""
 
     block: Id
     first: Frame
     last: Frame
 
 
+class HoldPosture(_Edit, frozen=True, tag="hold"):
+    """Hold a posture, a block of one frame, for some seconds."""
+
+    block: Id
+    seconds: Seconds
+
+
+class Play(_Edit, frozen=True):
+    """Change how fast a block plays, and how many times."""
+
+    block: Id
+    pace: Pace = 1.0
+    repeats: Repeats = 1
+
+
 class Split(_Edit, frozen=True):
-    """Cut a block in two; the second begins with the frame `at` and gets the new id."""
+    """Cut a block in two; the second begins with the frame `at` and gets the new id.
+
+    Of a block that repeats, cut the playing number `turn`, from 1. The playings before it keep the block's id: its
+    first half then gets the id `half`, and the playings after it, if any, get `rest`.
+    """
 
     block: Id
     at: Frame
     id: Id
+    turn: Repeats = 1
+    half: Id | None = None
+    rest: Id | None = None
 
 
 class Mirror(_Edit, frozen=True):
@@ -144,7 +158,10 @@ class Delete(_Edit, frozen=True):
 
 
 class Choose(_Edit, frozen=True):
-    """Choose one of the movements, counted from 1, that were found for the seam between two neighbours."""
+    """Choose one of the movements, counted from 1, that were found for the seam between two neighbours.
+
+    Here and below, a block that repeats is its own neighbour.
+    """
 
     left: Id
     right: Id
@@ -164,14 +181,15 @@ class Wish(_Edit, frozen=True, tag="ask"):
 
     left: Id
     right: Id
-    seconds: Annotated[float, msgspec.Meta(gt=0.0, le=600.0)] | None = None
+    seconds: Annotated[float, msgspec.Meta(gt=0.0, le=MAX_INSERTION_S)] | None = None
     passing: Annotated[tuple[Passing, ...], msgspec.Meta(max_length=20)] = ()
     pins: Annotated[tuple[Pin, ...], msgspec.Meta(max_length=20)] = ()
+    reaches: Annotated[tuple[Reach, ...], msgspec.Meta(max_length=20)] = ()
 
     @property
     def ask(self) -> Ask:
         """The request without its seam."""
-        return Ask(self.seconds, self.passing, self.pins)
+        return Ask(self.seconds, self.passing, self.pins, self.reaches)
 
 
 class Arrange(_Edit, frozen=True):
@@ -184,6 +202,36 @@ class Arrange(_Edit, frozen=True):
 
     blocks: Annotated[tuple[Block, ...], msgspec.Meta(max_length=MAX_BLOCKS)]
     about: dict[str, Any] = {}
+
+
+class Annotate(_Edit, frozen=True, tag="note"):
+    """Add a note, or replace the one with its id."""
+
+    note: Note
+
+
+class Erase(_Edit, frozen=True, tag="erase"):
+    """Delete a note."""
+
+    note: Id
+
+
+class SaveVersion(_Edit, frozen=True, tag="version"):
+    """Keep the piece as a version by name, or delete that version.
+
+    Attributes:
+        name: its name; a version of that name is replaced.
+        keep: whether to keep it.
+    """
+
+    name: Name
+    keep: bool = True
+
+
+class GoBack(_Edit, frozen=True):
+    """Replace the piece by a version of it."""
+
+    name: Name
 
 
 class SavePosture(_Edit, frozen=True, tag="posture"):
@@ -204,6 +252,20 @@ class SetCorpus(_Edit, frozen=True, tag="corpus"):
     name: Name
 
 
+class SetTempo(_Edit, frozen=True, tag="tempo"):
+    """Count the piece by another tempo."""
+
+    tempo: Tempo
+    counts: Counts = 8
+
+
+class SetReference(_Edit, frozen=True, tag="reference"):
+    """Show a video beside the piece, by its path, or none; `begins` is its time at the piece's start, seconds."""
+
+    path: Annotated[str, msgspec.Meta(max_length=4_096)] = ""
+    begins: Annotated[float, msgspec.Meta(ge=-36_000.0, le=36_000.0)] = 0.0
+
+
 class SetTitle(_Edit, frozen=True, tag="title"):
     """Rename the piece."""
 
@@ -214,6 +276,8 @@ Single: TypeAlias = (
     Insert
     | Move
     | Trim
+    | HoldPosture
+    | Play
     | Split
     | Mirror
     | Delete
@@ -221,8 +285,14 @@ Single: TypeAlias = (
     | Decide
     | Wish
     | Arrange
+    | Annotate
+    | Erase
+    | SaveVersion
+    | GoBack
     | SavePosture
     | SetCorpus
+    | SetReference
+    | SetTempo
     | SetTitle
 )
 
@@ -241,19 +311,6 @@ class Several(_Edit, frozen=True):
 
 Edit: TypeAlias = Single | Several
 
-_DESCRIPTIONS: Mapping[type, str] = {
-    Insert: "insert a stretch",
-    Move: "move a stretch",
-    Trim: "trim a stretch",
-    Split: "split a stretch",
-    Mirror: "mirror a stretch",
-    Delete: "delete a stretch",
-    Choose: "choose an insertion",
-    Wish: "change the wishes for an insertion",
-    SetCorpus: "change the corpus",
-    SetTitle: "rename the piece",
-}
-
 
 def each(edit: Edit) -> Iterator[Single]:
     """Yield the single edits that an edit consists of, in order."""
@@ -261,27 +318,6 @@ def each(edit: Edit) -> Iterator[Single]:
         yield from edit.edits
     else:
         yield edit
-
-
-def words_of(edit: Edit) -> str:
-    """Describe an edit in a few words, such as "delete a stretch".
-
-    >>> from motionmind.studio.edits import Delete, words_of
-    >>> words_of(Delete("b1"))
-    'delete a stretch'
-    """
-    match edit:
-        case Several(edits, words):
-            return words or words_of(edits[-1])
-        case Decide():
-            verb = {"open": "reopen", "locked": "lock", "discarded": "discard"}[edit.decision]
-            return f"{verb} an insertion"
-        case Arrange():
-            return str(edit.about.get("words", "")) or "rearrange the piece"
-        case SavePosture():
-            return f"{'delete' if edit.posture is None else 'save'} the posture {edit.name}"
-        case _:
-            return _DESCRIPTIONS[type(edit)]
 
 
 def touched(edit: Edit) -> frozenset[Place]:
@@ -294,18 +330,26 @@ def touched(edit: Edit) -> frozenset[Place]:
         match one:
             case Insert(id=new):
                 places.add(new)
-            case Split(block=block, id=new):
-                places |= {block, new}
-            case Move(block=block) | Trim(block=block) | Mirror(block=block) | Delete(block=block):
+            case Split(block=block, id=new, half=half, rest=rest):
+                places |= {block, new, *filter(None, (half, rest))}
+            case Move(block) | Trim(block) | HoldPosture(block) | Play(block) | Mirror(block) | Delete(block):
                 places.add(block)
             case Choose(left, right) | Decide(left, right) | Wish(left, right):
                 places.add((left, right))
             case Arrange(blocks=blocks):
                 places |= {block.id for block in blocks}
+            case Annotate(note=Note(id=name)) | Erase(note=name):
+                places.add(f"/note/{name}")
+            case SaveVersion(name=name) | GoBack(name=name):
+                places.add(f"/version/{name}")
             case SavePosture(name=name):
                 places.add(f"own/{name}")
             case SetCorpus():
                 places.add("/corpus")
+            case SetReference():
+                places.add("/reference")
+            case SetTempo():
+                places.add("/tempo")
             case SetTitle():
                 places.add("/title")
     return frozenset(places)

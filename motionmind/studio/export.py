@@ -35,6 +35,8 @@ _MEDIA_TYPES = {
     "bvh": "text/plain; charset=utf-8",
     "json": "application/json",
     "motionmind": "application/jsonl",
+    "pdf": "application/pdf",
+    "png": "image/png",
 }
 
 
@@ -83,11 +85,11 @@ def routes(studio: Studio) -> list[BaseRoute]:
         form = request.path_params["format"]
         title = studio.project.state.title
         if form == "project":
-            return _saved(studio.project.path.read_bytes(), file_name(title, "motionmind"))
+            return saved(studio.project.path.read_bytes(), file_name(title, "motionmind"))
         if form not in makers:
             raise MotionMindError(f"cannot export as {form!r:.20}{suggestion(form, list(makers))}")
         data = await run_in_threadpool(makers[form], composed(studio))
-        return _saved(data, file_name(title, form))
+        return saved(data, file_name(title, form))
 
     async def credit(_: Request) -> Response:
         sections = sections_of(ledger_of(await run_in_threadpool(credits_of, studio)))
@@ -107,8 +109,12 @@ def _written(motion: Motion, suffix: str) -> bytes:
         return path.read_bytes()
 
 
-def _saved(data: bytes, name: str) -> Response:
+def saved(data: bytes, name: str) -> Response:
     """Return a response that a browser saves as a file."""
+    return Response(data, media_type=_MEDIA_TYPES[name.rpartition(".")[2]], headers=saving_headers(name))
+
+
+def saving_headers(name: str) -> dict[str, str]:
+    """Return the headers by which a browser saves a response as a file of this name."""
     disposition = f"attachment; filename*=UTF-8''{quote(name, safe='')}"
-    media = _MEDIA_TYPES[name.rpartition(".")[2]]
-    return Response(data, media_type=media, headers={"Content-Disposition": disposition, "Cache-Control": "no-store"})
+    return {"Content-Disposition": disposition, "Cache-Control": "no-store"}

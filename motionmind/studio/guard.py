@@ -15,6 +15,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from starlette.exceptions import HTTPException
+from starlette.routing import compile_path
 
 from motionmind.display import printable
 from motionmind.errors import MotionMindError
@@ -26,8 +27,19 @@ Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]
 Application = Callable[[Message, Receive, Send], Awaitable[None]]
 
-ENTER_PATH = "/api/enter"
+ENTER_PATH, CHALLENGE_PATH, RENEW_PATH = "/api/enter", "/api/challenge", "/api/renew"
 _UPLOAD_PATH = "/api/imports"
+# The routes of the look-only link; all others are closed to it, and so are new ones.
+LOOKING = (
+    ("GET", "/api/project"),
+    ("GET", "/api/events"),
+    ("GET", "/api/movements/{key:path}"),
+    ("GET", "/api/thumbnails/{key:path}/{frame}.png"),
+    ("GET", "/api/credits"),
+    ("POST", "/api/comments"),
+)
+_LOOKING_PATTERNS = [(method, compile_path(path)[0]) for method, path in LOOKING]
+_IS_LOOKING = "motionmind.is_looking"  # in the scope of a request
 _SECURITY_HEADERS = {
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
@@ -45,6 +57,11 @@ def policy(*scripts: str) -> str:
         "connect-src 'self'; media-src 'self' blob:; font-src 'self'; base-uri 'none'; form-action 'none'; "
         "frame-ancestors 'none'"
     )
+
+
+def is_looking(scope: Message) -> bool:
+    """Return whether a request that the guard admitted came by the look-only link."""
+    return bool(scope.get(_IS_LOOKING, False))
 
 
 class TooLargeError(Exception):
@@ -113,7 +130,7 @@ class Guard:
         headers: dict[str, list[str]] = {}
         for name, value in scope["headers"]:
             headers.setdefault(name.decode("latin-1").lower(), []).append(value.decode("latin-1"))
-        return self._foreign(headers, scope["method"]) or self._unwelcome(headers, scope["path"])
+        return self._foreign(headers, scope["method"]) or self._unwelcome(headers, scope)
 
     def _foreign(self, headers: Mapping[str, list[str]], method: str) -> tuple[int, str] | None:
         """Return the fault of a request that may come from another page."""
@@ -131,15 +148,22 @@ class Guard:
             return 403, "requests that write need the headers Origin and X-MotionMind"
         return None
 
-    def _unwelcome(self, headers: Mapping[str, list[str]], path: str) -> tuple[int, str] | None:
-        """Return the fault of a request that is too large or not authorised."""
+    def _unwelcome(self, headers: Mapping[str, list[str]], scope: Message) -> tuple[int, str] | None:
+        """Return the fault of a request that is too large or not authorised; mark one of the look-only link."""
+        method, path = scope["method"], scope["path"]
         length = headers.get("content-length", ["0"])[0]
         most = _max_bytes(path)
         if not length.isascii() or not length.isdigit() or len(length) > 15 or int(length) > most:
             return 413, f"request too large: at most {most // 2**20} MB"
-        needs_cookie = path.startswith("/api/") and path != ENTER_PATH
-        if needs_cookie and not self._keys.is_let_in("; ".join(headers.get("cookie", [])), self._port):
+        needs_cookie = path.startswith("/api/") and path not in (ENTER_PATH, CHALLENGE_PATH, RENEW_PATH)
+        cookies = "; ".join(headers.get("cookie", []))
+        if not needs_cookie or self._keys.is_let_in(cookies, self._port):
+            return None
+        if not self._keys.is_looking(cookies, self._port):
             return 401, "open the studio at the address shown in the terminal"
+        if not any(method == allowed and pattern.match(path) for allowed, pattern in _LOOKING_PATTERNS):
+            return 403, "this link only lets you look and comment"
+        scope[_IS_LOOKING] = True
         return None
 
     def _is_own(self, host: str) -> bool:

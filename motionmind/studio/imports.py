@@ -125,4 +125,4 @@ def _recording(uploads: Uploads, upload: str, clip: int) -> Recording:
 def _sheet(name: str, home: Any) -> dict[str, Any]:
     from motionmind.learned import persistence
 
-    return sheet_of(persistence.load(known(name, home), home).corpus)
+    return sheet_of(persistence.load_corpus(known(name, home), home), name)

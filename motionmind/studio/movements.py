@@ -15,9 +15,12 @@ import hashlib
 from base64 import b64decode, b64encode
 from collections import OrderedDict
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from threading import Lock
+from typing import Any, cast
 
 import msgspec
 import numpy as np
@@ -28,13 +31,14 @@ from motionmind.body.motion import Insertion, Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store
 from motionmind.corpus.corpus import Corpus, Facing
-from motionmind.credits.credit import Credit, credit_clip
+from motionmind.credits.credit import Credit
 from motionmind.display import displayed
-from motionmind.errors import FormatError, MotionMindError, suggestion
+from motionmind.errors import MotionMindError, suggestion
 from motionmind.names.finding import Collection, open_collection
 from motionmind.names.spelling import Source
-from motionmind.studio.journal import Journal, Line
-from motionmind.studio.piece import MIRRORED, OWN
+from motionmind.studio.corpora import list_clips
+from motionmind.studio.journal import DamagedError, Journal, Line
+from motionmind.studio.neighbours import MIRRORED, OWN
 
 STORED = "m-"  # prefix of keys of movements stored in the project
 
@@ -149,11 +153,11 @@ class Movements:
         self.saved: Callable[[str], str] = _no_posture
 
     def take_in(self, line: Line) -> None:
-        """Register a line of the file that holds a movement; raise FormatError if it is damaged."""
+        """Register a line of the file that holds a movement; raise DamagedError if it is damaged."""
         try:
             found = msgspec.json.decode(line.data, type=MovementLine)
         except (ValueError, RecursionError) as error:
-            raise FormatError(f"is damaged: {error}", path=self._journal.path, line=line.number + 1) from error
+            raise DamagedError(f"is damaged: {error}", self._journal.path, line.number) from error
         self._kept[found.movement] = found.title, line.start, len(line.data)
 
     def get(self, key: str) -> Motion:
@@ -193,7 +197,7 @@ class Movements:
             MotionMindError: it cannot be written.
         """
         record = msgspec.json.encode(MotionRecord.of(motion))
-        key = STORED + hashlib.sha256(record).hexdigest()[:16]
+        key = _key_of(record)
         if key not in self._kept:
             title = displayed(title or motion.name or motion.skeleton.name)
             self.take_in(self._journal.append(MovementLine(key, title, msgspec.Raw(record))))
@@ -206,6 +210,10 @@ class Movements:
     def collection(self, corpus: str) -> Collection:
         """Return a corpus's clips and postures by name; raise MotionMindError if there is no such corpus."""
         return self._corpus(corpus).collection
+
+    def clips(self, corpus: str) -> list[dict[str, Any]]:
+        """List a corpus's clips, as `list_clips` does; composing them takes a few seconds the first time."""
+        return self._corpus(corpus).clips()
 
     def facing(self, corpus: str) -> Facing:
         """Return which way a corpus's dancers may face; "free" if there is no such corpus."""
@@ -221,6 +229,8 @@ class Movements:
         title, start, length = self._kept[key]
         try:
             line = msgspec.json.decode(self._journal.read(start, length), type=MovementLine)
+            if _key_of(line.motion) != key:
+                raise ValueError("its content has changed")
             record = msgspec.json.decode(line.motion, type=MotionRecord)
         except (ValueError, RecursionError) as error:
             raise MotionMindError(f"{self._journal.path}: movement {key} is damaged: {error}") from error
@@ -252,12 +262,20 @@ class _Corpus:
     def __init__(self, name: str, home: Path | None) -> None:
         self.collection = open_collection(Source(name, "corpus", name), home)
         self._name, self._home = name, home
+        self._loading, self._loaded = Lock(), cast("Corpus | None", None)
 
-    @cached_property
+    @property
     def _corpus(self) -> Corpus:
         from motionmind.learned import persistence  # numba is slow to import
 
-        return persistence.load(self._name, self._home).corpus
+        with self._loading:  # several threads may ask
+            if self._loaded is None:
+                self._loaded = persistence.load_corpus(self._name, self._home)
+        return self._loaded
+
+    def clips(self) -> list[dict[str, Any]]:
+        """List the clips; a corpus without any is not loaded."""
+        return list_clips(self._corpus, self._name) if self.collection.clips else []
 
     @cached_property
     def facing(self) -> Facing:
@@ -266,13 +284,11 @@ class _Corpus:
         return found
 
     def motion(self, name: str) -> Motion:
-        """Return a clip as recorded, or else a posture, credited to the corpus."""
-        try:
-            clip = self._corpus.clip_labelled(name)
-        except KeyError:
-            found = self.collection.find(name, as_clip=True)
-            return replace(found, recorded=(credit_clip(self._corpus.own_origin, name),))
-        return replace(self._corpus.recording(clip), name=name)
+        """Return a clip as recorded, or else a posture, which needs no clips."""
+        if name in self.collection.clips or name not in self.collection.postures:
+            with suppress(KeyError):
+                return replace(self._corpus.recording(self._corpus.clip_labelled(name)), name=name)
+        return self.collection.find(name, as_clip=True)
 
 
 def version_of(corpus: str, home: Path | None) -> str:
@@ -288,6 +304,11 @@ def version_of(corpus: str, home: Path | None) -> str:
             digest.update(f"{path.name}\0".encode())
             digest.update(hashlib.file_digest(file, "sha256").digest())
     return digest.hexdigest()[:16]
+
+
+def _key_of(record: bytes | msgspec.Raw) -> str:
+    """Return the key of a stored movement."""
+    return STORED + hashlib.sha256(record).hexdigest()[:16]
 
 
 def _bytes(motion: Motion) -> int:

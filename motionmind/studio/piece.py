@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 
@@ -20,18 +20,20 @@ from motionmind.errors import MotionMindError
 from motionmind.studio.edits import (
     MAX_BLOCKS,
     Arrange,
-    Ask,
     Block,
     Choose,
     Decide,
-    Decision,
     Delete,
     Edit,
+    HoldPosture,
     Insert,
     Mirror,
     Move,
+    Play,
     SavePosture,
     SetCorpus,
+    SetReference,
+    SetTempo,
     SetTitle,
     Single,
     Split,
@@ -39,105 +41,9 @@ from motionmind.studio.edits import (
     Wish,
     each,
 )
-
-OWN = "own/"  # prefix of keys of saved postures
-MIRRORED = "~"
-
-Pair = tuple[str, str]  # ids of the blocks before and after a seam
-
-
-class Verdict(msgspec.Struct, frozen=True):
-    """A choreographer's requests and decision at a seam.
-
-    Attributes:
-        ask: the request for its insertion.
-        chosen: number of the chosen insertion, counted from 1.
-        decision: a "locked" insertion does not change until it is unlocked; a "discarded" one is left out.
-        corpus: the corpus of a locked insertion, whatever the piece's is now; "" unless it is locked.
-    """
-
-    ask: Ask = Ask()
-    chosen: int = 1
-    decision: Decision = "open"
-    corpus: str = ""
-
-
-class End(msgspec.Struct, frozen=True):
-    """One side of a seam.
-
-    Attributes:
-        key: key of the movement, with `~` if it is mirrored.
-        frame: the frame at the seam.
-        moves: whether the body moves there; a block of one frame is a held posture.
-    """
-
-    key: str
-    frame: int
-    moves: bool
-
-
-class Found(msgspec.Struct, frozen=True):
-    """A movement that was found for a seam.
-
-    Attributes:
-        key: key of the movement.
-        seconds: its duration.
-        words: a description for choreographers.
-    """
-
-    key: str
-    seconds: float
-    words: str
-
-
-class Finding(msgspec.Struct, frozen=True):
-    """The engine's answer at a seam: a fact, which undo never removes.
-
-    Attributes:
-        finding: the hash of its question (`question_of`).
-        abrupt: whether the transition is abrupt for the corpus.
-        words: the reason, or the reason why nothing was found.
-        insertions: movements to insert, the best first; None before the search.
-    """
-
-    finding: str
-    abrupt: bool
-    words: str
-    insertions: tuple[Found, ...] | None
-
-
-class Seam(NamedTuple):
-    """A seam between two neighbours.
-
-    Attributes:
-        left: the block before it.
-        right: the block after it.
-        verdict: requests and decision.
-    """
-
-    left: Block
-    right: Block
-    verdict: Verdict
-
-    @property
-    def pair(self) -> Pair:
-        """The ids of both blocks."""
-        return self.left.id, self.right.id
-
-    @property
-    def goes_on(self) -> bool:
-        """Whether the movement continues as recorded or holds its posture, so that there is nothing to judge."""
-        one, other = self.left, self.right
-        return key_of(one) == key_of(other) and other.first - one.last in (0, 1)
-
-    @property
-    def ends(self) -> tuple[End, End]:
-        """Both sides: the end of the left block and the beginning of the right one."""
-        one, other = self.left, self.right
-        return (
-            End(key_of(one), one.last, one.last > one.first),
-            End(key_of(other), other.first, other.last > other.first),
-        )
+from motionmind.studio.neighbours import MIRRORED, OWN, Pair, Seam, Verdict
+from motionmind.studio.notes import Notes, follow
+from motionmind.studio.versions import Version, changed
 
 
 @dataclass(frozen=True)
@@ -152,6 +58,10 @@ class State:
         postures: keys of saved postures' movements, by name.
         used: ids of all blocks, past and present.
         about: origin of the present order, from `Arrange`.
+        notes, versions: the notes on it, by id, and versions of it, by name.
+        tempo: counts a minute.
+        counts: counts of a phrase.
+        reference: the video beside it.
     """
 
     title: str = ""
@@ -161,13 +71,23 @@ class State:
     postures: Mapping[str, str] = field(default_factory=dict)
     used: frozenset[str] = frozenset()
     about: Mapping[str, Any] = field(default_factory=dict)
+    notes: Notes = field(default_factory=dict)
+    versions: Mapping[str, Version] = field(default_factory=dict)
+    tempo: float = 120.0
+    counts: int = 8
+    reference: SetReference = field(default_factory=SetReference)
 
     @cached_property
     def seams(self) -> tuple[Seam, ...]:
-        """The seams in order, one fewer than blocks."""
+        """The seams in order: one after each block but the last, and before it one within each block that repeats."""
+        played = (block for block in self.blocks for _ in range(min(block.repeats, 2)))
         return tuple(
-            Seam(one, other, self.verdicts.get((one.id, other.id), Verdict())) for one, other in pairwise(self.blocks)
+            Seam(one, other, self.verdicts.get((one.id, other.id), Verdict())) for one, other in pairwise(played)
         )
+
+    @cached_property
+    def _by_pair(self) -> dict[Pair, Seam]:
+        return {seam.pair: seam for seam in self.seams}
 
     @cached_property
     def _places(self) -> dict[str, int]:
@@ -186,10 +106,11 @@ class State:
 
     def seam(self, left: str, right: str) -> Seam:
         """Return the seam between two neighbours; raise MotionMindError if they are not neighbours."""
-        place = self.place(left)
-        if self.place(right) != place + 1:
+        for name in (left, right):
+            self.place(name)
+        if (seam := self._by_pair.get((left, right))) is None:
             raise MotionMindError("these two stretches are no longer neighbours")
-        return self.seams[place]
+        return seam
 
     def stable(self, key: str) -> str:
         """Return the key of the movement that now holds a saved posture; other keys unchanged.
@@ -206,11 +127,6 @@ class State:
         return mark + self.postures[name]
 
 
-def key_of(block: Block) -> str:
-    """Return the key of the movement that a block shows, with `~` if it is mirrored."""
-    return MIRRORED + block.source if block.mirrored else block.source
-
-
 def apply(state: State, edit: Edit) -> State:
     """Return the state after an edit.
 
@@ -223,12 +139,17 @@ def apply(state: State, edit: Edit) -> State:
     >>> [(block.id, block.first, block.last) for block in apply(state, Split("b1", 10, "b2")).blocks]
     [('b1', 0, 9), ('b2', 10, 40)]
     """
-    return reduce(_apply, each(edit), state)
+    return reduce(_followed, each(edit), state)
 
 
 def apply_all(edits: Iterable[Edit], state: State | None = None) -> State:
     """Return the state after several edits of `state` or of the empty project; raise the errors of `apply`."""
     return reduce(apply, edits, state or State())
+
+
+def _followed(state: State, edit: Single) -> State:
+    after = _apply(state, edit)
+    return replace(after, notes=follow(after.notes, state.blocks, after.blocks))
 
 
 def _apply(state: State, edit: Single) -> State:  # noqa: PLR0911 (one case an edit)
@@ -243,9 +164,19 @@ def _apply(state: State, edit: Single) -> State:  # noqa: PLR0911 (one case an e
             return _moved(state, edit)
         case Trim(block=name, first=first, last=last):
             block = state.block(name)
-            trimmed = _checked(state, msgspec.structs.replace(block, first=first, last=last))
-            reset = _forget_ends(state, block, begins=first != block.first, ends=last != block.last)
-            return _put(reset, trimmed)
+            time: dict[str, Any] = {"repeats": 1} if first == last else {"hold": 0.0}
+            trimmed = _checked(state, msgspec.structs.replace(block, first=first, last=last, **time))
+            return _put(_forget_ends(state, block, begins=first != block.first, ends=last != block.last), trimmed)
+        case HoldPosture(name, seconds):
+            block = state.block(name)
+            held = _checked(state, msgspec.structs.replace(block, hold=seconds))
+            at_rest = (held.hold > 0.0) != (block.hold > 0.0)  # its insertions then begin and end at rest
+            return _put(_forget_ends(state, block, begins=at_rest, ends=at_rest), held)
+        case Play(name, pace, repeats):
+            block = state.block(name)
+            played = _checked(state, msgspec.structs.replace(block, pace=pace, repeats=repeats))
+            is_other = pace != block.pace
+            return _put(_forget_ends(state, block, begins=is_other, ends=is_other), played)
         case Split():
             return _split(state, edit)
         case Mirror(name):
@@ -256,16 +187,18 @@ def _apply(state: State, edit: Single) -> State:  # noqa: PLR0911 (one case an e
             place = state.place(name)
             return replace(state, blocks=state.blocks[:place] + state.blocks[place + 1 :])
         case Choose(left, right, alternative):
-            verdict = _open(state.seam(left, right))
-            return _judged(state, (left, right), Verdict(verdict.ask, alternative))
+            chosen = Verdict(_open(state.seam(left, right)).ask, alternative)
+            return replace(state, verdicts={**state.verdicts, (left, right): chosen})
         case Decide(left, right, decision):
             verdict = state.seam(left, right).verdict
             corpus = (verdict.corpus or state.corpus) if decision == "locked" else ""
-            return _judged(state, (left, right), Verdict(verdict.ask, verdict.chosen, decision, corpus))
+            decided = Verdict(verdict.ask, verdict.chosen, decision, corpus)
+            return replace(state, verdicts={**state.verdicts, (left, right): decided})
         case Wish(left=left, right=right):
             _open(state.seam(left, right))
             passing = tuple(msgspec.structs.replace(one, posture=state.stable(one.posture)) for one in edit.ask.passing)
-            return _judged(state, (left, right), Verdict(msgspec.structs.replace(edit.ask, passing=passing)))
+            wished = Verdict(msgspec.structs.replace(edit.ask, passing=passing))
+            return replace(state, verdicts={**state.verdicts, (left, right): wished})
         case Arrange(given, about):
             blocks = tuple(_checked(state, block) for block in given)
             names = {block.id for block in blocks}
@@ -279,8 +212,14 @@ def _apply(state: State, edit: Single) -> State:  # noqa: PLR0911 (one case an e
             return _saved(state, name, posture)
         case SetCorpus(name):
             return replace(state, corpus=name)
+        case SetReference():
+            return replace(state, reference=edit)
+        case SetTempo(tempo, counts):
+            return replace(state, tempo=tempo, counts=counts)
         case SetTitle(title):
             return replace(state, title=title)
+        case _:
+            return replace(state, **changed(state, edit))
 
 
 def arranged(state: State, blocks: tuple[Block, ...]) -> State:
@@ -301,9 +240,13 @@ def arranged(state: State, blocks: tuple[Block, ...]) -> State:
 
 
 def _checked(state: State, block: Block) -> Block:
-    """Return the block with a stable source; raise MotionMindError if it ends before it begins."""
+    """Return the block with a stable source; raise MotionMindError if it ends before it begins, or cannot be held."""
     if block.first > block.last:
         raise MotionMindError(f"a stretch cannot end before it begins: frames {block.first} to {block.last}")
+    if block.hold and block.first < block.last:
+        raise MotionMindError(f"only a posture can be held: this stretch has frames {block.first} to {block.last}")
+    if block.repeats > 1 and block.first == block.last:
+        raise MotionMindError("a posture cannot repeat: hold it for longer")
     source, mirrored = state.stable(block.source), block.mirrored
     if source.startswith(MIRRORED):
         source, mirrored = source[1:], not mirrored
@@ -336,23 +279,42 @@ def _moved(state: State, edit: Move) -> State:
 def _split(state: State, edit: Split) -> State:
     place = state.place(edit.block)
     block = state.blocks[place]
-    _check_new(state, edit.id)
     if not block.first < edit.at <= block.last:
         raise MotionMindError(f"cannot split at frame {edit.at}: the stretch has frames {block.first} to {block.last}")
-    one = msgspec.structs.replace(block, last=edit.at - 1)
-    other = msgspec.structs.replace(block, first=edit.at, id=edit.id)
-    blocks = _check_count((*state.blocks[:place], one, other, *state.blocks[place + 1 :]))
-    # The verdict on the seam at the block's end moves with that end.
+    if edit.turn > block.repeats:
+        raise MotionMindError(f"cannot split playing {edit.turn}: the stretch plays {block.repeats} times")
+    once, after = msgspec.structs.replace(block, repeats=1), block.repeats - edit.turn
+    half, rest = edit.half if edit.turn > 1 else block.id, edit.rest if after else edit.id
+    if half is None or rest is None:
+        raise MotionMindError("to split a stretch that repeats, give new ids to its other playings")
+    cut = [
+        *([msgspec.structs.replace(block, repeats=edit.turn - 1)] if edit.turn > 1 else []),
+        msgspec.structs.replace(once, id=half, last=edit.at - 1),
+        msgspec.structs.replace(once, id=edit.id, first=edit.at),
+        *([msgspec.structs.replace(block, id=rest, repeats=after)] if after else []),
+    ]
+    blocks = _check_count((*state.blocks[:place], *cut, *state.blocks[place + 1 :]))
+    names = [one.id for one in cut if one.id != block.id]
+    for number, name in enumerate(names):
+        _check_new(state, name)
+        if name in names[:number]:
+            raise MotionMindError(f"id {displayed(name)} is taken: a new stretch needs a new id")
+    # The verdict on the seam at the block's end moves with that end; that on its repeats holds at each of them.
+    again = block.id, block.id
     verdicts = {
-        (edit.id if left == block.id else left, right): verdict for (left, right), verdict in state.verdicts.items()
+        (rest if left == block.id else left, right): verdict
+        for (left, right), verdict in state.verdicts.items()
+        if (left, right) != again
     }
-    return replace(state, blocks=blocks, verdicts=verdicts, used=state.used | {edit.id})
+    if (verdict := state.verdicts.get(again)) is not None:
+        played = (one.id for one in cut for _ in range(min(one.repeats, 2)))
+        verdicts |= dict.fromkeys(set(pairwise(played)) - {(half, edit.id)}, verdict)
+    return replace(state, blocks=blocks, verdicts=verdicts, used=state.used | set(names))
 
 
 def _put(state: State, block: Block) -> State:
     """Replace the block that has the same id."""
-    place = state.place(block.id)
-    return replace(state, blocks=(*state.blocks[:place], block, *state.blocks[place + 1 :]))
+    return replace(state, blocks=tuple(block if one.id == block.id else one for one in state.blocks))
 
 
 def _forget_ends(state: State, block: Block, *, begins: bool, ends: bool) -> State:
@@ -376,10 +338,6 @@ def _open(seam: Seam) -> Verdict:
     if seam.verdict.decision == "locked":
         raise MotionMindError("this would change a locked insertion: unlock it first")
     return seam.verdict
-
-
-def _judged(state: State, pair: Pair, verdict: Verdict) -> State:
-    return replace(state, verdicts={**state.verdicts, pair: verdict})
 
 
 def _saved(state: State, name: str, posture: str | None) -> State:

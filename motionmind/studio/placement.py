@@ -8,7 +8,7 @@ and `performance` joins them into one movement.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import cos, sin
 from typing import NamedTuple
@@ -16,12 +16,15 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
+from motionmind._typing import Floats, Ints
 from motionmind.body.motion import Motion
 from motionmind.corpus.corpus import Facing
 from motionmind.credits.credit import add_up
 from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.geometry import rotations as rot
-from motionmind.studio.piece import Seam, State, key_of
+from motionmind.studio.edits import Block
+from motionmind.studio.neighbours import Seam, key_of
+from motionmind.studio.piece import State
 from motionmind.variation.piece import LONE_POSTURE_S, Parts, Placement
 
 Movements = Callable[[str], Motion]  # returns a movement by key; raises MotionMindError if there is none
@@ -48,7 +51,7 @@ class Part(msgspec.Struct, frozen=True):
         first: its first frame.
         last: its last frame, inclusive.
         at: when it begins in the piece, seconds.
-        seconds: its duration.
+        seconds: its duration; its frames are spread over it in proportion to their own times, a single one is held.
         place: x and z of the shift after the turn, metres.
         turn: rotation about the vertical, radians.
         inserted: whether it is an insertion.
@@ -140,22 +143,20 @@ class Layout(NamedTuple):
     """A piece's parts.
 
     Attributes:
-        blocks: one for each block, in order.
-        insertions: one for each seam, in order; None if nothing is inserted.
+        parts: all of them, in order of time.
+        blocks: one for each block, in order: its first, if it repeats.
+        ends: when each block ends, with its repeats, seconds.
+        insertions: one for each seam, in order, the first of a block that repeats; None if nothing is inserted.
+        gaps: when each seam begins and ends, seconds; likewise.
         seconds: duration of the piece.
     """
 
+    parts: tuple[Part, ...]
     blocks: tuple[Part, ...]
+    ends: tuple[float, ...]
     insertions: tuple[Part | None, ...]
+    gaps: tuple[tuple[float, float], ...]
     seconds: float
-
-    @property
-    def parts(self) -> Iterator[Part]:
-        """All parts in order of time."""
-        for place, block in enumerate(self.blocks):
-            yield block
-            if place < len(self.insertions) and (insertion := self.insertions[place]) is not None:
-                yield insertion
 
 
 def lay_out(state: State, insertion: Callable[[Seam], str | None], marks: Marks) -> Layout:
@@ -167,49 +168,62 @@ def lay_out(state: State, insertion: Callable[[Seam], str | None], marks: Marks)
         marks: marks of the movements.
     """
     turns = bool(state.blocks) and marks.facing(state.corpus) == "free"
+    parts: list[Part] = []
     blocks: list[Part] = []
+    ends: list[float] = []
     insertions: list[Part | None] = []
+    gaps: list[tuple[float, float]] = []
     for place, block in enumerate(state.blocks):
-        if place == 0:
-            blocks.append(_part(marks, key_of(block), block.first, block.last, 0.0, (0.0, 0.0), 0.0))
-            continue
-        seam, before = state.seams[place - 1], blocks[-1]
-        end = before.at + before.seconds
-        if seam.goes_on:
-            at = end + (marks.step(before.key, before.last) if block.first > before.last else 0.0)
-            insertions.append(None)
-            blocks.append(_part(marks, before.key, block.first, block.last, at, before.place, before.turn))
-            continue
-        key = insertion(seam)
-        if key is None:
-            insertions.append(None)
-            end += marks.step(before.key, before.last)
-        else:
-            before = _following(marks, before, key, (0, marks.length(key) - 1), end, turns, inserted=True)
-            insertions.append(before)
-            end += before.seconds
-        blocks.append(_following(marks, before, key_of(block), (block.first, block.last), end, turns))
-    length = blocks[-1].at + blocks[-1].seconds if blocks else 0.0
-    return Layout(tuple(blocks), tuple(insertions), length)
+        for number in range(block.repeats):
+            if not parts:
+                parts.append(Part(key_of(block), block.first, block.last, 0.0, _seconds(marks, block), (0.0, 0.0), 0.0))
+            else:
+                left = block if number else state.blocks[place - 1]
+                seam = state.seam(left.id, block.id)
+                joined = _joined(marks, parts[-1], seam, insertion(seam), turns)
+                if number < 2:  # all repeats have the same seam
+                    insertions.append(joined[0] if len(joined) > 1 else None)
+                    gaps.append((parts[-1].at + parts[-1].seconds, joined[-1].at))
+                parts += joined
+            if number == 0:
+                blocks.append(parts[-1])
+        ends.append(parts[-1].at + parts[-1].seconds)
+    return Layout(tuple(parts), tuple(blocks), tuple(ends), tuple(insertions), tuple(gaps), ends[-1] if ends else 0.0)
 
 
-def _part(marks: Marks, key: str, first: int, last: int, at: float, place: tuple[float, float], turn: float) -> Part:
-    seconds = marks.at(key, last).time - marks.at(key, first).time
-    return Part(key, first, last, at, seconds, place, turn)
+def _seconds(marks: Marks, block: Block) -> float:
+    """Return how long a block plays once."""
+    key = key_of(block)
+    return (marks.at(key, block.last).time - marks.at(key, block.first).time) / block.pace + block.hold
+
+
+def _joined(marks: Marks, before: Part, seam: Seam, key: str | None, turns: bool) -> list[Part]:
+    """Return the parts that follow another one: the insertion at a seam, if `key` names its movement, and the block."""
+    block, seconds = seam.right, _seconds(marks, seam.right)
+    end = before.at + before.seconds
+    step = marks.step(before.key, before.last) / (seam.ends[0].pace or 1.0)
+    if seam.goes_on:
+        at = end + (step if block.first > before.last else 0.0)
+        return [Part(before.key, block.first, block.last, at, seconds, before.place, before.turn)]
+    if key is None:
+        return [_following(marks, before, key_of(block), (block.first, block.last), end + step, seconds, turns)]
+    frames = 0, marks.length(key) - 1
+    length = marks.at(key, frames[1]).time - marks.at(key, 0).time
+    found = msgspec.structs.replace(_following(marks, before, key, frames, end, length, turns), inserted=True)
+    after = _following(marks, found, key_of(block), (block.first, block.last), end + length, seconds, turns)
+    return [found, after]
 
 
 def _following(
-    marks: Marks, before: Part, key: str, frames: tuple[int, int], at: float, turns: bool, *, inserted: bool = False
+    marks: Marks, before: Part, key: str, frames: tuple[int, int], at: float, seconds: float, turns: bool
 ) -> Part:
     """Place a part where another one ends, turned to its heading if `turns`."""
-    first, last = frames
-    end, begin = marks.at(before.key, before.last), marks.at(key, first)
+    end, begin = marks.at(before.key, before.last), marks.at(key, frames[0])
     turn = before.turn + end.heading - begin.heading if turns else 0.0
     x, z = _turned(end.x, end.z, before.turn)
     own_x, own_z = _turned(begin.x, begin.z, turn)
     place = before.place[0] + x - own_x, before.place[1] + z - own_z
-    part = _part(marks, key, first, last, at, place, turn)
-    return msgspec.structs.replace(part, inserted=True) if inserted else part
+    return Part(key, *frames, at, seconds, place, turn)
 
 
 def _turned(x: float, z: float, angle: float) -> tuple[float, float]:
@@ -245,20 +259,34 @@ def performance(parts: Sequence[Part], movement: Movements) -> Motion:
         if part.last >= len(motion):
             raise MotionMindError(f"{part.key} has no frame {part.last}: its frames are 0 to {len(motion) - 1}")
         check_body(parts[0].key, whole, part.key, motion)
-        begin, stop = part.first, part.last + 1
+        frames, times = _played(part, motion)
+        first, last = motion.times[part.first], motion.times[part.last]
+        marks = [
+            replace(one, times=np.interp(one.times, motion.times[frames], times))
+            for one in motion.insertions
+            if first <= one.times[0] and one.times[-1] <= last
+        ]
+        shown = slice(None)
         if part.inserted:
-            begin, stop = begin + 1, stop - 1  # its end frames repeat the neighbours' postures
+            shown = slice(1, -1)  # its end frames repeat the neighbours' postures
         elif place and _repeats(parts[place - 1], part):
-            begin += 1
-        clock = part.at - float(motion.times[part.first])
-        shift = np.array([part.place[0], 0.0, part.place[1]])
-        frames = slice(begin, stop)
-        times = motion.times[part.first], motion.times[part.last]
-        marks = [one for one in motion.insertions if times[0] <= one.times[0] and one.times[-1] <= times[1]]
-        where = Placement(part.turn, shift)
+            shown = slice(1, None)
+        where = Placement(part.turn, np.array([part.place[0], 0.0, part.place[1]]))
+        frames = frames[shown]
         joined.frames.append(np.arange(0))
-        joined.add(motion.rotations[frames], motion.root[frames], motion.times[frames], marks, where, clock)
+        joined.add(motion.rotations[frames], motion.root[frames], times[shown], marks, where, 0.0)
     return joined.join(whole).motion
+
+
+def _played(part: Part, motion: Motion) -> tuple[Ints, Floats]:
+    """Return the frames of a part [T], a held one twice, and when they come, seconds [T]."""
+    frames = np.arange(part.first, part.last + 1)
+    own = motion.times[frames] - motion.times[part.first]
+    if len(frames) > 1:
+        return frames, part.at + part.seconds * (own / own[-1])
+    if part.seconds > 0.0:
+        return np.repeat(frames, 2), part.at + np.array([0.0, part.seconds])
+    return frames, part.at + own
 
 
 def _repeats(before: Part, part: Part) -> bool:

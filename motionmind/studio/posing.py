@@ -17,7 +17,8 @@ from motionmind.body.motion import Posture
 from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.studio.api import body_of, error, json
-from motionmind.studio.edits import Frame, Key
+from motionmind.studio.asks import Frame, Key
+from motionmind.studio.balance import balance_of
 from motionmind.studio.handles import handles_of, mirror, turned, turns_of, words_of
 from motionmind.studio.known import Memory
 from motionmind.studio.reach import drag, put_on_floor, standing_feet
@@ -174,6 +175,7 @@ class Poser:
             "root": posture.root.tolist(),
             "standing": standing_feet(posture),
             "corpus": self._studio.project.state.corpus,
+            "balance": balance_of(posture),
         }
         memory = self._memory()
         out["known"] = memory.known(posture) if memory.fits(posture) else []

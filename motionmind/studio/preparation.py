@@ -39,7 +39,6 @@ def _duration(seconds: float) -> str:
     """Return a rough duration in words."""
     if seconds < 10:
         return "a few seconds"
-    if seconds <= 60:
+    if seconds <= 90:
         return f"about {10 * ceil(seconds / 10)} s"
-    minutes = ceil(seconds / 60)
-    return f"about {minutes} minutes"
+    return f"about {ceil(seconds / 30) / 2:g} minutes"

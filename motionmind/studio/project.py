@@ -2,46 +2,36 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Self
 
 from motionmind.display import displayed
-from motionmind.errors import FormatError, MotionMindError, enumerated
+from motionmind.errors import MotionMindError, enumerated
 from motionmind.studio import piece
 from motionmind.studio.checks import check_movements, check_names, corpora_of, missing_in
-from motionmind.studio.edits import Edit, SetCorpus, Wish, touched, words_of
-from motionmind.studio.journal import Journal
+from motionmind.studio.edit_words import words_of
+from motionmind.studio.edits import Edit, SetCorpus, Wish, touched
+from motionmind.studio.findings import Finding, Found
+from motionmind.studio.journal import DamagedError, Journal
 from motionmind.studio.movements import Movements, version_of
-from motionmind.studio.piece import End, Finding, Found, Pair, Seam, State
+from motionmind.studio.neighbours import OWN, End, Pair, Seam
+from motionmind.studio.notes import COMMENTS
+from motionmind.studio.piece import State
 from motionmind.studio.placement import Marks
 from motionmind.studio.questions import question_of
-from motionmind.studio.records import Corpora, EditLine, Head, RedoLine, UndoLine, decode_line
+from motionmind.studio.records import Change, Corpora, EditLine, Head, RedoLine, UndoLine, decode_line
 from motionmind.studio.view import chosen_at
+
+_log = logging.getLogger(__name__)
 
 _N_CHANGES_PER_STATE = 16  # edits between remembered states, so that an undo need not replay all edits
 
 
 class RefusedError(MotionMindError):
     """An edit cannot be applied to the present state; nothing has changed."""
-
-
-@dataclass
-class Change:
-    """An edit of the project.
-
-    Attributes:
-        number: its number; numbers increase.
-        edit: the edit.
-        window: the window that made it.
-        undone: whether it is undone.
-    """
-
-    number: int
-    edit: Edit
-    window: str
-    undone: bool = False
 
 
 class Project:
@@ -52,7 +42,7 @@ class Project:
         marks: marks of the movements.
         state: the state after its edits.
         versions: the version of each corpus that it uses.
-        words: notices from its opening, such as that a corpus has changed.
+        words: notices, such as that a corpus has changed.
     """
 
     def __init__(self, journal: Journal, home: Path | None = None) -> None:
@@ -73,7 +63,10 @@ class Project:
         self.state = State()
         if journal.dropped:
             self.words.append("the last edit was lost: the studio ended while writing it")
-        self._read()
+        written = self._read()
+        journal.mend()
+        journal.told = self.notice
+        self._check_corpora(written)
 
     @classmethod
     def create(cls, path: Path, corpus: str, home: Path | None = None, title: str = "") -> Self:
@@ -97,7 +90,8 @@ class Project:
         """Open a project.
 
         Raises:
-            FormatError: the file is not a project, or damaged.
+            DamagedError: a line of the file is damaged.
+            FormatError: it is not a project's file, or of another version.
             MotionMindError: it is open elsewhere.
         """
         journal = Journal.open(path)
@@ -117,6 +111,11 @@ class Project:
         return self._journal.path
 
     @property
+    def saved(self) -> float:
+        """The time at which the file was last written, in seconds since 1970."""
+        return self._journal.saved
+
+    @property
     def sequence(self) -> int:
         """A number that grows with each line of the file."""
         return self._journal.count
@@ -126,13 +125,22 @@ class Project:
         """All edits in order, with the undone ones."""
         return tuple(self._changes)
 
-    def tell(self, address: str) -> None:
-        """Note the address at which the project is open."""
-        self._journal.tell(address)
-
     def subscribe(self, callback: Callable[[], None]) -> None:
         """Call a function after each edit, undo, redo and finding."""
         self._subscribers.append(callback)
+
+    def notice(self, words: str) -> None:
+        """Show a notice on the terminal and in all windows."""
+        if words not in self.words:
+            self.words.append(words)
+            _log.warning(words)
+            self._changed()
+
+    def withdraw(self, words: str) -> None:
+        """Withdraw a notice, which no longer holds."""
+        if words in self.words:
+            self.words.remove(words)
+            self._changed()
 
     @property
     def missing(self) -> list[str]:
@@ -173,12 +181,18 @@ class Project:
         passed = [(one.posture, one.frame) for one in seam.verdict.ask.passing]
         return not (self.movements.has(self.corpus_at(seam)) and all(self.marks.has(*at) for at in ends + passed))
 
-    def keep_finding(self, finding: Finding) -> None:
-        """Store a finding; raise MotionMindError if it cannot be written."""
-        if self._findings.get(finding.finding) != finding:
-            self._journal.append(finding)
-            self._findings[finding.finding] = finding
+    def keep_finding(self, finding: Finding) -> Finding:
+        """Store a finding with the earlier insertions of its question, and return both as one.
+
+        Raises:
+            MotionMindError: it cannot be written.
+        """
+        earlier = self._findings.get(finding.finding)
+        if (whole := finding.after(earlier)) != earlier:
+            self._journal.append(whole)
+            self._findings[finding.finding] = whole
             self._changed()
+        return whole
 
     # --- edits ------------------------------------------------------------------------------------------------------
 
@@ -261,7 +275,7 @@ class Project:
 
     def _last(self, window: str) -> Change | None:
         """Return the last change that a window may undo: its own, or one of a window that is not open."""
-        mine = (one for one in reversed(self._changes) if not one.undone)
+        mine = (one for one in reversed(self._changes) if not one.undone and one.window != COMMENTS)
         return next((one for one in mine if one.window == window or one.window not in self._windows), None)
 
     def _without_conflict(self, change: Change, *, undone: bool) -> State:
@@ -309,8 +323,8 @@ class Project:
 
     # --- the file ---------------------------------------------------------------------------------------------------
 
-    def _read(self) -> None:
-        """Read all lines, apply the edits, and compare the corpora with those on record."""
+    def _read(self) -> dict[str, str]:
+        """Read all lines, apply the edits, and return the corpora's versions on record."""
         changes: dict[int, Change] = {}
         written: dict[str, str] = {}
         start = State()
@@ -318,7 +332,7 @@ class Project:
             try:
                 record = decode_line(line.data)
             except (ValueError, RecursionError) as error:
-                raise FormatError(f"is damaged: {error}", path=self.path, line=line.number + 1) from error
+                raise DamagedError(f"is damaged: {error}", self.path, line.number) from error
             match record:
                 case Head():
                     start = State(title=record.title, corpus=record.corpus)
@@ -334,8 +348,7 @@ class Project:
                     self._redoable.pop(record.window, None)
                 case UndoLine(undo=number, window=window) | RedoLine(redo=number, window=window):
                     if (change := changes.get(number)) is None:
-                        message = f"is damaged: there is no edit {number}"
-                        raise FormatError(message, path=self.path, line=line.number + 1)
+                        raise DamagedError(f"is damaged: there is no edit {number}", self.path, line.number)
                     change.undone = isinstance(record, UndoLine)
                     stack = self._redoable.setdefault(window, [])
                     if change.undone:
@@ -344,7 +357,7 @@ class Project:
                         stack.remove(change)
         self._changes = list(changes.values())
         self._apply_all(start)
-        self._check_corpora(written)
+        return written
 
     def _apply_all(self, state: State) -> None:
         self._states = [state]
@@ -352,7 +365,7 @@ class Project:
             try:
                 state = state if one.undone else piece.apply(state, one.edit)
             except MotionMindError as error:
-                raise FormatError(f"is damaged: {error}", path=self.path, line=one.number + 1) from error
+                raise DamagedError(f"is damaged: {error}", self.path, one.number) from error
             if place % _N_CHANGES_PER_STATE == 0:
                 self._states.append(state)
         self.state = state
@@ -384,4 +397,4 @@ class Project:
             self.versions |= new
 
     def _saved(self, name: str) -> str:
-        return self.state.stable(f"{piece.OWN}{name}")
+        return self.state.stable(f"{OWN}{name}")

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 import msgspec
 
-from motionmind.studio.edits import Ask
-from motionmind.studio.piece import MIRRORED, End
+from motionmind.studio.asks import Ask
+from motionmind.studio.neighbours import MIRRORED, End
 
 
 def question_of(ends: tuple[End, End], ask: Ask, corpus: str, versions: Mapping[str, str]) -> str:
@@ -22,7 +22,10 @@ def question_of(ends: tuple[End, End], ask: Ask, corpus: str, versions: Mapping[
     """
     names = {key.lstrip(MIRRORED).partition("/")[0] for key in _keys(ends, ask)} | {corpus}
     used = sorted((name, versions[name]) for name in names if name in versions)
-    return hashlib.sha256(msgspec.json.encode([ends, ask, corpus, used])).hexdigest()[:32]
+    asked = msgspec.to_builtins(ask)
+    if not ask.reaches:
+        del asked["reaches"]  # so that answers from before there were reaches stay valid
+    return hashlib.sha256(msgspec.json.encode([ends, asked, corpus, used])).hexdigest()[:32]
 
 
 def _keys(ends: tuple[End, End], ask: Ask) -> list[str]:

@@ -14,6 +14,7 @@ import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -221,7 +222,7 @@ def _worded(message: str, order: Order) -> str:
 
 def _read(order: Order) -> list[Motion]:
     """Read the clips of a file, on the file's own joints."""
-    from motionmind.formats import read_motion
+    from motionmind.formats import read_clips
 
     path, stem = Path(order.file), displayed(Path(order.name).stem)
     if path.suffix == ".score":
@@ -239,7 +240,11 @@ def _read(order: Order) -> list[Motion]:
         if len(found) > _MAX_CLIPS:
             raise FormatError(f"has {len(found)} clips: at most {_MAX_CLIPS} are allowed", path=path)
         return [replace(one, name=displayed(one.name)) for one in found]
-    return [replace(read_motion(path, unit=order.unit, asf=order.asf, fps=order.fps), name=stem)]
+    found = list(islice(read_clips(path, unit=order.unit, asf=order.asf, fps=order.fps), _MAX_CLIPS + 1))
+    if len(found) > _MAX_CLIPS:
+        raise FormatError(f"has more than {_MAX_CLIPS} clips, which is too many", path=path)
+    names = [stem + displayed(one.name.removeprefix(path.stem)) for one in found] if len(found) > 1 else [stem]
+    return [replace(one, name=name) for one, name in zip(found, names, strict=True)]
 
 
 def _understand(order: Order, motions: list[Motion]) -> Facts:
@@ -307,15 +312,16 @@ def _unit(order: Order) -> tuple[str, bool]:
 def is_posed_first(motion: Motion) -> bool:
     """Return whether the first frame of a recording seems to be a pose that a program added, such as a T-pose.
 
-    The body turns at least four times as far from such a pose as between any two of the next frames. The pose either
-    rotates no joint or stretches out both arms level.
+    The body turns at least four times as far from such a pose as between any two of the next frames, or several joints
+    jump (`added_frames`). The pose either rotates no joint or stretches out both arms level.
     """
+    from motionmind.corpus.recordings import added_frames
     from motionmind.geometry import rotations as rot
 
     if len(motion) < 10 or motion.keyframed:
         return False
     turned = rot.angle(motion.rotations[:9], motion.rotations[1:10]).max(axis=1)
-    if turned[0] < np.radians(10.0) or turned[0] < 4.0 * turned[1:].max():
+    if turned[0] < np.radians(10.0) or (turned[0] < 4.0 * turned[1:].max() and added_frames(motion) != 1):
         return False
     unrotated = float(rot.angle(motion.rotations[0, 1:], np.array([0.0, 0.0, 0.0, 1.0])).max()) < 1e-3
     return unrotated or _has_level_arms(motion)

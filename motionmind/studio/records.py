@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import msgspec
 
 from motionmind.errors import enumerated
 from motionmind.studio.edits import Edit
-from motionmind.studio.piece import Finding
+from motionmind.studio.findings import Finding
 
 
 class Head(msgspec.Struct, frozen=True):
@@ -71,3 +72,20 @@ def decode_line(data: bytes) -> Any:
         if name in fields:
             return msgspec.json.decode(data, type=kind)
     raise ValueError(f"a line of unknown kind, with {enumerated(sorted(fields))}")
+
+
+@dataclass
+class Change:
+    """An edit of the project.
+
+    Attributes:
+        number: its number; numbers increase.
+        edit: the edit.
+        window: the window that made it.
+        undone: whether it is undone.
+    """
+
+    number: int
+    edit: Edit
+    window: str
+    undone: bool = False

@@ -10,30 +10,44 @@ from typing import Any, NamedTuple
 import msgspec
 
 from motionmind.studio.answers import (
+    Asking,
     Begun,
-    CorpusView,
-    Credited,
+    Entered,
     Entering,
     Failure,
-    Gallery,
+    FilmBegun,
     Health,
     JobView,
+    Looking,
+    MovementData,
+    Nothing,
+    ProjectView,
+    Proving,
+    Renewing,
+    VersionView,
+    Visiting,
+)
+from motionmind.studio.api import Edited, Windowed
+from motionmind.studio.between import Acceptance, Between, Desk, DeskKeeping
+from motionmind.studio.comments import Comment
+from motionmind.studio.corpora import Lesson
+from motionmind.studio.filming import Direction
+from motionmind.studio.panel_answers import (
+    CorpusView,
+    Credited,
+    Gallery,
     KeptView,
     Lines,
     Map,
-    MovementData,
-    Nothing,
     Opened,
     Posed,
-    ProjectView,
     Sheet,
     UploadView,
     Variation,
 )
-from motionmind.studio.api import Edited, Windowed
-from motionmind.studio.between import Acceptance, Between
-from motionmind.studio.corpora import Lesson
 from motionmind.studio.posing import Changing, Dragging, Keeping, Opening, Telling, Turning
+from motionmind.studio.recent import RecentOpening, RecentProject
+from motionmind.studio.reference import Referring
 from motionmind.studio.uploads import Choices
 from motionmind.studio.varied import Ordering, Wish
 
@@ -56,12 +70,19 @@ class Call(NamedTuple):
 
 CALLS = (
     Call("GET", "/health", None, Health),
-    Call("POST", "/api/enter", Entering, Nothing),
+    Call("POST", "/api/enter", Entering, Entered),
+    Call("POST", "/api/challenge", Asking, Proving),
+    Call("POST", "/api/renew", Proving, Nothing),
+    Call("GET", "/api/renewal", None, Renewing),
+    Call("POST", "/api/visit", None, Visiting),
+    Call("GET", "/api/link", None, Looking),
+    Call("POST", "/api/link", None, Looking),
     Call("GET", "/api/schema", None, dict[str, Any]),
     Call("GET", "/api/project", None, ProjectView),
     Call("POST", "/api/edits", Edited, ProjectView),
     Call("POST", "/api/undo", Windowed, ProjectView),
     Call("POST", "/api/redo", Windowed, ProjectView),
+    Call("POST", "/api/comments", Comment, ProjectView),
     Call("GET", "/api/events", None, "text/event-stream"),
     Call("GET", "/api/jobs/{id}", None, JobView),
     Call("DELETE", "/api/jobs/{id}", None, JobView),
@@ -70,9 +91,12 @@ CALLS = (
     Call("POST", "/api/seams", None, Nothing),
     Call("DELETE", "/api/seams", None, Nothing),
     Call("GET", "/api/gallery", None, Gallery),
+    Call("GET", "/api/desk", None, Desk),
+    Call("POST", "/api/desk", DeskKeeping, Nothing),
     Call("POST", "/api/between", Between, Begun),
     Call("POST", "/api/between/accept", Acceptance, ProjectView),
     Call("GET", "/api/between/{job}/{number}", None, MovementData),
+    Call("GET", "/api/between/{job}/{number}/{frame}.png", None, "image/png"),
     Call("GET", "/api/vary/map", None, Map),
     Call("POST", "/api/vary", Wish, Variation),
     Call("POST", "/api/vary/accept", Ordering, ProjectView),
@@ -93,7 +117,15 @@ CALLS = (
     Call("POST", "/api/pose/change", Changing, Posed),
     Call("POST", "/api/pose/keep", Keeping, KeptView),
     Call("POST", "/api/pose/score", Keeping, Lines),
+    Call("GET", "/api/reference", None, "application/octet-stream"),
+    Call("POST", "/api/reference", Referring, ProjectView),
+    Call("GET", "/api/recent", None, list[RecentProject]),
+    Call("POST", "/api/recent", RecentOpening, Nothing),
+    Call("GET", "/api/versions", None, list[VersionView]),
     Call("GET", "/api/credits", None, Credited),
+    Call("POST", "/api/films", Direction, FilmBegun),
+    Call("GET", "/api/films/{job}", None, "video/mp4"),
+    Call("GET", "/api/sheet/{format}", None, "application/octet-stream"),
     Call("GET", "/api/export/{format}", None, "application/octet-stream"),
 )
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import warnings
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -19,13 +19,13 @@ from starlette.routing import BaseRoute, Route
 
 from motionmind.body.motion import Motion
 from motionmind.display import displayed
-from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError, enumerated
+from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError, SkeletonError, enumerated
 from motionmind.studio import api
-from motionmind.studio.alternatives import MAX_ALTERNATIVES, Account, account, find, usual_likelihoods
-from motionmind.studio.edits import Ask, Pin
-from motionmind.studio.piece import Finding, Found, Seam
+from motionmind.studio.alternatives import MAX_ALTERNATIVES, account, find, usual_likelihoods
+from motionmind.studio.asks import Ask
+from motionmind.studio.findings import Finding, Found
+from motionmind.studio.neighbours import Seam
 from motionmind.studio.sides import Sides, options_of, sides_of
-from motionmind.studio.stays import in_place, stays_of
 from motionmind.studio.worker_loop import engine_of
 from motionmind.studio.workers import JobCancelledError, WorkerLostError
 from motionmind.variation.seams import AbruptJoint, TransitionTest
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from motionmind.studio.workers import Job, Report
 
 _MAX_JOINTS_NAMED = 3
+_RETRY_S = 5.0  # after an error
 
 
 class Question(NamedTuple):
@@ -45,14 +46,12 @@ class Question(NamedTuple):
         sides: the movement on both sides.
         options: the user's request, as options of the engine.
         wished: whether movement is to be inserted even where the transition is not abrupt.
-        stays: hands and feet that stay in place.
     """
 
     name: str
     sides: Sides
     options: dict[str, Any]
     wished: bool
-    stays: Sequence[Pin] = ()
 
 
 def judge(report: Report, corpus: str, questions: Sequence[Question]) -> list[Finding]:
@@ -106,15 +105,13 @@ def smooth(report: Report, corpus: str, question: Question) -> tuple[list[tuple[
         tweens = find(engine, a, b, MAX_ALTERNATIVES, before=before, after=after, **question.options)
         for number, tween in enumerate(tweens, start=1):
             if tween.path.tobytes() not in distinct:
-                motion, missed = in_place(tween.motion, question.stays)
-                distinct[tween.path.tobytes()] = motion, _words(account(tween, engine.corpus, own, first), missed)
+                distinct[tween.path.tobytes()] = tween.motion, account(tween, engine.corpus, own, first).line()
                 first = first or tween.motion
             report(number, MAX_ALTERNATIVES, "smoothing a seam")
-    except MotionMindError as error:  # after the first: no other differs enough
-        if not distinct:
-            wished = question.options.keys() - {"duration"}
-            impossible = "no movement meets all wishes: drop a posture, a hand or a foot"
-            return [], impossible if wished else f"no movement found: {_line(error)}"
+    except MotionMindError as error:
+        wished = isinstance(error, NoPathError) and question.options.keys() - {"duration"}
+        impossible = "no movement meets all wishes: drop a posture, a hand or a foot"
+        return [], impossible if wished else f"no movement found: {_line(error)}"
     return list(distinct.values()), ""
 
 
@@ -131,13 +128,17 @@ def why_abrupt(joints: tuple[AbruptJoint, ...], corpus: str) -> str:
     )
 
 
-def _words(found: Account, missed: Sequence[str]) -> str:
-    """Describe an insertion in one line."""
-    return "; ".join(said for said in (found.usual, found.words, found.differs, *missed, *found.beyond) if said)
-
-
 def _line(error: Exception) -> str:
     return " ".join(str(error).split())
+
+
+def _reason(error: Exception) -> str:
+    """Return an error of the background work in a line."""
+    if isinstance(error, MotionMindError):
+        return _line(error).removeprefix("not done: ")
+    if isinstance(error, MemoryError):
+        return "not enough memory"
+    return f"{type(error).__name__}: {_line(error)}"
 
 
 class Smoother:
@@ -155,6 +156,7 @@ class Smoother:
         self._seen: dict[str, int] = {}  # when each question first came up
         self._lost: set[str] = set()  # questions on which a worker process died
         self._job: Job | None = None
+        self._trouble = ""  # the notice of what is wrong
         studio.project.subscribe(self._look)
 
     def _look(self) -> None:
@@ -181,9 +183,17 @@ class Smoother:
             while self._changed.is_set():
                 self._changed.clear()
                 await asyncio.sleep(0.15)  # until no edit follows
-            with suppress(JobCancelledError):
-                while not self._studio.has_stopped and await self._step():
-                    pass
+            try:
+                is_busy = True
+                while is_busy and not self._studio.has_stopped:
+                    is_busy = await self._step()
+                    if not self._studio.has_stopped:
+                        self._report("")
+            except JobCancelledError:
+                pass
+            except Exception as error:  # whatever it is, smoothing goes on
+                await self._wait(error)
+                self._changed.set()
 
     async def _step(self) -> bool:
         """Judge all new seams of one corpus, or else smooth the newest abrupt one; return whether there was any."""
@@ -219,12 +229,18 @@ class Smoother:
         if not questions:
             return
         try:
-            for finding in await self._result("seams", judge, corpus, questions):
-                self._studio.project.keep_finding(finding)
+            findings = await self._result("seams", judge, corpus, questions)
         except JobCancelledError:
             raise
-        except MotionMindError:  # the job's state carries the error
+        except MotionMindError as error:
+            if isinstance(error, WorkerLostError) and not self._lost.issuperset(seams):  # try them once more
+                self._lost.update(seams)
+                return
             self._studio.tell_of_smoothing(has_stopped=True)
+            self._report(f"the seams cannot be checked: {_line(error)}")
+            return
+        for finding in findings:
+            await self._kept(partial(self._studio.project.keep_finding, finding))
 
     async def _smooth(self, corpus: str, question: Question, judged: Finding) -> None:
         try:
@@ -238,18 +254,45 @@ class Smoother:
             alternatives, failure = [], _line(error)
         except MotionMindError as error:
             alternatives, failure = [], _line(error)
-        found = tuple(
-            Found(self._studio.movements.keep(motion), float(motion.times[-1] - motion.times[0]), words)
-            for motion, words in alternatives
-        )
-        finding = msgspec.structs.replace(judged, insertions=found, words=failure or judged.words)
-        self._studio.project.keep_finding(finding)
+
+        def keep() -> None:
+            found = tuple(
+                Found(self._studio.movements.keep(motion), float(motion.times[-1] - motion.times[0]), words)
+                for motion, words in alternatives
+            )
+            finding = msgspec.structs.replace(judged, insertions=found, words=failure or judged.words)
+            self._studio.project.keep_finding(finding)
+
+        await self._kept(keep)
+
+    async def _kept(self, write: Callable[[], object]) -> None:
+        """Write results; while that fails, as on a full disk, try again, instead of searching again."""
+        while not self._studio.has_stopped:
+            try:
+                write()
+                return
+            except Exception as error:
+                await self._wait(error)
+        raise JobCancelledError("smoothing was stopped")
+
+    async def _wait(self, error: Exception) -> None:
+        """Report an error, and wait until the next try."""
+        self._report(f"smoothing waits, and tries again every {_RETRY_S:g} s: {_reason(error)}")
+        await asyncio.sleep(_RETRY_S)
+
+    def _report(self, trouble: str) -> None:
+        """Show what is wrong, in place of what was; "" if nothing is."""
+        if trouble != self._trouble:
+            self._studio.project.withdraw(self._trouble)
+            self._trouble = trouble
+            if trouble:
+                self._studio.project.notice(trouble)
 
     def _asked(self, name: str, seam: Seam) -> Question:
         movement, ask = self._studio.movements.get, seam.verdict.ask
         sides = sides_of(seam.ends, movement, self._studio.movements.facing(self._studio.project.corpus_at(seam)))
         skeleton = sides.a.skeleton
-        return Question(name, sides, options_of(ask, skeleton, movement), ask != Ask(), stays_of(ask, skeleton))
+        return Question(name, sides, options_of(ask, skeleton, movement), ask != Ask())
 
     async def _result(self, kind: str, function: Callable[..., Any], *arguments: Any) -> Any:
         """Return the result of a job; raise JobCancelledError if it was cancelled, MotionMindError if it failed."""

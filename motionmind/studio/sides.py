@@ -2,7 +2,7 @@
 
 The rules are those of variations (`motionmind.variation.piece`): both ends stand above the origin and face ahead, or
 keep their own headings if the corpus's dancers face the audience. Frames beside each end show its speed, as far as the
-recording has them. A held posture does not move.
+recording has them. A posture that is held shows the speed 0.
 """
 
 from __future__ import annotations
@@ -16,11 +16,13 @@ from motionmind.body.limbs import limbs_of
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Facing
-from motionmind.studio.edits import Ask
-from motionmind.studio.piece import End
+from motionmind.studio.asks import Ask
+from motionmind.studio.neighbours import End
 from motionmind.studio.placement import Marks, Movements, check_body
+from motionmind.tween.options import StayOption
 from motionmind.variation.piece import Piece
 
+_REST_S = 0.2  # of a held posture, which shows that it does not move
 _CONTEXT_S = 1.0  # on each side of a seam; `Piece.around` takes what it needs
 
 
@@ -30,7 +32,7 @@ class Sides(NamedTuple):
     Attributes:
         a: the posture that the seam leads from.
         b: the posture that it leads to.
-        before: frames that lead up to `a`; None if the body is held there or the recording begins there.
+        before: frames that lead up to `a`; None at a posture that is not held, or where the recording begins.
         after: frames that follow `b`; None likewise.
         seconds: time from `a` to `b` without an insertion.
     """
@@ -58,11 +60,14 @@ def sides_of(ends: tuple[End, End], movement: Movements, facing: Facing) -> Side
     check_body(ends[0].key, one, ends[1].key, other)
     begin, stop = ends[0].frame, ends[1].frame + 1
     if ends[0].moves:
-        begin = min(int(np.searchsorted(one.times, one.times[begin] - _CONTEXT_S)), max(begin - 1, 0))
+        earliest = one.times[begin] - _CONTEXT_S * (ends[0].pace or 1.0)
+        begin = min(int(np.searchsorted(one.times, earliest)), max(begin - 1, 0))
     if ends[1].moves:
-        stop = max(int(np.searchsorted(other.times, other.times[stop - 1] + _CONTEXT_S)), min(stop + 1, len(other)))
+        latest = other.times[stop - 1] + _CONTEXT_S * (ends[1].pace or 1.0)
+        stop = max(int(np.searchsorted(other.times, latest)), min(stop + 1, len(other)))
     before, after = one.slice(begin, ends[0].frame + 1), other.slice(ends[1].frame, stop)
-    seconds = Marks(movement).step(ends[0].key, ends[0].frame)
+    before, after = (_played(side, end) for end, side in zip(ends, (before, after), strict=True))
+    seconds = Marks(movement).step(ends[0].key, ends[0].frame) / (ends[0].pace or 1.0)
     clock = float(before.times[-1]) + seconds - float(after.times[0])
     both = replace(
         before,
@@ -74,6 +79,13 @@ def sides_of(ends: tuple[End, End], movement: Movements, facing: Facing) -> Side
     i = len(before) - 1
     piece = Piece.of(both, facing=facing)
     return Sides(*piece.ends(i, i + 1), *piece.around(i, i + 1), seconds)
+
+
+def _played(side: Motion, end: End) -> Motion:
+    """Return the movement on one side of a seam as it plays: at its pace, or, in its only frame, at rest."""
+    if end.rests:
+        return side.at(side.times[0] + np.linspace(0.0, _REST_S, 3))
+    return side if end.pace is None else replace(side, times=side.times / end.pace, insertions=(), rate=0.0)
 
 
 def options_of(ask: Ask, skeleton: Skeleton, movement: Movements) -> dict[str, Any]:
@@ -94,8 +106,11 @@ def options_of(ask: Ask, skeleton: Skeleton, movement: Movements) -> dict[str, A
         options["via"] = [movement(one.posture).posture(one.frame) for one in ask.passing]
     pin: dict[str, str] = {}
     hold: list[str] = []
+    stays: list[StayOption] = []
     for one in ask.pins:
-        if one.hold == "place":  # see `motionmind.studio.stays`
+        if one.hold == "place":
+            skeleton.index(one.joint)  # raises if there is none
+            stays.append((one.joint, one.begins, one.ends))
             continue
         limb = _limb(skeleton, one.joint)
         if one.hold == "throughout":
@@ -106,6 +121,12 @@ def options_of(ask: Ask, skeleton: Skeleton, movement: Movements) -> dict[str, A
         options["pin"] = pin
     if hold:
         options["hold"] = hold
+    if stays:
+        options["stay"] = stays
+    if ask.reaches:
+        for reach in ask.reaches:
+            skeleton.index(reach.joint)  # raises if there is none
+        options["reach"] = [(reach.joint, reach.place, reach.at) for reach in ask.reaches]
     return options
 
 

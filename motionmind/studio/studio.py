@@ -6,15 +6,15 @@ import asyncio
 import threading
 from collections import OrderedDict
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motionmind.errors import MotionMindError
+from motionmind.jit import interpreted
 from motionmind.render.page import player_data
 from motionmind.studio.events import Events
 from motionmind.studio.movements import Movements
-from motionmind.studio.preparation import Steps, told
+from motionmind.studio.preparation import Steps, Told, told
 from motionmind.studio.project import Project
 from motionmind.studio.thumbnails import THUMBNAIL_HEIGHT_PX, Thumbnails, thumbnail
 from motionmind.studio.view import view_of
@@ -35,6 +35,7 @@ class Studio:
         thumbnails: cache of small pictures.
         workers: the worker processes, set once the server runs.
         has_stopped: whether smoothing of seams is paused.
+        is_shared: whether other computers can reach it.
     """
 
     workers: Workers
@@ -45,6 +46,7 @@ class Studio:
         home: Path | None = None,
         processes: int | None = None,
         first: Steps | None = None,
+        is_shared: bool = False,
     ) -> None:
         """Set up a studio.
 
@@ -53,11 +55,14 @@ class Studio:
             home: the folder of the user's corpora; None for the default folder.
             processes: the number of workers; by default as many as this computer has room for.
             first: preparation that makes jobs fast; jobs wait for it.
+            is_shared: whether other computers can reach it.
         """
-        self.project, self.home = project, home
+        self.project, self.home, self.is_shared = project, home, is_shared
         self.events, self.thumbnails = Events(), Thumbnails()
         self.has_stopped = False
+        self._shown: set[str] = set()
         self._processes, self._first = processes, first
+        self._is_cold = first is not None
         self._engines: OrderedDict[str, Engine] = OrderedDict()
         project.subscribe(self._tell_of_project)
 
@@ -66,6 +71,10 @@ class Studio:
         """All movements, by key."""
         return self.project.movements
 
+    def previewing(self) -> AbstractContextManager[None]:
+        """Return a context for the first pictures: without compiled code, they do not wait for it."""
+        return interpreted() if self._is_cold else nullcontext()
+
     def start(self) -> None:
         """Start the workers, in the event loop."""
         corpus = self.project.state.corpus
@@ -73,11 +82,16 @@ class Studio:
         threading.Thread(target=self._draw_first, daemon=True).start()
         asyncio.get_running_loop().call_later(2.0, self.workers.begin)  # until the page has loaded
         if self._first is not None:
-            self._preparing = asyncio.create_task(self.workers.prepare("getting ready", told(self._first)))
+            self._preparing = asyncio.create_task(self._prepare(told(self._first)))
+
+    async def _prepare(self, steps: Told) -> None:
+        """Wait for compiled code."""
+        await self.workers.prepare("getting ready", steps)
+        self._is_cold = False
 
     def _draw_first(self) -> None:
         """Load the gallery and draw its first picture before the browser opens the page."""
-        with suppress(MotionMindError):
+        with suppress(Exception), self.previewing():  # a request for the picture reports the error
             collection = self.movements.collection(self.project.state.corpus)
             name = next(iter([*collection.postures, *collection.clips]))
             motion = collection.find(name, as_clip=False)
@@ -119,10 +133,15 @@ class Studio:
         state = project.state
         return {
             "sequence": project.sequence,
+            "access": "shared" if self.is_shared else "own",
             "title": state.title,
             "file": project.path.name,
+            "saved": project.saved,
             "corpus": state.corpus,
             "corpora": project.versions,
+            "tempo": state.tempo,
+            "counts": state.counts,
+            "reference": {"path": state.reference.path, "begins": state.reference.begins},
             "words": project.words,
             "missing": project.missing,
             "postures": [{"name": name, "key": key} for name, key in state.postures.items()],
@@ -131,6 +150,20 @@ class Studio:
             "redo": project.redoable(window),
         }
 
+    def look(self) -> Mapping[str, Any]:
+        """Return the project as the look-only link shows it: the piece and its notes."""
+        whole = self.view("-")
+        piece = whole["piece"]
+        self._shown |= {one["key"] for one in (*piece["parts"], *piece["blocks"])}
+        nothing = {"file": "", "corpus": "", "corpora": {}, "words": [], "missing": [], "postures": []}
+        nothing["reference"] = {"path": "", "begins": 0.0}
+        known = {name: whole[name] for name in ("sequence", "title", "saved", "tempo", "counts")}
+        return known | nothing | {"access": "look", "piece": piece | {"seams": []}, "undo": None, "redo": None}
+
+    def has_shown(self, key: str) -> bool:
+        """Return whether the look-only link has shown a movement: it sees no others."""
+        return key in self._shown
+
     def tell_of_smoothing(self, has_stopped: bool) -> None:
         """Tell the windows when smoothing stops or resumes."""
         if has_stopped != self.has_stopped:
@@ -138,7 +171,7 @@ class Studio:
             self.events.send("smoothing", {"stopped": has_stopped})
 
     def _tell_of_project(self) -> None:
-        self.events.send("project", {"sequence": self.project.sequence})
+        self.events.send("project", {"sequence": self.project.sequence, "notices": len(self.project.words)})
 
     def _tell_of_job(self, job: Job) -> None:
         self.events.send("job", job.view(), job.id)

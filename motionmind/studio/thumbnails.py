@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections import OrderedDict
 from io import BytesIO
 from math import ceil
@@ -28,9 +29,20 @@ class Thumbnails:
     def __init__(self) -> None:
         self._held: OrderedDict[tuple[str, int, int], bytes] = OrderedDict()
         self._size = 0
+        self._drawing = asyncio.Lock()  # draw one picture at a time: it leaves a processor to the engine
 
-    def find(self, key: str, frame: int, height: int) -> bytes | None:
-        """Return the picture of a movement's frame; None if it is not in the cache."""
+    async def draw(self, key: str, motion: Motion, frame: int, height: int) -> bytes:
+        """Return the picture of a movement's frame from the cache, or draw it; raise MotionMindError as `thumbnail`."""
+        if (known := self._find(key, frame, height)) is not None:
+            return known
+        async with self._drawing:
+            if (drawn := self._find(key, frame, height)) is None:  # nobody has drawn it meanwhile
+                drawn = await asyncio.to_thread(thumbnail, motion, frame, height)
+                self.hold(key, frame, height, drawn)
+        return drawn
+
+    def _find(self, key: str, frame: int, height: int) -> bytes | None:
+        """Return a picture; None if it is not in the cache."""
         if (known := self._held.get((key, frame, height))) is not None:
             self._held.move_to_end((key, frame, height))
         return known

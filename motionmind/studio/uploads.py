@@ -14,14 +14,13 @@ from collections.abc import AsyncIterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
-from weakref import finalize
 
 import msgspec
 
 from motionmind.body.motion import Motion
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
-from motionmind.files import make_room
+from motionmind.formats.refused import way_out
 from motionmind.formats.units import UNITS
 from motionmind.studio.reading import (
     FACTS_FILE,
@@ -33,15 +32,12 @@ from motionmind.studio.reading import (
     Order,
     load_clip,
 )
+from motionmind.studio.room import Room
 
 MAX_UPLOAD_BYTES = 64 * 2**20  # of a file
 _MAX_FILES = 300
 _START_S = 5.0  # to start a child process
-_REFUSALS = {  # as in imports.js
-    ".fbx": "FBX is not supported: import it into Blender (File, Import, FBX) and export glTF (.glb) or BVH",
-    ".c3d": "C3D contains skin markers, not joints: solve a skeleton and export it as BVH",
-    ".gltf": "a .gltf refers to other files: export a single .glb",
-}
+_TWO_FILES = "a .gltf refers to other files: export a single .glb"
 
 
 class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -92,8 +88,7 @@ class Uploads:
     """All uploads since the studio started; they are deleted when it ends."""
 
     def __init__(self) -> None:
-        self._folder = make_room("studio")
-        self._goes = finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
+        self._room = Room()
         self._uploads: dict[str, Upload] = {}
         self._reading = asyncio.Semaphore(2)
 
@@ -119,8 +114,8 @@ class Uploads:
         """
         shown, suffix = displayed(name), Path(name).suffix.lower()
         if suffix not in (accepted := (*READABLE_SUFFIXES, ".asf")):
-            reason = _REFUSALS.get(suffix, f"supported formats are {', '.join(accepted)}")
-            raise MotionMindError(f"{shown}: {reason}")
+            instead = _TWO_FILES if suffix == ".gltf" else way_out(suffix)
+            raise MotionMindError(f"{shown}: {instead or 'supported formats are ' + ', '.join(accepted)}")
         if len(self._uploads) >= _MAX_FILES:
             raise MotionMindError(f"{shown}: there are already {_MAX_FILES} files; remove some first")
         upload = secrets.token_hex(8)
@@ -210,10 +205,10 @@ class Uploads:
     def close(self) -> None:
         """Delete all uploads."""
         self._uploads.clear()
-        self._goes()
+        self._room.close()
 
     def _place(self, upload: str) -> Path:
-        return self._folder / upload
+        return self._room.folder / upload
 
 
 async def _read(folder: Path, order: Order) -> Answer:

@@ -23,6 +23,7 @@ from motionmind.render.markup import base64_of
 from motionmind.studio import api
 from motionmind.studio.attractor_map import drawn, map_of
 from motionmind.studio.edits import Arrange, Block
+from motionmind.studio.forecast import CAUTION_RATIO, Forecast, forecast
 from motionmind.studio.piece import State, arranged
 from motionmind.studio.project import RefusedError
 from motionmind.studio.varying import (
@@ -154,11 +155,15 @@ async def propose(studio: Studio, wish: Wish) -> dict[str, Any]:
         used=state.used,
         insertions=None if wish.inserted is None else insertions,
     )
-    return _shown(studio, state, base, found, locked, wish) | {"unlimited": unlimited}
+    try:
+        foreseen: Forecast | None = await run_in_threadpool(forecast, studio, arranged(state, found.blocks))
+    except MotionMindError:
+        foreseen = None
+    return _shown(studio, state, base, found, locked, wish) | {"unlimited": unlimited, "forecast": foreseen}
 
 
 def _estimates(studio: Studio, units: Sequence[Unit], clocks: Clocks) -> Estimates:
-    """Estimate the insertions between units."""
+    """Estimate the insertions between units, with caution."""
     from motionmind.variation.insertion_times import estimate_insertions
     from motionmind.variation.piece import Piece
     from motionmind.variation.seams import TransitionTest
@@ -180,13 +185,15 @@ def _estimates(studio: Studio, units: Sequence[Unit], clocks: Clocks) -> Estimat
         [own[min(unit.last + 1, len(own) - 1)] - own[unit.first] for own, unit in zip(times, units, strict=True)]
     )
     durations = np.maximum(durations, 1e-3)  # the last frame of a movement leads nowhere
+    durations = durations / [unit.pace for unit in units] + [unit.hold for unit in units]
     postures = Motion(
         motions[0].skeleton,
         np.stack([motion.rotations[first] for motion, first in zip(motions, firsts, strict=True)]),
         np.stack([motion.root[first] for motion, first in zip(motions, firsts, strict=True)]),
         np.append(0.0, np.cumsum(durations[:-1])),
     )
-    estimates = Estimates(estimate_insertions(Piece(postures, np.arange(len(units))), test), durations)
+    seconds = CAUTION_RATIO * estimate_insertions(Piece(postures, np.arange(len(units))), test)
+    estimates = Estimates(seconds, durations)
     _latest[studio] = _Estimated(asked, (engine, *motions), estimates)
     return estimates
 
@@ -263,7 +270,8 @@ def base_of(state: State) -> tuple[Block, ...]:
 
 
 def _holds(one: Block, block: Block) -> bool:
-    same = (one.source, one.mirrored) == (block.source, block.mirrored)
+    kinds = [(each.source, each.mirrored, each.hold, each.pace) for each in (one, block)]
+    same = kinds[0] == kinds[1]
     return same and one.first <= block.first and block.last <= one.last
 
 

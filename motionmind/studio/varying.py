@@ -90,6 +90,8 @@ class Unit(NamedTuple):
         mirrored: whether left and right are exchanged.
         first: its first frame.
         last: its last frame.
+        hold: seconds in which a posture stands still.
+        pace: its speed, as a multiple of the recorded one.
     """
 
     block: int
@@ -97,6 +99,8 @@ class Unit(NamedTuple):
     mirrored: bool
     first: int
     last: int
+    hold: float = 0.0
+    pace: float = 1.0
 
 
 class Estimates(NamedTuple):
@@ -164,7 +168,8 @@ def units_of(blocks: Sequence[Block], clocks: Clocks) -> list[Unit]:
     """
     found = []
     for number, block in enumerate(blocks):
-        times, rate = clocks(block.source)
+        source, mirrored = block.source, block.mirrored
+        times, rate = clocks(source)
         own = times[block.first : block.last + 1]
         begins = np.arange(len(own))
         if rate is not None and len(own) > 1:
@@ -174,7 +179,7 @@ def units_of(blocks: Sequence[Block], clocks: Clocks) -> list[Unit]:
             begins = np.unique(np.where(wanted - own[before] <= own[after] - wanted, before, after))
         ends = np.append(begins[1:] - 1, len(own) - 1)
         found += [
-            Unit(number, block.source, block.mirrored, block.first + int(first), block.first + int(last))
+            Unit(number, source, mirrored, block.first + int(first), block.first + int(last), block.hold, block.pace)
             for first, last in zip(begins, ends, strict=True)
         ]
     return found
@@ -226,7 +231,7 @@ def vary_blocks(
     if max(len(free), total) > MAX_UNITS:
         raise MotionMindError(f"too long to vary: {max(len(free), total):,} postures, at most {MAX_UNITS:,}")
     order = find_order(wanted, len(free), len(places), insertions(free) if insertions else None)
-    naming = _Naming(present, used, [one.block for one in wanted.kept])
+    naming = _Naming(blocks, present, used, [one.block for one in wanted.kept])
     found = [(place, naming.block(run)) for place, run in _runs(order.indices, places, free)]
     found = sorted([*found, *((one.place, one.block) for one in wanted.kept)], key=lambda entry: entry[0])
     names = frozenset(one.block.id for one in wanted.kept)
@@ -352,19 +357,25 @@ def _runs(indices: Ints, places: Ints, units: Sequence[Unit]) -> list[tuple[int,
 class _Naming:
     """Assign ids to stretches: a stretch of the piece keeps its own, a new one gets an unused id."""
 
-    def __init__(self, present: Sequence[Block], used: Collection[str], kept: Sequence[Block]) -> None:
+    def __init__(
+        self, blocks: Sequence[Block], present: Sequence[Block], used: Collection[str], kept: Sequence[Block]
+    ) -> None:
+        self._blocks = blocks
         self._taken = {block.id for block in kept}
-        self._present: dict[tuple[str, int, int, bool], list[str]] = {}  # ids of equal stretches, in order
+        self._present: dict[Block, list[str]] = {}  # ids of equal stretches, in order, by these without an id
         for block in present:
             if block.id not in self._taken:
-                self._present.setdefault(_frames(block), []).append(block.id)
+                self._present.setdefault(msgspec.structs.replace(block, id=""), []).append(block.id)
         self._used = set(used)
 
     def block(self, run: Sequence[Unit]) -> Block:
         """Return the stretch of a run of units."""
         unit = run[0]
-        bare = Block("", unit.source, unit.first, run[-1].last, unit.mirrored)
-        here = self._present.get(_frames(bare))
+        origin = self._blocks[unit.block]
+        last = run[-1].last
+        repeats = origin.repeats if (unit.first, last) == (origin.first, origin.last) else 1
+        bare = msgspec.structs.replace(origin, id="", first=unit.first, last=last, repeats=repeats)
+        here = self._present.get(bare)
         name = here.pop(0) if here else self._new(bare)
         self._taken.add(name)
         return msgspec.structs.replace(bare, id=name)
@@ -372,12 +383,8 @@ class _Naming:
     def _new(self, block: Block) -> str:
         number = 0
         while True:
-            text = repr((*_frames(block), number))
+            text = repr((*msgspec.structs.astuple(block), number))
             name = f"v{hashlib.sha256(text.encode()).hexdigest()[:10]}"
             if name not in self._used and name not in self._taken:
                 return name
             number += 1
-
-
-def _frames(block: Block) -> tuple[str, int, int, bool]:
-    return block.source, block.first, block.last, block.mirrored

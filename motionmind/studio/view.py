@@ -7,8 +7,10 @@ from typing import Any, Literal
 
 import msgspec
 
-from motionmind.studio.edits import Ask
-from motionmind.studio.piece import Finding, Found, Seam, State, key_of
+from motionmind.studio.asks import Ask
+from motionmind.studio.findings import Finding, Found
+from motionmind.studio.neighbours import Seam, key_of
+from motionmind.studio.piece import State
 from motionmind.studio.placement import Layout, Marks, Part, lay_out
 
 SeamState = Literal["smooth", "abrupt", "waiting", "inserted", "discarded", "none found"]
@@ -55,7 +57,7 @@ def view_of(
     title: Callable[[str], str],
     standing: Standing = lambda _: None,
 ) -> dict[str, Any]:
-    """Return `piece` of the project's JSON: its duration, parts, blocks and seams.
+    """Return `piece` of the project's JSON: its duration, parts, blocks, seams and notes.
 
     Args:
         state: the piece.
@@ -65,6 +67,7 @@ def view_of(
         standing: returns the insertion that stays at a seam until its request is answered.
     """
     layout = layout_of(state, findings, marks, standing)
+    notes = noted(state, layout, marks)
     blocks = [
         msgspec.structs.asdict(block)
         | {
@@ -73,23 +76,48 @@ def view_of(
             "frames": marks.length(key_of(block)) if (here := marks.has(key_of(block), block.last)) else block.last + 1,
             "missing": not here,
             "at": part.at,
-            "seconds": part.seconds,
+            "once": part.seconds,
+            "seconds": end - part.at,
         }
-        for block, part in zip(state.blocks, layout.blocks, strict=True)
+        for block, part, end in zip(state.blocks, layout.blocks, layout.ends, strict=True)
     ]
     seams = [
-        _seam_view(seam, number, findings(seam), layout.insertions[number - 1], layout.blocks[number - 1 : number + 1])
-        for number, seam in enumerate(state.seams, start=1)
+        _seam_view(seam, number, findings(seam), insertion, gap)
+        for number, (seam, insertion, gap) in enumerate(
+            zip(state.seams, layout.insertions, layout.gaps, strict=True), start=1
+        )
     ]
     parts = [msgspec.to_builtins(part) for part in layout.parts if marks.has(part.key, part.last)]
-    return {"seconds": layout.seconds, "parts": parts, "blocks": blocks, "seams": seams}
+    return {"seconds": layout.seconds, "parts": parts, "blocks": blocks, "seams": seams, "notes": notes}
+
+
+def noted(state: State, layout: Layout, marks: Marks) -> list[dict[str, Any]]:
+    """Return the notes in order of time: their fields, `at` in the piece and `seconds`, for which a section lasts."""
+    ends = [*(part.at for part in layout.blocks[1:]), layout.seconds]
+    places = {block.id: place for place, block in enumerate(state.blocks)}
+    found = []
+    for note in state.notes.values():
+        at = 0.0
+        if (place := places.get(note.block)) is not None:
+            block, part = state.blocks[place], layout.blocks[place]
+            if block.first <= note.frame <= block.last:
+                own = [marks.at(key_of(block), frame).time for frame in (block.first, note.frame)]
+                at = min(part.at + own[1] - own[0] + note.after, ends[place])
+            else:  # trimmed away
+                at = part.at + (part.seconds if note.frame > block.last else 0.0)
+        found.append(msgspec.structs.asdict(note) | {"at": at, "seconds": 0.0})
+    found.sort(key=lambda note: (note["at"], note["id"]))
+    end = layout.seconds
+    for note in reversed(found):
+        if note["kind"] == "section":
+            note["seconds"], end = max(end - note["at"], 0.0), note["at"]
+    return found
 
 
 def _seam_view(
-    seam: Seam, number: int, finding: Finding | None, insertion: Part | None, sides: tuple[Part, ...]
+    seam: Seam, number: int, finding: Finding | None, insertion: Part | None, gap: tuple[float, float]
 ) -> dict[str, Any]:
-    before, after = sides
-    begin = before.at + before.seconds
+    begin, end = gap
     found = finding.insertions if finding is not None else None
     return {
         "left": seam.left.id,
@@ -103,5 +131,5 @@ def _seam_view(
         "ask": msgspec.to_builtins(seam.verdict.ask),
         "at": begin,
         "stands": insertion is not None,
-        "seconds": insertion.seconds if insertion else after.at - begin,
+        "seconds": insertion.seconds if insertion else end - begin,
     }

@@ -1,4 +1,4 @@
-"""The loop of a worker process: it runs one job after another, and caches engines."""
+"""A worker process: how it starts, and its loop, which runs one job after another and caches engines."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ def work(connection: Connection, home: Path | None, warm: str) -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-    connection.send(("begun",))
-    with suppress(MotionMindError):
+    _send(connection, ("begun",))
+    with suppress(Exception):  # the job that needs it reports the error
         if warm:
             engine_of(warm)
 
     def report(done: int, of: int, words: str = "", partial: Any = None) -> None:
-        connection.send(("report", done, of, words, partial))
+        _send(connection, ("report", done, of, words, partial))
 
     while True:
         try:
@@ -67,12 +67,20 @@ def work(connection: Connection, home: Path | None, warm: str) -> None:
             return
         try:
             answer = "done", function(report, *arguments)
-        except MemoryError:
-            answer = "failed", "not enough memory"
         except Exception as error:
             answer = "failed", words_of(error)
-        with suppress(OSError):
-            connection.send(answer)
+        try:
+            _send(connection, answer)
+        except Exception as error:  # an answer that does not fit into memory
+            _send(connection, ("failed", words_of(error)))
+
+
+def _send(connection: Connection, message: tuple[Any, ...]) -> None:
+    """Send a message to the server; end this process if the server has ended."""
+    try:
+        connection.send(message)
+    except OSError:
+        os._exit(0)
 
 
 def _end_with(parent: Any) -> None:
@@ -85,5 +93,26 @@ def words_of(error: Exception) -> str:
     """Return an error as a line; print an unexpected one on the terminal."""
     if isinstance(error, MotionMindError):
         return str(error)
+    if isinstance(error, MemoryError):
+        return "not enough memory"
     traceback.print_exception(error, file=sys.stderr)
     return "internal error: see the terminal"
+
+
+def process_context() -> Any:
+    """Return how processes start: forked from a preloaded process on Linux, or else spawned."""
+    if sys.platform != "linux":  # on other systems, system libraries may not survive a fork
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["motionmind.studio.preloaded"])
+    return context
+
+
+def room_for_workers() -> int:
+    """Return the number of workers: two need two processors and 1 GiB of free memory, and take a fifth of it."""
+    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    try:
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_AVPHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        memory = 0
+    return 2 if processors >= 2 and memory >= 2**30 else 1

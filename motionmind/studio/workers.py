@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import multiprocessing
-import os
 import sys
 import threading
 import time
@@ -17,8 +15,9 @@ from typing import Any, Literal, Protocol
 
 from motionmind.errors import MotionMindError
 from motionmind.studio.preparation import Told
-from motionmind.studio.worker_loop import words_of, work
+from motionmind.studio.worker_loop import process_context, room_for_workers, words_of, work
 
+_MAX_FAILURES = 3  # consecutive workers that die before they are ready
 JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
 
 
@@ -155,8 +154,8 @@ class Workers:
         self._numbers = count(time.time_ns())  # ids differ from those of earlier studios
         self._waiting: deque[Job] = deque()
         self._jobs: OrderedDict[str, Job] = OrderedDict()
-        self._number = number or _room()
-        self._has_begun = False  # whether the processes have started
+        self._number = number or room_for_workers()
+        self._is_closed = False
         self._held_by: Job | None = None  # the job that all others wait for
         self._workers: list[_Worker] = []
         self._failures = 0  # consecutive workers that died before they were ready
@@ -167,10 +166,20 @@ class Workers:
         return [job for job in self._jobs.values() if job.state in ("waiting", "running")]
 
     def begin(self) -> None:
-        """Start the processes, unless they have started."""
-        if not self._has_begun:
-            self._has_begun = True
-            self._workers = [_Worker(self, *self._theirs) for _ in range(self._number)]
+        """Start the processes, unless they run or jobs wait for a preparation; if none could start before, try again.
+
+        During a preparation, which compiles and learns, each would compile and learn the same.
+        """
+        if not self._workers and not self._is_closed and self._held_by is None:
+            for _ in range(self._number):
+                self._begin_one(*self._theirs)
+
+    def _begin_one(self, home: Path | None, warm: str) -> None:
+        """Start a process, if the system lets it."""
+        try:
+            self._workers.append(_Worker(self, home, warm))
+        except (OSError, RuntimeError, MemoryError) as error:  # no more pipes, threads or memory
+            print(f"motionmind studio: cannot start a process: {error or 'not enough memory'}", file=sys.stderr)
 
     def submit(
         self,
@@ -214,6 +223,8 @@ class Workers:
                     self._release(job)
                 self._tell(job)
                 await asyncio.sleep(0.2)
+        except Exception as error:  # searches compile what they need
+            job.end("failed", words=words_of(error))
         finally:
             steps.close()
             job.end("done")
@@ -224,6 +235,7 @@ class Workers:
         """Let the jobs begin that wait for a preparation."""
         if self._held_by is job:
             self._held_by = None
+            self.begin()
             self.go_on()
 
     def _add(self, job: Job) -> Job:
@@ -244,10 +256,10 @@ class Workers:
         """Cancel a job at once, killing its worker."""
         if job in self._waiting:
             self._waiting.remove(job)
-        for place, worker in enumerate(self._workers):
-            if worker.job is job:
-                worker.kill()
-                self._workers[place] = _Worker(self, *self._theirs)
+        for worker in [one for one in self._workers if one.job is job]:
+            worker.kill()
+            self._workers.remove(worker)
+            self._begin_one(*self._theirs)
         if job.state in ("waiting", "running"):
             job.end("cancelled", words="cancelled")
             self._tell(job)
@@ -255,7 +267,7 @@ class Workers:
 
     def close(self) -> None:
         """Cancel all jobs and kill all workers."""
-        self._has_begun = True
+        self._is_closed = True
         for job in self.jobs:
             job.end("cancelled", words="the studio is closing")
         self._waiting.clear()
@@ -265,7 +277,7 @@ class Workers:
 
     def go_on(self) -> None:
         """Give waiting jobs to free workers."""
-        while self._waiting and not self._workers:
+        while self._waiting and not self._workers and self._held_by is None:
             job = self._waiting.popleft()
             job.end("failed", words="the engine failed to start: see the terminal")
             self._tell(job)
@@ -291,8 +303,10 @@ class Workers:
         if message is None:
             self._failures += not worker.has_begun
             self._workers.remove(worker)
-            if self._failures < 3:
-                self._workers.append(_Worker(self, *self._theirs))
+            if self._failures < _MAX_FAILURES:
+                self._begin_one(self._theirs[0], "")  # loading the corpus at once may be what killed it
+            else:
+                self._failures -= 1  # the next job tries once more
             if job:
                 job.end("failed", words="stopped: this computer ran out of memory", error=WorkerLostError)
         elif message[0] == "begun":
@@ -333,7 +347,7 @@ class _Worker:
     def __init__(self, workers: Workers, home: Path | None, warm: str) -> None:
         self.job: Job | None = None
         self._workers, self._is_killed, self.has_begun = workers, False, False
-        context = _context()
+        context = process_context()
         self._connection, theirs = context.Pipe()
         self._process = context.Process(target=work, args=(theirs, home, warm), daemon=True, name="motionmind studio")
         self._theirs = theirs
@@ -353,8 +367,12 @@ class _Worker:
             self._process.kill()
 
     def _send(self, task: Any) -> None:
-        with suppress(OSError):  # it has died, which the listener reports
+        try:
             self._connection.send(task)
+        except OSError:  # it has died, which the listener reports
+            pass
+        except Exception as error:  # too large for this computer's memory
+            self._workers.post(self, ("failed", words_of(error)))
 
     def _listen(self) -> None:
         try:
@@ -365,29 +383,14 @@ class _Worker:
             while True:
                 self._workers.post(self, self._connection.recv())
         except (EOFError, OSError):
-            self._workers.post(self, None)
+            pass
+        except Exception as error:  # a message that cannot be read, for example for lack of memory
+            words_of(error)
+            self.kill()
+        self._workers.post(self, None)
         with suppress(AssertionError):
             self._process.join()
 
 
-def _context() -> Any:
-    """Return how processes start: forked from a preloaded process on Linux, or else spawned."""
-    if sys.platform != "linux":  # on other systems, system libraries may not survive a fork
-        return multiprocessing.get_context("spawn")
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["motionmind.studio.preloaded"])
-    return context
-
-
 def _nothing(_: Report) -> None:
     """Do nothing: a preparation has no function that a worker calls."""
-
-
-def _room() -> int:
-    """Return the number of workers: two need two processors and 1 GiB of free memory, and take a fifth of it."""
-    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    try:
-        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_AVPHYS_PAGES")
-    except (AttributeError, ValueError, OSError):
-        memory = 0
-    return 2 if processors >= 2 and memory >= 2**30 else 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,6 +14,13 @@ from pages import RESTING
 
 _IS_HERE = find_spec("starlette") is not None and find_spec("uvicorn") is not None
 collect_ignore_glob = [] if _IS_HERE else ["test_studio_*.py"]  # the extra studio
+
+_AXE_FAULTS = """async () => {
+  const { violations } = await axe.run(document, { resultTypes: ['violations'] });
+  return violations
+    .filter(({ impact }) => impact === 'serious' || impact === 'critical')
+    .flatMap(({ id, nodes }) => nodes.map((node) => `${id}: ${node.html.slice(0, 200)} ${node.failureSummary}`));
+}"""
 
 if TYPE_CHECKING:
     from pages import Tabs
@@ -24,7 +33,7 @@ if TYPE_CHECKING:
 @pytest.fixture(scope="session", autouse=True)
 def _thumbnails() -> Iterator[None]:
     """Every page that is opened shows the same thirty small pictures: each is drawn once, for the same movement."""
-    from motionmind.studio import api, studio
+    from motionmind.studio import studio, thumbnails
     from motionmind.studio.thumbnails import thumbnail
 
     drawn: dict[object, bytes] = {}
@@ -40,7 +49,7 @@ def _thumbnails() -> Iterator[None]:
         return drawn[key]
 
     with pytest.MonkeyPatch.context() as patch:
-        for module in (api, studio):
+        for module in (studio, thumbnails):
             patch.setattr(module, "thumbnail", draw)
         yield
 
@@ -97,3 +106,21 @@ def studio_page(request: pytest.FixtureRequest, studio_server: Served, tabs: Tab
         page.goto(studio_server.entry)
         yield page
     assert not errors
+
+
+@pytest.fixture(scope="session")
+def axe_faults() -> Callable[[Any], list[str]]:
+    """Find the serious faults of a page with axe-core, which is installed for node, as `.ci/run` does."""
+    node = shutil.which("node")
+    asked = 'require.resolve("axe-core/axe.min.js")'
+    found = node and subprocess.run([node, "-p", asked], capture_output=True, text=True, check=False)
+    if not found or found.returncode:
+        pytest.skip("axe-core is not here (install it for node, and set NODE_PATH)")
+    source = Path(found.stdout.strip()).read_text(encoding="utf-8")
+
+    def find(page: Any) -> list[str]:
+        page.evaluate(f"{source};0")
+        faults: list[str] = page.evaluate(_AXE_FAULTS)
+        return faults
+
+    return find

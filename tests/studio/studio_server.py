@@ -20,6 +20,7 @@ import msgspec
 
 from motionmind.studio.answers import Failure
 from motionmind.studio.project import Project
+from motionmind.studio.renewal import Link
 from motionmind.studio.schema import CALLS
 from motionmind.studio.serving import Server
 from motionmind.studio.studio import Studio
@@ -79,6 +80,12 @@ class Client:
         assert answer.status == 200, answer
         self.cookie = answer.headers["set-cookie"].partition(";")[0]
 
+    def look(self, key: str) -> Client:
+        """Someone who has the key of the look-only link."""
+        looking = Client(self.url, "w-look")
+        looking.enter(key)
+        return looking
+
     def get(self, path: str) -> Any:
         """GET a path, which must be there."""
         answer = self.send("GET", path)
@@ -132,7 +139,9 @@ class Client:
 def check_answer(method: str, path: str, answer: Answer) -> None:
     """Check an answer of the API against its schema: every field that it has, and that it has them all."""
     bare = path.partition("?")[0]
-    if answer.status >= 400 and bare.startswith("/api/"):
+    if method == "HEAD":
+        assert answer.body == b""
+    elif answer.status >= 400 and bare.startswith("/api/"):
         assert answer.headers["content-type"] == "application/json"
         msgspec.json.decode(answer.body, type=Failure)
     elif answer.status == 200:
@@ -209,20 +218,23 @@ def _listening(host: str) -> socket.socket:
 
 
 @contextmanager
-def serving(project: Project, home: Path | None = None, host: str = "127.0.0.1") -> Iterator[Served]:
-    """Serve a project in this process, with one worker; the project is closed at the end."""
-    studio, keys, ready = Studio(project, home, 1), Keys(), threading.Event()
+def serving(
+    project: Project, home: Path | None = None, host: str = "127.0.0.1", link: Link | None = None
+) -> Iterator[Served]:
+    """Serve a project in this process, with one worker, and to others if there is a look-only link; the project is
+    closed at the end."""
+    studio, keys, ready = Studio(project, home, 1, is_shared=link is not None), Keys(link=link), threading.Event()
     with _listening(host) as listening:
         port = listening.getsockname()[1]
         server = Server(studio, keys, host, port, ready.set)
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
         thread.start()
-        assert ready.wait(30)
+        assert ready.wait(60)
         try:
             yield Served(f"http://127.0.0.1:{port}", studio, keys)
         finally:
             server.should_exit = True
-            thread.join(20.0)
+            thread.join(60.0)
             assert not thread.is_alive()
 
 
@@ -235,8 +247,9 @@ def running(*arguments: object, home: Path, **environment: str) -> Iterator[tupl
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "runpy.run_module('motionmind', run_name='__main__', alter_sys=True)\n"
     )
+    options = () if "BROWSER" in environment else ("--no-browser",)
     process = subprocess.Popen(
-        [sys.executable, "-c", program, "studio", "--no-browser", *map(str, arguments)],
+        [sys.executable, "-c", program, "studio", *options, *map(str, arguments)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import msgspec
 import numpy as np
@@ -17,6 +17,7 @@ from motionmind.names.postures import find_posture
 from motionmind.names.spelling import Source
 from motionmind.studio.alternatives import (
     COST_GAP_RATIO,
+    FAR_SHARE,
     MAX_ALTERNATIVES,
     Account,
     account,
@@ -55,20 +56,39 @@ def test_alternatives_differ_and_are_near_enough(found: list[tuple[Tween, Accoun
         assert tween.cost <= (1.0 + COST_GAP_RATIO) * tween.lower_bound + 1e-6
 
 
+@pytest.mark.long
+def test_the_farther_they_go_the_more_any_two_differ(ballet: Engine) -> None:
+    pairs = [("arabesque", "fifth"), ("first", "attitude"), ("passe", "arabesque")]
+    for names in pairs:
+        a, b = (find_posture(f"ballet/{name}").posture for name in names)
+        least: dict[str, float] = {}
+        best: Tween | None = None
+        for spread, share in (("near", 0.2), ("usual", 0.2), ("far", FAR_SHARE)):
+            tweens = list(find(ballet, a, b, spread=spread))
+            assert len(tweens) == MAX_ALTERNATIVES
+            assert min(min(tween.differs) for tween in tweens[1:]) >= share - 1e-9
+            best = best or tweens[0]
+            assert np.array_equal(tweens[0].path, best.path)
+            shown = [tween.motion.at(np.linspace(0.0, tween.motion.times[-1], 41)) for tween in tweens]
+            least[spread] = min(float(_degrees_apart(*two).mean()) for two in combinations(shown, 2))
+        assert 0.0 < 1.5 * least["near"] < least["usual"] < least["far"]
+
+
 def test_words_say_what_is_proven(found: list[tuple[Tween, Account]]) -> None:
     for tween, said in found:
         assert (tween.status == "optimal") == ("proven" in said.sure)
         assert said.usual.endswith(f"; {tween.motion_attested:.0%} of the motion's transitions occur in ballet")
-        assert "_" not in "".join([said.words, said.differs, said.sure, said.usual, *said.beyond])
+        assert "_" not in "".join([said.words, said.differs, said.details, said.sure, said.usual, *said.beyond])
         assert f"{tween.motion.times[-1]:.1f} s" in said.words
         assert b"nat" not in msgspec.json.encode([said.words, said.sure, said.usual, said.beyond])
 
 
 def test_words_say_where_and_when_one_differs_most_from_the_first(found: list[tuple[Tween, Account]]) -> None:
     (tween, said), *others = found
-    assert said.differs == ""
+    assert (said.differs, said.details) == ("", "")
     for other, words in others:
-        joint, degrees, at = re.findall(r": ([a-z ]+) by (\d+)°.* at ([\d.]+) s$", words.differs)[0]
+        assert words.differs
+        joint, degrees, at = re.findall(r": ([a-z ]+) by (\d+)°.* at ([\d.]+) s$", words.details)[0]
         apart = _degrees_apart(other.motion, tween.motion)
         frame, number = np.unravel_index(int(apart.argmax()), apart.shape)
         assert joint == other.motion.skeleton.names[number].replace("_", " ")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from piece_page import wait_for
 
 
+@pytest.mark.long
 def test_long_pieces_stay_fluent(studio_server: Any, studio_page: Any) -> None:
     """A piece of 5,000 postures in 1,000 stretches: own script takes at most 4 ms a frame where it plays."""
     made = [

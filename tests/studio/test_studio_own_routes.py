@@ -160,6 +160,7 @@ def test_a_score_is_brought_looked_at_and_put_on_the_time_line(served: Served) -
     assert served.get(f"/api/movements/{kept['key']}")["name"] == "bends"  # the project keeps it
 
 
+@pytest.mark.long
 def test_a_corpus_is_learned_looked_through_and_deleted(served: Served) -> None:
     upload = bring(served, "bends.score", BENDS.encode()).value
     wish = {"name": "mine", "title": "Bends", "parts": [{"upload": upload["id"]}], "mix": [{"name": "ballet"}]}
@@ -169,7 +170,7 @@ def test_a_corpus_is_learned_looked_through_and_deleted(served: Served) -> None:
     entry = next(one for one in served.get("/api/corpora") if one["name"] == "mine")
     assert (entry["title"], entry["own"]) == ("Bends", True)
     sheet = served.get("/api/corpora/mine")
-    assert sheet["clips"][0]["name"] == "bends"
+    assert sheet["clips"][0]["title"] == "bends"
     picture = served.send("GET", f"/api/thumbnails/{sheet['clips'][0]['key']}/0.png?height=72")
     assert (picture.status, picture.body[:4]) == (200, b"\x89PNG")
     again = served.send("POST", "/api/corpora", wish)
@@ -178,6 +179,7 @@ def test_a_corpus_is_learned_looked_through_and_deleted(served: Served) -> None:
     assert all(one["name"] != "mine" for one in served.get("/api/corpora"))
 
 
+@pytest.mark.long
 def test_a_recording_is_mixed_with_a_corpus_of_keyframes(served: Served, tmp_path: Path) -> None:
     times = np.arange(61) / 30.0
     turns = np.zeros((61, 23, 3))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from pages import beside
 from piece_page import LONG, from_a_to_b, until, wait_for_alternatives
 from studio_server import LARGE, SMALL
 
@@ -59,7 +61,7 @@ def test_from_the_open_page_to_a_file_in_six_clicks(studio_page: Any, tmp_path: 
     assert mouse.clicks <= 6
     assert download.value.suggested_filename == "piece.html"
     download.value.save_as(tmp_path / "piece.html")
-    shared = studio_page.context.new_page()
+    shared = beside(studio_page)
     shared.goto((tmp_path / "piece.html").as_uri())
     until(shared, "window.motionmind?.motion.length > 10")
     assert shared.evaluate("motionmind.motion.insertions.length") == 1
@@ -79,11 +81,11 @@ def test_a_film_of_the_piece_is_taken_away_while_something_else_is_done(
         studio_page.get_by_test_id("open-pose").click()
         studio_page.get_by_test_id("handle-pelvis").wait_for()
         studio_server.edit(edit="delete", block="b1")
-    assert download.value.suggested_filename == "piece.webm"
-    download.value.save_as(tmp_path / "piece.webm")
-    _, found = ffmpeg.count_frames_and_secs(str(tmp_path / "piece.webm"))
+    assert download.value.suggested_filename == "piece.mp4"
+    download.value.save_as(tmp_path / "piece.mp4")
+    _, found = ffmpeg.count_frames_and_secs(str(tmp_path / "piece.mp4"))
     assert found == pytest.approx(seconds, abs=0.1)
-    studio_page.get_by_text("Film saved: piece.webm.").wait_for()
+    studio_page.get_by_text("Film saved: piece.mp4.").wait_for()
 
 
 def test_how_far_a_film_is_leads_to_where_it_is_stopped(studio_server: Any, studio_page: Any) -> None:
@@ -135,7 +137,9 @@ def test_four_alternatives_play_in_step_and_say_what_they_are(studio_page: Any) 
         assert " s" in text
         assert "ballet" in text  # how usual it is
         assert "best" in text  # how sure
-    assert ["differs from the first" in text for text in cards.all_inner_texts()] == [False, True, True, True]
+    assert studio_page.locator(".alternative .differs").count() == 3
+    joints = studio_page.locator(".alternative .joints").all_text_contents()
+    assert ["differs from the first" in text for text in joints] == [False, True, True, True]
     for n in range(1, 5):
         assert painted(studio_page, f"[data-testid=alternative-{n}] > canvas") > 50
 
@@ -263,12 +267,10 @@ def test_it_all_goes_by_keyboard_alone(studio_page: Any) -> None:
             page.keyboard.press("Tab")
         raise AssertionError(f"no Tab leads to {selector}")
 
-    for posture in ("arabesque", "fifth"):
-        reach(f"[data-testid=posture-{posture}]") if posture == "arabesque" else None
-        if posture == "fifth":
-            page.keyboard.press("Shift+Tab")
-            while not page.evaluate("document.activeElement.matches('[data-testid=posture-fifth]')"):
-                page.keyboard.press("Shift+Tab")
+    reach("[data-testid=posture-first]")
+    for posture, key in (("arabesque", "ArrowRight"), ("fifth", "ArrowLeft")):
+        while not page.evaluate(f"document.activeElement.matches('[data-testid=posture-{posture}]')"):
+            page.keyboard.press(key)
         page.keyboard.press("Enter")
     wait_for_alternatives(page)
     page.keyboard.press("3")
@@ -367,3 +369,93 @@ def test_a_telephone_shows_and_approves(studio_page: Any) -> None:
     page.locator(".caption .name").get_by_text("piece at 1.").wait_for()
     chosen = page.get_by_test_id("pose-from").evaluate("(select) => select.selectedOptions[0].textContent")
     assert chosen.startswith("piece at 1.")
+
+
+def test_film_strips_lead_to_a_moment_and_the_dial_to_the_next_four(
+    studio_page: Any, axe_faults: Callable[[Any], list[str]]
+) -> None:
+    page = studio_page
+    from_a_to_b(page)
+    strips = page.locator(".film")
+    assert strips.count() == 4
+    for width in (390, 1024, 1440):
+        page.set_viewport_size({"width": width, "height": 900})
+        assert axe_faults(page) == []
+        assert page.get_by_test_id("spread").bounding_box()["height"] >= 24
+    drawn = "[...document.querySelectorAll('.film img')].filter((one) => one.complete && one.naturalWidth).length"
+    until(page, f"{drawn} === 24")
+    end = page.evaluate("studio.desk.found[1].motion.end")
+    box = page.get_by_test_id("film-2").bounding_box()
+    page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    whole = page.evaluate("Math.max(...studio.desk.found.map(({ motion }) => motion.end))")
+    time = page.get_by_label("Time of all alternatives")
+    assert float(time.input_value()) == pytest.approx(0.5 * end / whole, abs=0.01)
+    lines = [one.evaluate("(line) => parseFloat(line.style.left)") for one in page.locator(".film-line").all()]
+    assert lines[1] == pytest.approx(50.0, abs=1.0)  # the same moment of each
+    ends = page.evaluate("studio.desk.found.map(({ motion }) => motion.end)")
+    assert lines == pytest.approx([min(50.0 * end / own, 100.0) for own in ends], abs=1.0)
+    usual = page.locator(".differs").all_inner_texts()
+    # By keys, then by mouse.
+    page.get_by_test_id("spread").focus()
+    page.keyboard.press("ArrowRight")
+    until(page, "studio.desk.spread === 'far' && studio.desk.state === 'searching'")
+    wait_for_alternatives(page)
+    far = page.locator(".differs").all_inner_texts()
+    assert far != usual
+    dial = page.get_by_test_id("spread")
+    box = dial.bounding_box()
+    page.mouse.click(box["x"] + 2, box["y"] + 0.5 * box["height"])
+    until(page, "studio.desk.spread === 'near'")
+    wait_for_alternatives(page)
+    assert page.locator(".differs").all_inner_texts() not in (usual, far)
+    page.reload()
+    until(page, "window.studio?.desk?.spread === 'near'")
+    wait_for_alternatives(page)
+    page.get_by_test_id("accept").click()
+    until(page, "studio.store.state.piece.blocks.length === 2")
+
+
+def test_what_was_found_before_a_search_is_cancelled_is_accepted(studio_page: Any) -> None:
+    page = studio_page
+    for posture in ("arabesque", "fifth"):
+        page.get_by_test_id(f"posture-{posture}").click()
+    until(page, "studio.desk.found.length > 0")
+    page.evaluate("studio.desk.stop()")
+    page.get_by_test_id("accept").click()
+    until(page, "studio.store.state.piece.blocks.length === 2")
+
+
+def test_the_first_stretch_is_shown_though_the_gallery_answers_late(studio_page: Any) -> None:
+    page = studio_page
+    wait = lambda route: (page.wait_for_timeout(1500), route.continue_())  # noqa: E731
+    page.get_by_test_id("posture-first").wait_for()
+    page.route("**/api/movements/ballet/*", wait)
+    page.reload()
+    page.get_by_test_id("posture-fifth").wait_for()
+    page.evaluate("void studio.api.edit({ edit: 'insert', id: 'x1', source: 'ballet/fifth', first: 0, last: 0 })")
+    until(page, "studio.viewer.piece && studio.viewer.motion === studio.viewer.piece && studio.viewer.isHome")
+    page.wait_for_timeout(2000)  # what comes late comes
+    assert page.evaluate("studio.viewer.isHome")
+    # What is picked and added at once is shown in the piece.
+    page.get_by_test_id("posture-arabesque").click()
+    page.get_by_test_id("insert-posture").click()
+    until(page, "studio.store.state.piece.blocks.length === 2 && studio.viewer.isHome")
+    page.wait_for_timeout(2000)
+    assert page.evaluate("studio.viewer.isHome && studio.viewer.motion === studio.viewer.piece")
+
+
+def test_the_slider_is_as_long_amid_an_insertion_and_credits_open_to_a_finger(studio_page: Any) -> None:
+    page = studio_page
+    from_a_to_b(page)
+    page.get_by_test_id("accept").click()
+    until(page, "studio.store.state.piece.blocks.length === 2 && studio.viewer.isHome")
+    boxes = []
+    for share, is_inserted in ((0.0, False), (0.5, True), (1.0, False)):
+        page.evaluate(f"studio.viewer.player.seek({share} * studio.viewer.player.motion.end)")
+        page.wait_for_timeout(50)
+        assert page.get_by_test_id("made").is_visible() == is_inserted
+        boxes.append(page.get_by_test_id("scrub").bounding_box())
+    assert boxes[0] == boxes[1] == boxes[2]
+    page.get_by_test_id("open-take").click()
+    summary = page.get_by_test_id("credits").locator("summary")
+    assert summary.bounding_box()["height"] >= 24

@@ -85,3 +85,22 @@ def test_no_file_is_long(kind: str) -> None:
     assert files
     lengths = {file.name: len(file.read_text(encoding="utf-8").splitlines()) for file in files}
     assert {name: length for name, length in lengths.items() if length > LONGEST} == {}
+
+
+def test_each_letter_is_one_key() -> None:
+    """While the time line has the focus, no letter of its keys has another meaning elsewhere.
+
+    The look-only page has neither the time line nor the panels; its letters are none of the viewer's.
+    """
+    line = PAGE / "timeline" / "keys.js"
+    own = re.findall(r'^  \["([a-z])", "",', line.read_text("utf-8"), re.M)
+    heard: dict[str, list[str]] = {}
+    for file in PAGE.rglob("*.js"):
+        heard.setdefault(file.parent.name, []).extend(re.findall(r'keys: \["([a-z])"\]', file.read_text("utf-8")))
+    looking = heard.pop("look")
+    editing = own + [letter for letters in heard.values() for letter in letters]
+    shared = heard["shell"] + heard["view"]
+    for letters in (own, looking, shared):
+        assert letters
+    assert len(set(editing)) == len(editing), sorted(editing)
+    assert len({*looking, *shared}) == len(looking) + len(shared), sorted(looking + shared)

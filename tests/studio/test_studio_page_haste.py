@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from pages import beside
 from piece_page import from_a_to_b, piece, until, wait_for, wait_for_alternatives
 from scores import BENDS
 
@@ -42,7 +43,7 @@ def test_what_is_varied_is_the_piece_as_it_stands(studio_server: Served, studio_
 
 
 def test_what_another_window_does_before_the_order_comes_is_varied_too(studio_server: Served, studio_page: Any) -> None:
-    page = studio_page.context.new_page()  # what is refused is told of on a page's console
+    page = beside(studio_page)  # what is refused is told of on a page's console
     page.goto(studio_server.url)
     studio_server.insert("b1", "ballet/adagio", 0, 40)
     page.get_by_test_id("open-vary").click()

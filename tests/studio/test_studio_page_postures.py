@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import pytest
 from piece_page import blocks, wait_for, wait_for_alternatives
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ def saved(page: Any) -> list[str]:
     return [one["name"] for one in page.evaluate("studio.store.state.postures")]
 
 
+@pytest.mark.long
 def test_a_posture_is_renamed_and_what_was_made_of_it_stays(studio_server: Served, studio_page: Any) -> None:
     page = studio_page
     save(studio_server, "reach", "ballet/arabesque")
@@ -50,6 +52,7 @@ def test_a_posture_is_renamed_and_what_was_made_of_it_stays(studio_server: Serve
     assert sorted(saved(page)) == ["reach", "rest"]
 
 
+@pytest.mark.long
 def test_a_posture_is_deleted_and_comes_back(studio_server: Served, studio_page: Any) -> None:
     page = studio_page
     save(studio_server, "rest", "ballet/fifth")

@@ -9,7 +9,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
-from pages import RESTING, Tabs
+from pages import RESTING, Tabs, beside
 from piece_page import until
 from studio_server import LARGE, SMALL, Client, Served
 
@@ -62,7 +62,7 @@ def test_another_window_sees_an_edit_and_takes_back_its_own_alone(
     studio_server: Served, studio_page: Any, expect: Any
 ) -> None:
     expect(studio_page.get_by_test_id("posture-arabesque")).to_be_visible()
-    other = studio_page.context.new_page()
+    other = beside(studio_page)
     other.goto(studio_server.url)  # the cookie lets it in
     expect(other.get_by_test_id("posture-arabesque")).to_be_visible()
     mine = Client(studio_server.url, studio_page.evaluate("studio.window"))
@@ -176,7 +176,7 @@ def test_a_page_elsewhere_can_neither_read_nor_write(studio_server: Served, stud
     elsewhere = ThreadingHTTPServer(("127.0.0.1", 0), Elsewhere)
     threading.Thread(target=elsewhere.serve_forever, daemon=True).start()
     try:
-        page = studio_page.context.new_page()
+        page = beside(studio_page)
         page.goto(f"http://127.0.0.1:{elsewhere.server_address[1]}/")
         tried = page.evaluate(attack, studio_server.url)
     finally:

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from motionmind.errors import MotionMindError
 from motionmind.studio import edits as e
 from motionmind.studio.checks import check_movements, check_names
-from motionmind.studio.piece import State, Verdict, apply, apply_all
+from motionmind.studio.edit_words import _DESCRIPTIONS, words_of
+from motionmind.studio.neighbours import End, Verdict
+from motionmind.studio.piece import State, apply, apply_all
 from motionmind.studio.questions import question_of
 
 IDS = [f"b{number}" for number in range(8)]
@@ -21,11 +23,16 @@ before = st.none() | ids
 sources = st.sampled_from(["ballet/adagio", "~ballet/adagio", "karate/kata", "own/rest"])
 passing = st.builds(e.Passing, sources, FRAMES)
 blocks = st.builds(e.Block, ids, sources, FRAMES, FRAMES, st.booleans())
+notes = st.builds(
+    e.Note, st.sampled_from(["n1", "n2"]), st.sampled_from(["note", "marker", "section"]), st.just("x"), ids, FRAMES
+)
 singles = st.one_of(
     st.builds(e.Insert, ids, sources, FRAMES, FRAMES, st.booleans(), before),
     st.builds(e.Move, ids, before),
     st.builds(e.Trim, ids, FRAMES, FRAMES),
-    st.builds(e.Split, ids, FRAMES, ids),
+    st.builds(e.HoldPosture, ids, st.sampled_from([0.0, 0.5, 3600.0])),
+    st.builds(e.Play, ids, st.sampled_from([0.5, 1.0, 1.25]), st.integers(1, 3)),
+    st.builds(e.Split, ids, FRAMES, ids, st.integers(1, 3), ids, ids),
     st.builds(e.Mirror, ids),
     st.builds(e.Delete, ids),
     st.builds(e.Choose, ids, ids, st.integers(1, 4)),
@@ -34,7 +41,12 @@ singles = st.one_of(
     st.builds(e.Arrange, st.lists(blocks, max_size=4).map(tuple), st.just({"words": "vary the piece"})),
     st.builds(e.SavePosture, st.sampled_from(["rest", "reach"]), st.none() | st.just("m-1")),
     st.builds(e.SetCorpus, st.sampled_from(["ballet", "karate"])),
+    st.builds(e.SetTempo, st.floats(20.0, 300.0), st.integers(2, 16)),
     st.builds(e.SetTitle, st.text(max_size=5)),
+    st.builds(e.Annotate, notes),
+    st.builds(e.Erase, st.sampled_from(["n1", "n2"])),
+    st.builds(e.SaveVersion, st.just("before"), st.booleans()),
+    st.builds(e.GoBack, st.just("before")),
 )
 anything = singles | st.builds(e.Several, st.lists(singles, min_size=1, max_size=3).map(tuple))
 BEGIN = State(
@@ -81,14 +93,17 @@ def test_every_state_is_sound(history):
     for block in state.blocks:
         assert block.first <= block.last
         assert not block.source.startswith(("~", "own/"))
-    assert [seam.pair for seam in state.seams] == list(pairwise(names))
+        assert block.first == block.last or block.hold == 0.0
+        assert block.first < block.last or block.repeats == 1
+    heard = [name for name, block in zip(names, state.blocks, strict=True) for _ in range(1 + (block.repeats > 1))]
+    assert [seam.pair for seam in state.seams] == list(pairwise(heard))
 
 
 @given(st.lists(singles, max_size=8), singles)
 def test_what_an_edit_does_not_touch_stays(history, edit):
     _, state = played(history)
     after = fits(state, edit)
-    if after is None or isinstance(edit, e.Arrange):
+    if after is None or isinstance(edit, e.Arrange | e.GoBack):
         return
     touched = e.touched(edit)
     now = {block.id: block for block in after.blocks}
@@ -100,8 +115,11 @@ def test_what_an_edit_does_not_touch_stays(history, edit):
         assert touched & {pair, *pair} or after.verdicts.get(pair) == verdict
     assert "/corpus" in touched or after.corpus == state.corpus
     assert "/title" in touched or after.title == state.title
+    assert "/tempo" in touched or (after.tempo, after.counts) == (state.tempo, state.counts)
     for name, key in state.postures.items():
         assert f"own/{name}" in touched or after.postures[name] == key
+    for name, note in state.notes.items():
+        assert f"/note/{name}" in touched or after.notes[name].text == note.text
 
 
 @given(st.lists(singles, max_size=6), singles, st.lists(singles, max_size=4))
@@ -249,6 +267,7 @@ def test_a_question_is_told_apart_by_all_that_its_answer_depends_on():
         question_of((one, other), e.Ask(2.0), "ballet", versions),
         question_of((one, other), e.Ask(pins=(e.Pin("left_wrist"),)), "ballet", versions),
         question_of((one, other), e.Ask(passing=(e.Passing("karate/kata", 3),)), "ballet", versions),
+        question_of((one, other), e.Ask(reaches=(e.Reach("left_wrist", (0.0, 1.0, 0.0), 1.0),)), "ballet", versions),
         question_of((other, one), e.Ask(), "ballet", versions),
         *(
             question_of((msgspec.structs.replace(one, **change), other), e.Ask(), "ballet", versions)
@@ -257,6 +276,11 @@ def test_a_question_is_told_apart_by_all_that_its_answer_depends_on():
     ]
     assert len({asked, *others}) == 1 + len(others)
     assert question_of(seam.ends, e.Ask(), "ballet", versions | {"karate": "v2"}) == asked
+    # Projects keep their answers under these hashes.
+    ends = End("ballet/arabesque", 0, moves=False), End("ballet/fifth", 0, moves=False)
+    assert question_of(ends, e.Ask(), "ballet", {"ballet": "v1"}) == "2ca5cf5388b399177bad07d4735b25c8"
+    wishes = e.Ask(2.0, (e.Passing("ballet/plie"),), (e.Pin("left_wrist", "place", 0.25, 1.0),))
+    assert question_of(ends, wishes, "ballet", {"ballet": "v1"}) == "f2144278ae2e5603bac6c3f7f4f6f09d"
     kata = e.Ask(passing=(e.Passing("karate/kata", 3),))
     assert question_of(seam.ends, kata, "ballet", versions) != question_of(
         seam.ends, kata, "ballet", versions | {"karate": "v2"}
@@ -285,11 +309,13 @@ def test_no_edit_is_read_from_what_is_none(text):
 
 
 def test_words_say_what_an_edit_does():
-    assert e.words_of(e.Several((e.Mirror("b1"), e.Decide("b1", "b2", "locked")))) == "lock an insertion"
-    assert e.words_of(e.Several((e.Mirror("b1"),), "turn everything round")) == "turn everything round"
-    assert e.words_of(e.SavePosture("rest", None)) == "delete the posture rest"
+    assert words_of(e.Several((e.Mirror("b1"), e.Decide("b1", "b2", "locked")))) == "lock an insertion"
+    assert words_of(e.Several((e.Mirror("b1"),), "turn everything round")) == "turn everything round"
+    assert words_of(e.SavePosture("rest", None)) == "delete the posture rest"
     for kind in e.Single.__args__:
-        assert kind in e._DESCRIPTIONS or kind in (e.Decide, e.Arrange, e.SavePosture)
+        assert kind in _DESCRIPTIONS or kind in (
+            *(e.Decide, e.Arrange, e.Annotate, e.SaveVersion, e.GoBack, e.SavePosture),
+        )
 
 
 def test_a_word_on_a_seam_goes_with_its_ends_into_another_order() -> None:
@@ -308,3 +334,79 @@ def test_a_word_on_a_seam_goes_with_its_ends_into_another_order() -> None:
     after = apply(state, e.Arrange((*new, state.block("b3")), {}))
     assert [seam.verdict for seam in after.seams] == [Verdict(decision="discarded"), Verdict(chosen=3), Verdict()]
     assert apply(state, e.Arrange(state.blocks, {})).seams == state.seams
+
+
+# --- notes ------------------------------------------------------------------------------------------------------------
+
+
+@given(st.lists(singles, max_size=12))
+def test_a_note_is_in_the_piece_unless_that_was_empty_meanwhile(history):
+    state = apply(BEGIN, e.Annotate(e.Note("n3", "note", "x", "b1", 4)))
+    for edit in history:
+        after = fits(state, edit)
+        state = after if after is not None and after.blocks else state
+    assert state.notes["n3"].block in {block.id for block in state.blocks}
+
+
+def shown_by(state: State, note: e.Note) -> tuple[str, bool, int] | None:
+    """The movement and frame that a note is about; None if its block shows that no longer."""
+    block = state.block(note.block)
+    return (block.source, block.mirrored, note.frame) if block.first <= note.frame <= block.last else None
+
+
+@given(st.integers(0, 3), st.integers(2, 8), st.integers(3, 8))
+def test_a_note_goes_with_its_frame_when_its_stretch_is_split_moved_or_varied(place, frame, at):
+    note = e.Note("n1", "note", "softer", IDS[place], frame, 0.2)
+    state = apply(BEGIN, e.Annotate(note))
+    about = shown_by(state, note)
+    for edit in (e.Split(IDS[place], at, "b7"), e.Move(IDS[place]), e.Trim(IDS[place], 4, 5)):
+        after = apply(state, edit)
+        kept = after.notes["n1"]
+        assert (kept.text, kept.after, kept.frame) == ("softer", 0.2, frame)
+        if not isinstance(edit, e.Trim):
+            assert shown_by(after, kept) == about
+    assert apply(apply(state, e.Trim(IDS[place], 4, 5)), e.Trim(IDS[place], 2, 8)) == state  # it comes back
+    pieces = tuple(
+        e.Block(f"b{5 + i}", "ballet/adagio", first, last) for i, (first, last) in enumerate([(6, 8), (2, 5)])
+    )
+    varied = apply(state, e.Arrange(pieces))
+    assert shown_by(varied, varied.notes["n1"]) == about
+    alike = tuple(e.Block(f"c{i}", "ballet/adagio", 2, 8) for i in range(4))
+    assert apply(state, e.Arrange(alike)).notes["n1"].block == f"c{place}"  # the nearest of several
+
+
+@given(st.integers(0, 3), st.permutations(IDS[:4]))
+def test_a_note_of_a_deleted_stretch_stays_at_its_place(place, order):
+    others = tuple(e.Block(name, f"ballet/{name}", 2, 8) for name in IDS[:4])  # no two show the same
+    state = State(blocks=others, used=frozenset(IDS[:4]))
+    state = apply(state, e.Annotate(e.Note("n1", "section", "waltz", IDS[place], 5)))
+    rest = list(IDS[:4])
+    for name in order:
+        rest.remove(name)
+        after = apply(state, e.Delete(name))
+        before, now = state.notes["n1"], after.notes["n1"]
+        if name != before.block:
+            assert now == before
+        elif rest:
+            later = [one for one in rest if IDS.index(one) > IDS.index(name)]
+            assert now.block == (later[0] if later else rest[-1])
+            assert now.frame == (2 if later else 8)
+        state = after
+    assert state.notes["n1"].text == "waltz"
+
+
+@pytest.mark.parametrize(
+    ("note", "words"),
+    [
+        (e.Note("n1", "note", "x", "b9", 2), "no longer in the piece"),
+        (e.Note("n1", "note", "x", "b0", 9), "frames 2 to 8, not 9"),
+        (e.Note("n1", "note", " ", "b0", 2), "a note needs a text"),
+        (e.Note("n1", "section", "", "b0", 2), "a section needs a text"),
+    ],
+)
+def test_a_note_is_refused_in_words(note, words):
+    with pytest.raises(MotionMindError, match=words):
+        apply(BEGIN, e.Annotate(note))
+    assert apply(BEGIN, e.Annotate(e.Note("n1", "marker", "", "b0", 2))).notes["n1"].kind == "marker"
+    with pytest.raises(MotionMindError, match="no longer there"):
+        apply(BEGIN, e.Erase("n1"))

@@ -15,7 +15,8 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 from motionmind.studio import edits as e
-from motionmind.studio.piece import Finding, Found, State, apply_all
+from motionmind.studio.findings import Finding, Found
+from motionmind.studio.piece import State, apply_all
 from motionmind.studio.placement import Marks, lay_out, performance
 from motionmind.studio.view import state_of, view_of
 from motionmind.variation.piece import Piece
@@ -157,7 +158,7 @@ def test_the_view_names_what_stands_where():
     at = [view["seams"][0]["at"], view["blocks"][1]["at"], view["seams"][1]["at"], view["seconds"]]
     assert at == pytest.approx([0.5, 1.0, 1.2, 1.3])
     empty = view_of(State(), lambda _: None, Marks(movement), str.upper)
-    assert empty == {"seconds": 0.0, "parts": [], "blocks": [], "seams": []}
+    assert empty == {"seconds": 0.0, "parts": [], "blocks": [], "seams": [], "notes": []}
 
 
 def test_parts_that_cannot_be_one_movement_are_refused():

@@ -11,7 +11,8 @@ from studio_server import Served
 from motionmind.errors import MotionMindError
 from motionmind.studio import piece
 from motionmind.studio.edits import Decide, Delete, Insert, Mirror, Move, SetCorpus, Trim
-from motionmind.studio.piece import Finding, Found
+from motionmind.studio.findings import Finding, Found
+from motionmind.studio.journal import OpenElsewhereError
 from motionmind.studio.project import Project, RefusedError
 from motionmind.studio.view import chosen_at
 
@@ -101,6 +102,23 @@ def with_insertion(project: Project) -> Found:
     found = Found(project.movements.keep(motion), 2.0, "usual")
     project.keep_finding(Finding(project.question(seam), True, "too fast", (found,)))
     return found
+
+
+def test_insertions_stay_where_they_were_when_more_are_found(make_project: Make) -> None:
+    project = make_project()
+    first = with_insertion(project)
+    (seam,) = project.state.seams
+    second = Found(project.movements.keep(ballet_clip("plies").slice(10, 19)), 1.0, "rare")
+    question = project.question(seam)
+    again = Found(first.key, first.seconds, "in other words")
+    whole = Finding(question, True, "too fast", (first, second))
+    assert project.keep_finding(Finding(question, True, "from one to the other", (second, again))) == whole
+    count = project.sequence
+    assert project.keep_finding(Finding(question, True, "too fast", None)) == whole  # judged late
+    assert project.keep_finding(Finding(question, True, "no movement found", ())) == whole
+    assert project.sequence == count
+    project.close()
+    assert make_project().finding(seam) == whole
 
 
 def test_a_locked_insertion_stays_whatever_the_corpus(make_project: Make) -> None:
@@ -198,8 +216,7 @@ def test_what_cannot_be_applied_changes_nothing(make_project: Make) -> None:
 
 def test_one_process_holds_a_project(make_project: Make) -> None:
     project = make_project()
-    project.tell("http://127.0.0.1:1234")
-    with pytest.raises(MotionMindError, match=r"already open in a studio at http://127\.0\.0\.1:1234"):
+    with pytest.raises(OpenElsewhereError, match="already open in a studio"):
         Project.open(project.path)
 
 
@@ -285,9 +302,9 @@ def test_two_windows_see_each_others_edits(studio_server: Served) -> None:
     other = studio_server.another("w2")
     with other.listening() as events:
         first = next(events)
-        assert first == ("project", {"sequence": other.project()["sequence"]})
+        assert first == ("project", {"sequence": other.project()["sequence"], "notices": 0})
         sequence = studio_server.insert("b1", "ballet/adagio", 0, 9)["sequence"]
-        assert next(events) == ("project", {"sequence": sequence})
+        assert next(events) == ("project", {"sequence": sequence, "notices": 0})
     assert [one["id"] for one in other.project()["piece"]["blocks"]] == ["b1"]
     assert other.project()["undo"] is None
 

@@ -16,10 +16,7 @@ from motionmind.studio.token import Keys
 
 def test_the_schema_has_every_route_and_no_other(studio_server: Served) -> None:
     found = set()
-    parts = [*app._open_routes(Keys(), 80)]
-    for part in app._PARTS:
-        parts += part.routes(studio_server.studio)
-    for route in parts:
+    for route in app.routes_of(studio_server.studio, Keys(), 80):
         assert isinstance(route, Route)
         path = re.sub(r":\w+\}", "}", route.path)
         if path.startswith(("/api/", "/health")):

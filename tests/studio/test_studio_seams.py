@@ -1,5 +1,6 @@
 """Seams judged and smoothed: what a worker answers, and what the studio makes of it in the background."""
 
+import re
 import time
 
 import numpy as np
@@ -8,8 +9,8 @@ import pytest
 from motionmind.geometry import rotations as rot
 from motionmind.studio import worker_loop
 from motionmind.studio.alternatives import MAX_ALTERNATIVES
-from motionmind.studio.edits import Ask, Passing, Pin
-from motionmind.studio.piece import End
+from motionmind.studio.asks import Ask, Passing, Pin, Reach
+from motionmind.studio.neighbours import End
 from motionmind.studio.seams import Question, judge, smooth
 from motionmind.studio.sides import options_of, sides_of
 from motionmind.tween.engine import Engine
@@ -75,6 +76,25 @@ def test_wishes_are_kept(engine, clips):
     assert (states == engine.space.assign(wanted)).mean(axis=1).max() > 0.9, way.max(axis=1)
 
 
+def test_places_are_reached_or_the_words_say_how_far_off_they_are(clips):
+    ends = End("ballet/plies", 20, False), End("ballet/adagio-barre", 9, False)
+    (plain, _), *_ = smooth(say_nothing, "ballet", question(clips, ends, Ask(2.0)))[0]
+    wrist = plain.skeleton.index("right_wrist")
+    place = plain.at([1.0]).positions()[0, wrist] + [0.0, 0.1, 0.0]
+    near, far = (Reach("right_wrist", (float(place[0]), float(place[1]) + up, float(place[2])), 1.0) for up in (0, 9))
+    (motion, words), *_ = smooth(say_nothing, "ballet", question(clips, ends, Ask(2.0, reaches=(near,))))[0]
+    assert np.linalg.norm(motion.at([1.0]).positions()[0, wrist] - place) < 0.01
+    assert re.search(r"reaches the place to 0\.\d cm", words)
+    (motion, words), *_ = smooth(say_nothing, "ballet", question(clips, ends, Ask(2.0, reaches=(far,))))[0]
+    off = np.linalg.norm(motion.at([1.0]).positions()[0, wrist] - far.place)
+    assert f"right wrist is {100.0 * off:.1f} cm from its place at 1 s" in words
+    assert "reaches" not in words
+    late = Reach("right_wrist", near.place, 2.5)
+    found, failure = smooth(say_nothing, "ballet", question(clips, ends, Ask(2.0, reaches=(late,))))
+    assert found == []
+    assert failure == "no movement found: reach right_wrist: 2.5 s is not between A and B: the movement lasts 2.00 s"
+
+
 def test_what_cannot_be_is_said_in_a_line(clips):
     ends = End("ballet/plies", 20, False), End("ballet/adagio-barre", 9, False)
     held = Ask(
@@ -125,6 +145,7 @@ def test_seams_are_smoothed_in_the_background(studio_server):
     assert back["alternatives"] == seam["alternatives"]
 
 
+@pytest.mark.long
 def test_smoothing_is_stopped_and_goes_on(studio_server):
     for number, clip in enumerate(("plies", "adagio-barre", "tendus", "fondus", "plies-crossed", "frappes")):
         studio_server.insert(f"b{number}", f"ballet/{clip}", 5 + number, 9 + number)

@@ -6,8 +6,8 @@ import pytest
 from motionmind.body.mirror import mirrored
 from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
-from motionmind.studio.edits import Ask, Passing, Pin
-from motionmind.studio.piece import End
+from motionmind.studio.asks import Ask, Passing, Pin, Reach
+from motionmind.studio.neighbours import End
 from motionmind.studio.sides import options_of, sides_of
 from motionmind.tween.engine import Engine
 from motionmind.variation.piece import Piece
@@ -80,8 +80,19 @@ def test_wishes_are_options_of_the_engine(engine, clip):
     assert options["hold"] == ["left_hip", "left_knee", "left_ankle"]
     assert options["pin"] == dict.fromkeys(["right_clavicle", "right_shoulder", "right_elbow", "right_wrist"], "A")
     assert options_of(Ask(), clip.skeleton, movements.__getitem__) == {}
-    with pytest.raises(MotionMindError, match="no joint 'tail'"):
-        options_of(Ask(pins=(Pin("tail"),)), clip.skeleton, movements.__getitem__)
+    reach = Reach("left_wrist", (0.3, 1.4, 0.5), 1.2)
+    assert options_of(Ask(reaches=(reach,)), clip.skeleton, {}.__getitem__) == {
+        "reach": [("left_wrist", (0.3, 1.4, 0.5), 1.2)]
+    }
+    stay = Pin("left_ankle", "place", 0.25, 0.5)
+    assert options_of(Ask(pins=(stay,)), clip.skeleton, {}.__getitem__) == {"stay": [("left_ankle", 0.25, 0.5)]}
+    for wrong in (
+        Ask(pins=(Pin("tail"),)),
+        Ask(pins=(Pin("tail", "place"),)),
+        Ask(reaches=(Reach("tail", (0.0, 1.0, 0.0), 1.0),)),
+    ):
+        with pytest.raises(MotionMindError, match="no joint 'tail'"):
+            options_of(wrong, clip.skeleton, movements.__getitem__)
 
 
 def test_a_limb_that_is_pinned_stays_on_the_way(engine, clip):

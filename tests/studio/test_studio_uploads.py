@@ -5,28 +5,35 @@ from __future__ import annotations
 import asyncio
 import io
 import os
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 import zipfile
 from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 import pytest
+from gltf_files import with_clips
 from scores import TITLED
+from studio_server import running
 
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 from motionmind.formats import write_motion
 from motionmind.geometry import rotations as rot
+from motionmind.studio import room as room_module
 from motionmind.studio import uploads as module
 from motionmind.studio.corpora import Lesson, Mixed, Part, Recording, check_lesson, learn, list_all
+from motionmind.studio.project import Project
 from motionmind.studio.reading import is_posed_first
+from motionmind.studio.room import Room
 from motionmind.studio.uploads import Choices, Upload, Uploads
 
 T = TypeVar("T")
@@ -82,6 +89,7 @@ def test_understands_a_recording(uploads: Uploads, tmp_path: Path) -> None:
     assert read.positions() == pytest.approx(motion.positions(), abs=1e-4)
 
 
+@pytest.mark.long
 def test_unit_and_rate_are_choices(uploads: Uploads, tmp_path: Path) -> None:
     found = bring(uploads, "turn.bvh", bvh(tmp_path, recording()))
     again = asyncio.run(uploads.read(found.id, Choices(unit="m", fps=60.0, skip=2)))
@@ -93,6 +101,7 @@ def test_unit_and_rate_are_choices(uploads: Uploads, tmp_path: Path) -> None:
         asyncio.run(uploads.read(found.id, Choices(unit="ell")))
 
 
+@pytest.mark.long
 def test_a_pose_that_was_put_first_is_left_out(uploads: Uploads, tmp_path: Path) -> None:
     motion = recording()
     rotations = motion.rotations.copy()
@@ -107,6 +116,17 @@ def test_a_pose_that_was_put_first_is_left_out(uploads: Uploads, tmp_path: Path)
     assert len(uploads.motion(found.id, 0)) == 59
     kept = asyncio.run(uploads.read(found.id, Choices(skip=0)))
     assert len(uploads.motion(kept.id, 0)) == 60
+
+
+@pytest.mark.parametrize("flip_deg", [0.0, 90.0])
+def test_a_pose_before_a_recording_with_flips(flip_deg: float) -> None:
+    motion = recording()
+    rotations = motion.rotations.copy()
+    rotations[0] = [0.0, 0.0, 0.0, 1.0]
+    for joint in ("left_knee", "right_knee", "left_shoulder", "right_shoulder"):
+        rotations[1:, human23().index(joint)] = rot.exp(np.array([0.0, 0.0, 1.2]))
+    rotations[5, human23().index("left_wrist")] = rot.exp(np.radians([flip_deg, 0.0, 0.0]))
+    assert is_posed_first(replace(motion, rotations=rotations))
 
 
 def test_quick_movement_is_no_pose_that_was_put_first() -> None:
@@ -130,6 +150,27 @@ def test_names_joints_that_jump(uploads: Uploads, tmp_path: Path) -> None:
     assert fault.seconds == pytest.approx(0.25, abs=0.01)
 
 
+@pytest.mark.parametrize("suffix", ["glb", "vrma"])
+def test_lists_every_clip_of_a_file(uploads: Uploads, suffix: str, tmp_path: Path) -> None:
+    turns = recording(), recording(90)
+    path = with_clips(tmp_path / f"a.{suffix}", list(zip(["Slow <b>", "Long\n"], turns, strict=True))).write()
+    found = bring(uploads, f"My hero.{suffix}", path.read_bytes())
+    assert found.error == ""
+    assert found.facts is not None
+    assert found.facts.notes == ()
+    assert [(one.name, one.frames) for one in found.facts.clips] == [
+        ("My hero#Slow <b>", 60),
+        ("My hero#Long\\u000a", 90),
+    ]
+    for number, turn in enumerate(turns):
+        motion = uploads.motion(found.id, number)
+        assert rot.angle(motion.rotations, turn.rotations).max() < 1e-3
+    alone = with_clips(tmp_path / f"b.{suffix}", [("Slow", turns[0])]).write()
+    facts = bring(uploads, f"one.{suffix}", alone.read_bytes()).facts
+    assert facts is not None
+    assert [one.name for one in facts.clips] == ["one"]
+
+
 def test_reads_a_score(uploads: Uploads) -> None:
     found = bring(uploads, "bends.score", TITLED.encode())
     assert found.facts is not None
@@ -149,6 +190,7 @@ def test_recorded_movement(uploads: Uploads, shared_data: Path) -> None:
     assert found.facts.faults[0].joint == "right_hip"
 
 
+@pytest.mark.long
 def test_an_amc_needs_its_asf(uploads: Uploads, shared_data: Path) -> None:
     amc, asf = ((shared_data / "cmu-135" / name).read_bytes() for name in ("135_04.amc", "135.asf"))
     alone = bring(uploads, "135_04.amc", amc)
@@ -160,6 +202,7 @@ def test_an_amc_needs_its_asf(uploads: Uploads, shared_data: Path) -> None:
     assert bring(uploads, "135_04.amc", amc).facts is not None  # the .asf is there already
 
 
+@pytest.mark.long
 def test_goes_with_the_studio(tmp_path: Path) -> None:
     uploads = Uploads()
     found = bring(uploads, "bends.score", TITLED.encode())
@@ -174,6 +217,104 @@ def test_goes_with_the_studio(tmp_path: Path) -> None:
     assert not other.exists()
 
 
+HOLDER = "import sys; from motionmind.studio.room import Room; room = Room(); "
+HOLDER += "print(room.folder, flush=True); sys.stdin.read()"
+
+
+def test_folders_of_killed_studios_go_at_once_and_of_running_ones_stay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    environment = os.environ | {"TMPDIR": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", HOLDER]
+    with ExitStack() as stack:
+        holders = [
+            stack.enter_context(
+                subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment)
+            )
+            for _ in range(3)
+        ]
+        folders = [Path(holder.stdout.readline().rstrip()) for holder in holders if holder.stdout]
+        for folder in folders:
+            (folder / "upload").mkdir()
+            os.utime(folder, (0.0, 0.0))  # however old it is
+        holders[0].kill()
+        holders[0].wait()
+        room = Room()
+        assert [folder.exists() for folder in folders] == [False, True, True]
+        assert all((folder / "upload").is_dir() for folder in folders[1:])
+        holders[1].communicate("")  # it ends
+        assert [folder.exists() for folder in folders] == [False, False, True]
+        holders[2].kill()
+    room.close()
+    Room().close()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_is_taken_for_a_leftover_before_it_is_locked_is_made_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    lock_alone, taken, others = room_module.lock_alone, list[Path](), list[Room]()
+
+    def interrupted(descriptor: int) -> bool:
+        if not taken:
+            taken.extend(tmp_path.iterdir())
+            monkeypatch.setattr(room_module, "lock_alone", lock_alone)
+            others.append(Room())  # of another process, which removes the first
+        return lock_alone(descriptor)
+
+    monkeypatch.setattr(room_module, "lock_alone", interrupted)
+    room = Room()
+    assert [folder.exists() for folder in (*taken, room.folder)] == [False, True]
+    room.close()
+
+
+@pytest.fixture
+def _heeds_hangups() -> Iterator[None]:
+    """Let processes heed SIGHUP even if the tests run under nohup."""
+    handler = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, handler)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="these signals are POSIX")
+@pytest.mark.usefixtures("_heeds_hangups")
+@pytest.mark.parametrize("number", ["SIGTERM", "SIGHUP", "SIGINT"])
+def test_a_signal_that_ends_the_studio_removes_uploads_and_keeps_the_project(tmp_path: Path, number: str) -> None:
+    (tmp_path / "tmp").mkdir()
+    path = tmp_path / "piece.motionmind"
+    with running(path, home=tmp_path, TMPDIR=str(tmp_path / "tmp")) as (process, client), client.listening() as events:
+        next(events)
+        answer = client.send("POST", "/api/imports", TITLED.encode(), X_Name="bends.score")
+        assert answer.status == 200
+        assert list((tmp_path / "tmp").glob("motionmind-studio-*/*/upload.score"))
+        client.insert("b0", "ballet/adagio", 0, 9)
+        process.send_signal(signal.Signals[number])
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == (130 if number == "SIGINT" else 143)
+    assert "Traceback" not in err
+    assert not list((tmp_path / "tmp").glob("motionmind-*"))
+    again = Project.open(path)
+    assert [block.id for block in again.state.blocks] == ["b0"]
+    again.close()
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="these signals are POSIX")
+def test_the_end_of_the_terminal_ends_no_studio_that_ignores_it(tmp_path: Path) -> None:
+    handler = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+    try:
+        with running(tmp_path / "piece.motionmind", home=tmp_path) as (process, client):
+            process.send_signal(signal.SIGHUP)
+            client.insert("b0", "ballet/adagio", 0, 9)
+            assert process.poll() is None
+    finally:
+        signal.signal(signal.SIGHUP, handler)
+
+
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="there nobody can be asked whether a process runs")
 def test_a_studio_that_was_killed_leaves_nothing_for_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
@@ -235,6 +376,7 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes]]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_no_file_does_harm(uploads: Uploads, kind: str) -> None:
     name, data = HOSTILE[kind]
@@ -264,6 +406,7 @@ def test_a_score_names_no_files_of_this_machine(uploads: Uploads, line: str, wor
     assert found.error == f"nosy.score:1: {words}"
 
 
+@pytest.mark.long
 def test_scores_take_in_others_that_were_brought(uploads: Uploads) -> None:
     words, phrases = TITLED.partition("clip")[0], "include words.score\nphrase dip\n  1 | bend\n"
     top = "include ../steps/phrases.score\nclip two\n  start | stand\n  dip\n  1 | stand\n"
@@ -296,7 +439,9 @@ def test_names_are_no_paths(uploads: Uploads, name: str) -> None:
     assert len(found.error) <= 400
 
 
-@pytest.mark.parametrize("name", ["virus.exe", "dance.fbx", "markers.c3d", "text", "scene.gltf", "aist.pkl"])
+@pytest.mark.parametrize(
+    "name", ["virus.exe", "dance.fbx", "markers.c3d", "text", "scene.gltf", "aist.pkl", "a.usdz", "a.bvh.gz"]
+)
 def test_other_files_are_refused(uploads: Uploads, name: str) -> None:
     with pytest.raises(MotionMindError, match=name):
         bring(uploads, name, b"anything")
@@ -308,7 +453,7 @@ def test_a_file_that_is_too_large_leaves_nothing(uploads: Uploads, monkeypatch: 
     with pytest.raises(MotionMindError, match="larger than 1 MB"):
         bring(uploads, "large.bvh", bytes(2**20 + 1))
     assert uploads.list() == ()
-    assert list(uploads._folder.iterdir()) == []
+    assert [path.name for path in uploads._room.folder.iterdir()] == ["lock"]
 
 
 def test_a_file_that_takes_too_long_is_given_up(uploads: Uploads, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -321,6 +466,7 @@ def test_a_file_that_takes_too_long_is_given_up(uploads: Uploads, monkeypatch: p
 # --- corpora ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_learns_a_corpus_of_what_was_brought(uploads: Uploads, tmp_path: Path) -> None:
     home = tmp_path / "home"
     found = bring(uploads, "turn.bvh", bvh(tmp_path, recording()))

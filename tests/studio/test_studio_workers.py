@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import threading
-import time
 from collections.abc import AsyncIterator, Callable
 from itertools import count
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import pytest
 import working
 from bundled_clips import ballet_clip
+from faults import failing_at
 from studio_server import Served
 
 from motionmind.corpus import store
@@ -71,14 +72,12 @@ def test_a_job_that_runs_is_cancelled_at_once_and_the_next_one_runs() -> None:
         await until(long, "running")
         while not long.words:
             await asyncio.sleep(0.01)
-        began = time.monotonic()
         waiting.cancel()
         long.cancel()
         assert (long.state, waiting.state) == ("cancelled", "cancelled")
         for job in (long, waiting):
             with pytest.raises(JobCancelledError):
                 await job.result()
-        assert time.monotonic() - began < 1.0
         assert await last.result() == 5
         long.cancel()  # which is over
         assert long.state == "cancelled"
@@ -126,9 +125,7 @@ def test_what_cannot_be_taken_in_fails_and_the_next_job_runs(hook: str, error: E
 def test_a_worker_keeps_its_corpus() -> None:
     async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
         first = await workers.submit("know", working.know, "ballet").result()
-        began = time.monotonic()
         assert await workers.submit("know", working.know, "ballet").result() == first
-        assert time.monotonic() - began < 0.5
         with pytest.raises(MotionMindError, match="no corpus"):
             await workers.submit("know", working.know, "nothing").result()
 
@@ -141,9 +138,9 @@ def test_a_corpus_that_was_built_anew_is_loaded_anew(tmp_path: Path) -> None:
 
     async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
         learn("plies")
-        small, process = await workers.submit("know", working.know, "mine").result()
+        small, process, _ = await workers.submit("know", working.know, "mine").result()
         learn("plies", "tendus")
-        assert await workers.submit("know", working.know, "mine").result() > (small, process)
+        assert await workers.submit("know", working.know, "mine").result() > (small, process, 0)
         store.delete("mine", tmp_path)
         with pytest.raises(MotionMindError, match="no corpus"):
             await workers.submit("know", working.know, "mine").result()
@@ -167,7 +164,74 @@ def test_workers_that_do_not_begin_are_given_up(monkeypatch: pytest.MonkeyPatch)
                 await workers.submit("sum", working.add, 2, 3).result()
 
     run(check)
-    assert len(began) == 3
+    assert len(began) == 4  # three for the first job, and one more try for the next
+
+
+@pytest.mark.parametrize("error", [OSError(24, "Too many open files"), RuntimeError("can't start new thread")])
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_process_that_the_system_does_not_start_is_started_for_the_next_job(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], error: Exception, number: int
+) -> None:
+    monkeypatch.setattr(workers_module, "_Worker", failing_at(number, workers_module._Worker, error))
+
+    async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
+        with pytest.raises(MotionMindError, match="failed to start" if number == 1 else "ran out of memory"):
+            await workers.submit("die", working.die).result()
+        assert await workers.submit("sum", working.add, 2, 3).result() == 5
+
+    run(check)
+    assert f"cannot start a process: {error}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("function", [lambda _: 0, working.answer_with_a_function])
+def test_what_cannot_be_sent_fails_and_the_next_job_runs(function: Any) -> None:
+    async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
+        for _ in range(2):
+            with pytest.raises(MotionMindError, match="internal error: see the terminal"):
+                await workers.submit("fails", function).result()
+        assert await workers.submit("sum", working.add, 2, 3).result() == 5
+
+    run(check)
+
+
+def test_an_answer_that_cannot_be_read_ends_its_worker_and_the_next_job_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    receive = Connection.recv
+    monkeypatch.setattr(Connection, "recv", failing_at(3, receive, MemoryError()))  # after "begun" and a report
+
+    async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
+        with pytest.raises(MotionMindError, match="ran out of memory"):
+            await workers.submit("sum", working.add, 2, 3).result()
+        assert await workers.submit("sum", working.add, 2, 3).result() == 5
+
+    run(check)
+
+
+def test_a_corpus_that_cannot_be_loaded_ahead_ends_no_worker() -> None:
+    async def check() -> None:
+        workers = Workers(None, lambda _: None, 5, 1)  # type: ignore[arg-type]  # an error that nobody foresaw
+        try:
+            assert await workers.submit("sum", working.sleep, 0.0).result() == (
+                await workers.submit("sum", working.sleep, 0.0).result()
+            )
+        finally:
+            workers.close()
+
+    asyncio.run(check())
+
+
+def test_a_preparation_that_fails_keeps_no_job_waiting() -> None:
+    def steps() -> Told:
+        yield 1, 2, "once", False
+        raise OSError("no space")
+
+    async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
+        preparing = asyncio.create_task(workers.prepare("getting ready", steps()))
+        await asyncio.sleep(0)
+        assert await workers.submit("sum", working.add, 2, 3).result() == 5
+        await preparing
+        assert [one["state"] for one in told if one["kind"] == "getting ready"][-1] == "failed"
+
+    run(check)
 
 
 def test_two_workers_work_side_by_side() -> None:
@@ -237,7 +301,7 @@ def test_a_stream_says_that_it_is_there(monkeypatch: pytest.MonkeyPatch) -> None
 
     async def check() -> None:
         stream = Events().open({})
-        assert [await anext(stream) for _ in range(3)] == [b"retry: 1000\n\n", b": here\n\n", b": here\n\n"]
+        assert [await anext(stream) for _ in range(3)] == [b"retry: 1000\n\n"] + 2 * [b"event: here\ndata: {}\n\n"]
 
     asyncio.run(check())
 
@@ -296,6 +360,37 @@ def test_jobs_wait_for_what_makes_them_fast_and_no_longer() -> None:
     run(check)
 
 
+def test_no_process_starts_during_a_preparation_which_does_its_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[bool] = []
+    begin = Workers._begin_one
+
+    def note(workers: Workers, *given: Any) -> None:
+        begun.append(may_begin.is_set())
+        begin(workers, *given)
+
+    monkeypatch.setattr(Workers, "_begin_one", note)
+    may_begin = threading.Event()
+
+    def steps() -> Told:
+        for number in count(1):
+            yield number, 1000, "once", may_begin.is_set()
+
+    async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
+        preparing = asyncio.create_task(workers.prepare("getting ready", steps()))
+        await asyncio.sleep(0)
+        workers.begin()
+        job = workers.submit("sum", working.add, 2, 3)
+        await asyncio.sleep(0.3)
+        assert (job.state, begun) == ("waiting", [])
+        may_begin.set()
+        assert await job.result() == 5
+        assert all(begun)
+        next(one for one in workers.jobs if one.kind == "getting ready").cancel()
+        await preparing
+
+    run(check)
+
+
 def test_it_is_told_how_long_it_takes_to_get_ready_at_the_pace_that_it_goes() -> None:
     clock = [0.0]
     ended: list[bool] = []
@@ -320,7 +415,7 @@ def test_it_is_told_how_long_it_takes_to_get_ready_at_the_pace_that_it_goes() ->
     assert [next(found)[2] for _ in range(4)] == ["getting ready, first time only"] * 4
     assert [next(found) for _ in range(4)] == [
         (110, 160, "getting ready, first time only: about 2 minutes", False),
-        (120, 160, "getting ready, first time only: about 9 minutes", False),
+        (120, 160, "getting ready, first time only: about 8.5 minutes", False),
         (130, 190, "getting the rest ready", True),
         (189, 190, "getting the rest ready: a few seconds", True),
     ]

@@ -10,7 +10,7 @@ const FIRST_PICTURES = 3; // the 3D view waits for these: without a GPU it takes
 export const api = new Api();
 
 // The URL of a restarted studio differs only in its token, so opening it here does not reload the page.
-addEventListener("hashchange", () => location.hash.includes("token") && location.reload());
+addEventListener("hashchange", () => /token|look/.test(location.hash) && location.reload());
 
 /** @param {[any, any]} answers the gallery and the project */
 function prefetchPictures([gallery, project]) {
@@ -21,6 +21,15 @@ function prefetchPictures([gallery, project]) {
   return Promise.allSettled(pictures.slice(0, FIRST_PICTURES).map((picture) => picture.decode()));
 }
 
+/** The gallery and its first pictures. */
+function prefetchGallery() {
+  return Promise.all([api.prefetch("/api/gallery"), project]).then(prefetchPictures, () => {}); // later requests report the error
+}
+
 const project = api.prefetch(`/api/project?window=${api.window}`);
 /** @type {Promise<unknown>} settles when the gallery's first pictures have loaded or failed */
-export const pictured = Promise.all([api.prefetch("/api/gallery"), project]).then(prefetchPictures, () => {}); // later requests report the error
+export const pictured = api.looks ? Promise.resolve() : prefetchGallery();
+project.then(
+  ({ access }) => access === "look" && !api.looks && api.onlyLook(),
+  () => {},
+);

@@ -5,10 +5,12 @@ import { api, pictured } from "./begin.js";
 import * as between from "./between/panel.js";
 import * as take from "./export/panel.js";
 import * as movement from "./imports/panel.js";
+import { Looking } from "./look/page.js";
 import * as pose from "./pose/panel.js";
 import { Bar } from "./shell/bar.js";
 import { useChange } from "./shell/hooks.js";
 import { icon } from "./shell/icons.js";
+import { followKeyboard } from "./shell/keyboard.js";
 import { Keys } from "./shell/keys.js";
 import { oncer } from "./shell/once.js";
 import { View } from "./shell/stage.js";
@@ -100,6 +102,7 @@ function painted() {
 
 async function start() {
   const shown = Promise.race([pictured.then(painted), new Promise((done) => setTimeout(done, PICTURES_TIMEOUT_MS))]);
+  followKeyboard();
   const open = new Open();
   const toasts = new Toasts();
   const keys = new Keys();
@@ -130,10 +133,27 @@ async function start() {
     once: oncer(act),
   };
   Object.assign(window, { studio }); // for tests and the console
-  render(html`<${Studio} studio=${studio} open=${open} />`, /** @type {Element} */ (document.getElementById("studio")));
+  const root = /** @type {Element} */ (document.getElementById("studio"));
+  root.classList.toggle("looking", api.looks);
+  render(html`<${api.looks ? Looking : Studio} studio=${studio} open=${open} />`, root);
+  /** @type {string[]} */
+  let noticed = [];
+  /** @type {string[]} */
+  let missed = [];
+  store.addEventListener("change", () => {
+    const words = store.state?.words ?? [];
+    for (const notice of words) if (!noticed.includes(notice)) studio.say(notice, { kind: "error" });
+    const holds = [...words, ...(store.state?.missing ?? [])];
+    for (const notice of [...noticed, ...missed]) if (!holds.includes(notice)) toasts.withdraw(notice);
+    noticed = words;
+  });
+  store.addEventListener("back", () => {
+    for (const words of api.faults) toasts.withdraw(words);
+    api.faults.clear();
+  });
   await studio.act(() => store.start());
-  for (const words of store.state?.words ?? []) studio.say(words);
-  for (const words of store.state?.missing ?? []) studio.say(words, { kind: "error" });
+  missed = store.state?.missing ?? [];
+  for (const words of missed) studio.say(words, { kind: "error" });
 }
 
 start();

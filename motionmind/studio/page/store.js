@@ -5,6 +5,8 @@ import { knowPostures } from "./places.js";
 import { useChange } from "./shell/hooks.js";
 
 const RETRY_MS = [500, 1000, 2000, 4000]; // until a lost connection is tried again
+const SILENCE_MS = 40_000; // without a word: the studio sends one every 15 s
+const WATCH_MS = 2000;
 const OVER = new Set(["done", "failed", "cancelled"]);
 const LOST = "The studio restarted during this job.";
 const MAX_FINISHED_JOBS = 50;
@@ -30,6 +32,10 @@ export class Store extends EventTarget {
     this.stopped = false; // whether smoothing of seams is paused
     this.tries = 0;
     this.heard = 0; // the latest sequence number announced
+    this.heardAt = 0; // when the server last sent anything, milliseconds
+    /** @type {EventSource | null} */
+    this.source = null;
+    this.retrying = 0; // the timer of the next try
     api.taken = (state) => this.take(state);
   }
 
@@ -37,7 +43,9 @@ export class Store extends EventTarget {
   async start() {
     await this.api.entered;
     this.#listen();
+    this.#watch();
     await this.load();
+    await this.api.renewal.learn();
   }
 
   /** Fetch the project. */
@@ -62,38 +70,60 @@ export class Store extends EventTarget {
   }
 
   #listen() {
+    clearTimeout(this.retrying);
     const source = new EventSource(`/api/events?window=${this.api.window}`);
+    this.source = source;
+    for (const kind of ["open", "here", "project", "smoothing", "job"]) {
+      source.addEventListener(kind, () => (this.heardAt = Date.now()));
+    }
+    this.heardAt = Date.now();
     source.addEventListener("open", () => {
       this.tries = 0;
       this.stopped = false; // otherwise the next event says so
       if (!this.connected) this.#return();
     });
     source.addEventListener("project", (event) => {
-      const { sequence, left } = JSON.parse(event.data); // `left` is a closed window: other windows may undo its edits
+      const { sequence, left, notices } = JSON.parse(event.data); // `left` is a closed window: other windows may undo its edits
       this.heard = sequence;
-      if (this.state && (left || sequence > this.state.sequence)) this.load().catch(() => {});
+      const noticed = notices !== undefined && notices !== this.state?.words.length;
+      if (this.state && (left || noticed || sequence > this.state.sequence)) this.load().catch(() => {});
     });
     source.addEventListener("smoothing", (event) => this.set(JSON.parse(event.data)));
     source.addEventListener("job", (event) => this.#hear(JSON.parse(event.data)));
-    source.addEventListener("error", () => {
-      source.close();
-      this.set({ connected: false });
-      // Event streams give no reason: a restarted studio requires the URL that it printed.
-      this.load().catch((error) => this.set({ refusal: error instanceof AwayError ? "" : error.message }));
-      setTimeout(() => this.#listen(), RETRY_MS[Math.min(this.tries++, RETRY_MS.length - 1)]);
-    });
+    source.addEventListener("error", () => this.#lose());
+  }
+
+  /** Handle a connection that ended, or is silent. */
+  #lose() {
+    this.source?.close();
+    this.set({ connected: false });
+    // Event streams give no reason. A restarted studio may let the page in again, or require the URL that it printed.
+    this.load().then(
+      () => this.set({ refusal: "" }),
+      (error) => this.set({ refusal: error instanceof AwayError ? "" : error.message }),
+    );
+    clearTimeout(this.retrying);
+    this.retrying = setTimeout(() => this.#listen(), RETRY_MS[Math.min(this.tries++, RETRY_MS.length - 1)]);
+  }
+
+  /** Notice a connection that broke without a word, and a network that came back. */
+  #watch() {
+    setInterval(() => this.connected && Date.now() - this.heardAt > SILENCE_MS && this.#lose(), WATCH_MS);
+    addEventListener("online", () => this.connected || this.#listen());
   }
 
   /** Handle a connection that returned, perhaps to a restarted studio. */
   #return() {
-    this.load().catch(() => {});
+    this.load()
+      .then(() => this.api.renewal.learn())
+      .catch(() => {});
     this.set({ connected: true });
-    for (const job of this.jobs.values()) if (!OVER.has(job.state)) this.#refetch(job);
+    for (const job of this.jobs.values()) if (!OVER.has(job.state)) this.refetch(job);
     this.dispatchEvent(new Event("back"));
   }
 
-  /** @param {any} job */
-  async #refetch(job) {
+  /** Fetch a job's state; a job that the studio does not know has failed. @param {{id: string}} job */
+  async refetch(job) {
     const lost = { ...job, state: "failed", words: LOST, lost: true };
     const found = await this.api.get(`/api/jobs/${job.id}`).catch((error) => (error instanceof AwayError ? null : lost));
     if (found) this.#hear(found);

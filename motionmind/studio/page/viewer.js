@@ -6,6 +6,7 @@ import { Stage } from "motionmind/stage";
 import { Theme } from "motionmind/theme";
 
 const CAMERA_SLACK_RATIO = 0.1; // the camera follows a movement that shifts by more than this share of its reach
+const REST_MS = 150; // without a change, until a picture drawn without a GPU is drawn finely
 const STILL = { length: 1, start: 0, end: 0, times: [0], frameAt: () => 0 }; // while there is nothing to show
 
 /** A stage on a canvas of its own in `half`. @param {HTMLElement} half @param {any} motion @param {() => void} changed */
@@ -21,6 +22,8 @@ function stageIn(half, motion, changed) {
 /** Fires "show" when another movement is shown, and "draw" after each picture. */
 export class Viewer extends EventTarget {
   #covered = false;
+  #rests = false;
+  #resting = 0; // the timer that lets it rest
 
   constructor() {
     super();
@@ -31,7 +34,8 @@ export class Viewer extends EventTarget {
     this.overlay = made("overlay");
     this.element.append(this.halves[0], this.overlay);
     this.title = "";
-    this.ghosts = { ends: true, onion: 0 };
+    /** What is drawn besides the body, as `Stage.show` takes it. */
+    this.ghosts = { ends: true, onion: 0, trails: /** @type {string[]} */ ([]), waypoints: /** @type {number[]} */ ([]) };
     this.isHome = true;
     /** @type {any} */
     this.motion = undefined;
@@ -99,6 +103,12 @@ export class Viewer extends EventTarget {
     this.halves[1].dataset.title = besideTitle;
     this.#take(motion, { time, beside, title, look, home: false });
     if (play && !matchMedia("(prefers-reduced-motion: reduce)").matches) this.player.play();
+  }
+
+  /** Draw other things besides the body. @param {Partial<Viewer["ghosts"]>} change */
+  besides(change) {
+    Object.assign(this.ghosts, change);
+    this.stale();
   }
 
   /** Request a new picture. */
@@ -195,13 +205,29 @@ export class Viewer extends EventTarget {
     this.stale();
   }
 
+  /** Whether the picture may soon change again; if nothing more does, another is drawn at rest. */
+  #moves() {
+    const rests = this.#rests;
+    this.#rests = false;
+    clearTimeout(this.#resting);
+    if (rests || !this.stage.software) return this.player.playing;
+    if (!this.player.playing) {
+      this.#resting = setTimeout(() => {
+        this.#rests = true;
+        this.stale();
+      }, REST_MS);
+    }
+    return true;
+  }
+
   #draw() {
     if (!this.stage || !this.motion || this.covered) return;
+    const moves = this.#moves();
     this.stage.show(this.player.time, this.ghosts);
-    this.stage.render(this.player.playing);
+    this.stage.render(moves, this.pictures.late);
     if (this.beside) {
       this.other.show(this.player.time, this.ghosts);
-      this.other.render(this.player.playing);
+      this.other.render(moves, this.pictures.late);
     }
     this.dispatchEvent(new Event("draw"));
   }

@@ -6,10 +6,15 @@ import { awaited } from "../store.js";
 import { useChange, useKeys } from "../shell/hooks.js";
 import { icon } from "../shell/icons.js";
 import { deskOf, MAX_ALTERNATIVES } from "./desk.js";
+import { Elapsed } from "./elapsed.js";
+import { Film } from "./film.js";
 import { Joints, seenWords, jointName } from "./joints.js";
 import { CLICK_SLACK_PX, Quartet } from "./quartet.js";
+import { Steps } from "./steps.js";
 
 const GROUP = "Alternatives";
+const SPREADS = /** @type {const} */ (["near", "usual", "far"]);
+const SPREAD_WORDS = { near: "nearer: variants of the first", usual: "usual: other passages of the corpus", far: "farther: as different as possible" };
 const ZOOM_RATIO = 0.95;
 
 /** @param {{studio: any}} props */
@@ -20,7 +25,7 @@ export function Centre({ studio }) {
     studio.viewer.covered = shown;
     return () => (studio.viewer.covered = false);
   }, [shown]);
-  return shown && html`<${Alternatives} studio=${studio} />`;
+  return shown ? html`<${Alternatives} studio=${studio} />` : html`<${Steps} studio=${studio} />`;
 }
 
 /** @param {{studio: any}} props */
@@ -72,7 +77,8 @@ function Alternatives({ studio }) {
     <header class="row">
       <h2 class="grow">${desk.away ? "Not searched yet" : heading(state, found.length)}</h2>
       <p class="hint" role="status">${searching && words && getting ? `${getting}. The search starts then.` : words}</p>
-      ${searching && html`<button class="button" onClick=${() => desk.stop()}>Cancel</button>`}
+      ${searching && html`<${Elapsed} since=${desk.since} /><button class="button" onClick=${() => desk.stop()}>Cancel</button>`}
+      <${Spread} desk=${desk} />
       <button class="button quiet icon" aria-label="Back to the viewer" title="Back to the viewer (Esc)" onClick=${() => desk.show(false)}>
         ${icon("close")}
       </button>
@@ -81,7 +87,7 @@ function Alternatives({ studio }) {
     <div class="four" role="radiogroup" aria-label="Alternatives" hidden=${state === "failed"}>
       ${Array.from({ length: state === "found" ? found.length : MAX_ALTERNATIVES }, (_, i) =>
         found[i]
-          ? html`<${Alternative} key=${i} desk=${desk} quartet=${quartet} index=${i} chosen=${chosen === i} account=${found[i].account} motion=${found[i].motion} />`
+          ? html`<${Alternative} key=${i} desk=${desk} quartet=${quartet} index=${i} chosen=${chosen === i} account=${found[i].account} motion=${found[i].motion} job=${found[i].job} />`
           : html`<${Waiting} key=${i} ends=${searching ? desk.ends : {}} begun=${!words} />`,
       )}
     </div>
@@ -93,6 +99,26 @@ function Alternatives({ studio }) {
       </button>
     </footer>
   </section>`;
+}
+
+/** The dial for the next four: how far they go from the best movement. @param {{desk: any}} props */
+function Spread({ desk }) {
+  const spread = /** @type {"near" | "usual" | "far"} */ (useChange(desk, () => desk.spread));
+  return html`<label class="spread" title="How far the others go from the first">
+    <span>nearer</span>
+    <input
+      type="range"
+      min="0"
+      max=${SPREADS.length - 1}
+      step="1"
+      value=${SPREADS.indexOf(spread)}
+      data-testid="spread"
+      aria-label="How far the others go from the first"
+      aria-valuetext=${SPREAD_WORDS[spread]}
+      onChange=${(/** @type {any} */ event) => desk.go(SPREADS[Number(event.target.value)])}
+    />
+    <span>farther</span>
+  </label>`;
 }
 
 /** The description of an alternative in one line, for small screens. @param {any} account */
@@ -115,11 +141,11 @@ function Waiting({ ends, begun }) {
 function heading(state, count) {
   if (state === "failed") return "Nothing found";
   if (state === "searching") return "From A to B…";
-  return count === 1 ? "From A to B: one movement" : `From A to B: ${count} movements`;
+  return count === 1 ? "From A to B: one movement" : html`From A to B: ${count}<span class="movements"> movements</span>`;
 }
 
 /** @param {any} props */
-function Alternative({ desk, quartet, index, chosen, account, motion }) {
+function Alternative({ desk, quartet, index, chosen, account, motion, job }) {
   const canvas = useRef(/** @type {any} */ (null));
   const [joint, setJoint] = useState(/** @type {number | null} */ (null));
   const time = useChange(quartet?.player ?? desk, () => (joint === null || !quartet ? 0 : Math.floor(quartet.player.time * 10) / 10));
@@ -187,6 +213,7 @@ function Alternative({ desk, quartet, index, chosen, account, motion }) {
       <span class="number" aria-hidden="true">${chosen ? icon("check") : ""}${index + 1}</span>
       <p class="seen" role="status">${joint !== null && html`<strong>${name}</strong> ${seenWords(account.joints[name], time)}`}</p>
     </div>
+    <${Film} job=${job} number=${account.number} motion=${motion} quartet=${quartet} />
     <div class="words">
       <p>${account.words}</p>
       ${account.differs && html`<p class="differs">${account.differs}</p>`}

@@ -2,6 +2,7 @@
 
 import { AwayError } from "../api.js";
 import { playable } from "../movements.js";
+import { Keeper } from "./keeper.js";
 
 export const MAX_ALTERNATIVES = 4;
 export const POSTURE_TYPE = "application/x-motionmind-posture"; // of data in a drag
@@ -9,7 +10,7 @@ export const POSTURE_TYPE = "application/x-motionmind-posture"; // of data in a 
 /**
  * @typedef {{key: string, frame: number, last?: number, title: string}} Place
  * @typedef {{begins: number, ends: number, how: string, where: string, key: string, at: number, degrees: number}} Stretch
- * @typedef {{number: number, seconds: number, words: string, differs: string, sure: string, usual: string,
+ * @typedef {{number: number, seconds: number, words: string, differs: string, details: string, sure: string, usual: string,
  *   beyond: string[], joints: Record<string, Stretch[]>}} Account
  */
 
@@ -22,8 +23,16 @@ class Desk extends EventTarget {
     this.ends = { a: null, b: null };
     /** @type {Place | null} the posture last picked in the gallery */
     this.choice = null;
+    /** @type {{by: Place, was: Place} | null} the B that the last pick replaced */
+    this.replaced = null;
     this.seconds = 0; // wished duration; 0 leaves it to the corpus
-    /** @type {{account: Account, motion: any}[]} */
+    /** @type {import("../asks/asked.js").Reach[]} places for hands and feet, where A stands */
+    this.reaches = [];
+    /** @type {any} the movement that the viewer shows to set them; null otherwise */
+    this.scene = null;
+    /** @type {"near" | "usual" | "far"} how far alternatives go from the best movement */
+    this.spread = "usual";
+    /** @type {{account: Account, motion: any, job: string}[]} with the search's job, which a cancelled search has no more */
     this.found = [];
     this.chosen = 0;
     /** @type {string | null} the search's job */
@@ -32,34 +41,45 @@ class Desk extends EventTarget {
     this.words = "";
     this.away = false; // whether the server did not answer
     this.shown = false;
+    this.since = 0; // when the search began, milliseconds
     this.asked = 0; // counts searches, to recognise late answers
     /** @type {any} the job's last known state */
     this.seen = null;
     this.taking = 0; // the search whose movements are being fetched
+    this.keeper = new Keeper(this);
     studio.store.addEventListener("change", () => this.#follow());
     studio.store.addEventListener("back", () => this.away && this.search());
   }
 
-  /** Pick a posture: the first is A, the second B; later ones wait to be set. @param {Place} place */
+  /** Pick a posture: the first is A, each further one B. @param {Place} place */
   pick(place) {
     this.choice = place;
-    if (!this.ends.a) this.set("a", place);
-    else if (!this.ends.b && !same(this.ends.a, place)) this.set("b", place);
-    else this.#changed();
+    const { a, b } = this.ends;
+    if (!a) this.set("a", place);
+    else if (same(a, place)) this.#changed();
+    else {
+      this.set("b", place);
+      if (b && !same(b, place)) this.replaced = { by: place, was: b };
+    }
   }
 
-  /** @param {"a" | "b"} end @param {Place | null} place */
+  /** Set an end; the posture that a pick has just put in B moves to A, and B is what it was. @param {"a" | "b"} end @param {Place | null} place */
   set(end, place) {
-    if (place && this.ends[end] && same(/** @type {Place} */ (this.ends[end]), place)) {
+    const { replaced, ends } = this;
+    this.replaced = null;
+    if (place && ends[end] && same(/** @type {Place} */ (ends[end]), place)) {
       this.#changed();
       return;
     }
-    this.ends = { ...this.ends, [end]: place };
+    this.ends = { ...ends, [end]: place };
+    if (end === "a") this.reaches = []; // they were where the other one stands
+    if (end === "a" && place && replaced && same(replaced.by, place)) this.ends.b = replaced.was;
     this.search();
   }
 
   swap() {
     this.ends = { a: this.ends.b, b: this.ends.a };
+    this.reaches = [];
     this.search();
   }
 
@@ -69,15 +89,47 @@ class Desk extends EventTarget {
     this.search();
   }
 
-  /** Search for alternatives if both ends are set; cancel an earlier search. */
-  async search() {
+  /** Ask for alternatives that go as far from the best movement. @param {"near" | "usual" | "far"} spread */
+  go(spread) {
+    this.spread = spread;
+    this.search();
+  }
+
+  /** Set places to reach, and search again while the viewer stays. @param {import("../asks/asked.js").Reach[]} reaches */
+  reach(reaches) {
+    this.reaches = reaches;
+    this.search(!this.looking);
+  }
+
+  /** Whether the viewer shows a movement from A to B to set places in. */
+  get looking() {
+    return this.scene !== null && this.studio.viewer.motion === this.scene;
+  }
+
+  /** Show the chosen alternative in the viewer, to set places there. */
+  look() {
+    const { viewer } = this.studio;
+    const motion = this.found[this.chosen]?.motion;
+    if (!motion || motion === this.scene) return;
+    const [time, look] = this.looking ? [viewer.player.time, false] : [motion.end / 2, true];
+    this.scene = motion;
+    this.show(false);
+    viewer.show(motion, { time, title: "From A to B", look });
+  }
+
+  /** Search for alternatives if both ends are set; cancel an earlier search. Show them in place of the viewer, or not. */
+  async search(shown = true) {
     this.stop();
     const { a, b } = this.ends;
-    Object.assign(this, { found: [], chosen: 0, words: "", away: false, state: a && b ? "searching" : "idle", shown: Boolean(a && b) });
+    const state = a && b ? "searching" : "idle";
+    Object.assign(this, { found: [], chosen: 0, words: "", away: false, state, shown: shown && Boolean(a && b) });
+    if (shown) this.scene = null;
+    this.since = performance.now();
     this.#changed();
     if (!a || !b) return;
     const asked = ++this.asked;
-    const ask = { a: bare(a), b: bare(b), options: this.seconds ? { seconds: this.seconds } : {} };
+    const options = { reaches: this.reaches, ...(this.seconds && { seconds: this.seconds }) };
+    const ask = { a: bare(a), b: bare(b), options, spread: this.spread };
     try {
       const { job } = await this.studio.api.post("/api/between", ask);
       if (asked !== this.asked) {
@@ -93,12 +145,30 @@ class Desk extends EventTarget {
     }
   }
 
+  /**
+   * Take back what this window had set before a reload.
+   * @param {{a: Place | null, b: Place | null, seconds: number, reaches: import("../asks/asked.js").Reach[], spread: any,
+   *   job: string | null, chosen: number, shown: boolean}} kept
+   */
+  restore({ a, b, seconds, reaches, spread, job, chosen, shown }) {
+    Object.assign(this, { ends: { a, b }, seconds, reaches, spread });
+    if (!job) {
+      if (a && b && shown) this.search(); // its alternatives have expired
+      else this.#changed();
+      return;
+    }
+    this.asked++;
+    Object.assign(this, { job, chosen, shown, state: "searching", since: performance.now() });
+    this.#changed();
+    this.studio.store.refetch({ id: job }); // a job that is over comes with no event
+  }
+
   /** Cancel the search. */
   stop() {
     this.asked++;
     if (this.state === "searching" && this.job) this.studio.api.delete(`/api/jobs/${this.job}`).catch(() => {});
     this.job = null;
-    if (this.state === "searching") Object.assign(this, { state: this.found.length ? "found" : "idle", shown: this.found.length > 0 });
+    if (this.state === "searching") Object.assign(this, { state: this.found.length ? "found" : "idle", shown: this.found.length > 0 && !this.looking });
     this.#changed();
   }
 
@@ -112,6 +182,7 @@ class Desk extends EventTarget {
   /** @param {boolean} shown */
   show(shown) {
     this.shown = shown;
+    if (shown) this.scene = null;
     this.#changed();
   }
 
@@ -121,12 +192,12 @@ class Desk extends EventTarget {
   }
 
   async #accept() {
-    const { job, chosen } = this;
+    const { chosen } = this;
     if (!this.found[chosen]) return;
     const { viewer, api, store } = this.studio;
-    await api.accept(/** @type {string} */ (job), chosen + 1);
+    await api.accept(this.found[chosen].job, chosen + 1);
     // The next movement starts here.
-    Object.assign(this, { ends: { a: this.ends.b, b: null }, choice: null, found: [], state: "idle", shown: false, job: null });
+    Object.assign(this, { ends: { a: this.ends.b, b: null }, choice: null, found: [], reaches: [], scene: null, state: "idle", shown: false, job: null });
     viewer.back();
     const seam = store.state.piece.seams.at(-1);
     if (seam) {
@@ -146,7 +217,7 @@ class Desk extends EventTarget {
     if (job.state === "failed") {
       if (job.lost) {
         this.job = null; // the job no longer exists
-        this.search();
+        this.search(!this.looking);
       } else this.#fail(job.words);
       return;
     }
@@ -170,7 +241,8 @@ class Desk extends EventTarget {
       if (!account) return;
       const motion = playable(await this.studio.api.get(`/api/between/${this.job}/${account.number}`));
       if (asked !== this.asked) return;
-      this.found = [...this.found, { account, motion }];
+      this.found = [...this.found, { account, motion, job: /** @type {string} */ (this.job) }];
+      if (this.looking && this.found.length === this.chosen + 1) this.look();
       this.#changed();
     }
   }
@@ -182,7 +254,7 @@ class Desk extends EventTarget {
 
   /** @param {string} words */
   #fail(words) {
-    Object.assign(this, { state: "failed", words, shown: true });
+    Object.assign(this, { state: "failed", words, shown: !this.looking });
     this.#changed();
   }
 

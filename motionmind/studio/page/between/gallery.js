@@ -6,6 +6,7 @@ import { icon } from "../shell/icons.js";
 import { movement } from "../movements.js";
 import { thumbnail } from "../places.js";
 import { insert, newId } from "../timeline/items.js";
+import { walk } from "./arrows.js";
 import { deskOf, POSTURE_TYPE, same } from "./desk.js";
 import { Own } from "./own.js";
 
@@ -19,18 +20,23 @@ export function Gallery({ studio }) {
   const [gallery, setGallery] = useState(/** @type {any} */ (null));
   const [managing, manage] = useState(false);
   const [sought, seek] = useState("");
+  const [reached, reach] = useState(""); // the key of the posture or clip that had the focus last
   useEffect(() => {
     if (corpora === "null") return; // not authorised yet
-    act(() => api.get("/api/gallery")).then((/** @type {any} */ found) => {
+    const take = (/** @type {any} */ found) => {
       if (!found) return;
       setGallery(found);
       showFirst(studio, found);
-    });
+      if (!found.whole) act(() => api.get("/api/gallery?whole")).then(take); // on a first start, clips take seconds
+    };
+    act(() => api.get("/api/gallery")).then(take);
   }, [corpora]);
   // Keys of movements do not change when a posture is renamed.
   const own = (saved ?? []).map((/** @type {any} */ { name, key }) => ({ key, title: name }));
   const fits = (/** @type {{title: string}} */ { title }) => title.toLowerCase().includes(sought.trim().toLowerCase());
-  return html`<section class="gallery" data-testid="gallery" aria-label="Gallery">
+  const listed = [own, ...(gallery?.corpora.flatMap((/** @type {any} */ one) => [one.postures, one.clips]) ?? [])].flat().filter(fits);
+  const stop = (listed.find(({ key }) => key === reached) ?? listed[0])?.key; // where Tab enters
+  return html`<section class="gallery" data-testid="gallery" aria-label="Gallery" onKeyDown=${walk}>
     ${managing && html`<${Own} key="own" studio=${studio} close=${() => manage(false)} />`}
     <label class="search">
       ${icon("search")}<span class="aside">Search postures and clips</span>
@@ -39,15 +45,16 @@ export function Gallery({ studio }) {
     ${!gallery && html`<p class="hint" role="status">Loading the corpus…</p>`}
     ${gallery && own.some(fits) && html`<div class="row"><h3 class="grow">Your own</h3>
         <button class="button quiet" data-testid="manage-postures" aria-haspopup="dialog" onClick=${() => manage(true)}>Rename or delete</button></div>
-      <${Postures} studio=${studio} postures=${own.filter(fits)} />`}
+      <${Postures} studio=${studio} postures=${own.filter(fits)} stop=${stop} reach=${reach} />`}
     ${gallery?.corpora.map(
       (/** @type {any} */ corpus) => html`
         ${corpus.postures.filter(fits).length > 0 && html`<h3>Postures of ${corpus.name}</h3>
-          <${Postures} studio=${studio} postures=${corpus.postures.filter(fits)} />`}
+          <${Postures} studio=${studio} postures=${corpus.postures.filter(fits)} stop=${stop} reach=${reach} />`}
         ${corpus.clips.filter(fits).length > 0 && html`<h3>Clips of ${corpus.name}</h3>
-          <${Clips} studio=${studio} clips=${corpus.clips.filter(fits)} />`}
+          <${Clips} studio=${studio} clips=${corpus.clips.filter(fits)} stop=${stop} reach=${reach} />`}
       `,
     )}
+    ${gallery && !gallery.whole && html`<p class="hint" role="status">Composing the clips…</p>`}
     ${gallery && sought && !own.some(fits) && nothing(gallery, fits) && html`<p class="empty">No posture or clip is named “${sought}”.</p>`}
   </section>`;
 }
@@ -57,7 +64,8 @@ async function showFirst(studio, gallery) {
   const first = [gallery.own, ...gallery.corpora.flatMap((/** @type {any} */ one) => [one.postures, one.clips])].flat()[0];
   if (!first || studio.viewer.motion || studio.store.state.piece.blocks.length > 0) return;
   const [motion] = await Promise.all([movement(studio.api, first.key), studio.pictured()]);
-  if (!studio.viewer.motion) studio.viewer.show(motion, { title: first.title });
+  const { viewer, store } = studio; // by now, a first stretch may be on its way there
+  if (!viewer.motion && store.state.piece.blocks.length === 0) viewer.show(motion, { title: first.title });
 }
 
 /** @param {any} gallery @param {(one: any) => boolean} fits */
@@ -65,8 +73,8 @@ function nothing(gallery, fits) {
   return !gallery.corpora.flatMap((/** @type {any} */ corpus) => [...corpus.postures, ...corpus.clips]).some(fits);
 }
 
-/** @param {{studio: any, postures: {key: string, title: string}[]}} props */
-function Postures({ studio, postures }) {
+/** @param {{studio: any, postures: {key: string, title: string}[], stop?: string, reach: (key: string) => void}} props */
+function Postures({ studio, postures, stop, reach }) {
   const desk = deskOf(studio);
   const choice = useChange(desk, () => desk.choice);
   const ends = useChange(desk, () => desk.ends);
@@ -80,6 +88,8 @@ function Postures({ studio, postures }) {
           data-testid="posture-${title}"
           aria-pressed=${String(Boolean(choice && same(choice, place)))}
           title=${title}
+          tabindex=${key === stop ? 0 : -1}
+          onFocus=${() => reach(key)}
           draggable="true"
           onDragStart=${(/** @type {DragEvent} */ event) => event.dataTransfer?.setData(POSTURE_TYPE, JSON.stringify(place))}
           onClick=${() => pick(studio, place)}
@@ -93,17 +103,20 @@ function Postures({ studio, postures }) {
   </ul>`;
 }
 
+let added = 0; // how often something was added to the time line, which the viewer then shows
+
 /** Pick a posture, and show it. @param {any} studio @param {any} place */
 async function pick(studio, place) {
   const desk = deskOf(studio);
   desk.pick(place);
   if (desk.shown) return;
+  const before = added;
   const motion = await studio.act(() => movement(studio.api, place.key));
-  if (motion && desk.choice === place) studio.viewer.show(motion, { time: motion.times[place.frame], title: place.title });
+  if (motion && desk.choice === place && added === before) studio.viewer.show(motion, { time: motion.times[place.frame], title: place.title });
 }
 
-/** @param {{studio: any, clips: any[]}} props */
-function Clips({ studio, clips }) {
+/** @param {{studio: any, clips: any[], stop?: string, reach: (key: string) => void}} props */
+function Clips({ studio, clips, stop, reach }) {
   const [open, setOpen] = useState("");
   const [all, setAll] = useState(false);
   return html`<ul class="clips">
@@ -114,6 +127,8 @@ function Clips({ studio, clips }) {
             data-testid="clip-${clip.title}"
             aria-expanded=${String(clip.key === open)}
             title=${clip.about}
+            tabindex=${clip.key === stop ? 0 : -1}
+            onFocus=${() => reach(clip.key)}
             draggable="true"
             onDragStart=${(/** @type {DragEvent} */ event) => event.dataTransfer?.setData(POSTURE_TYPE, JSON.stringify(whole(clip)))}
             onClick=${() => setOpen(clip.key === open ? "" : clip.key)}
@@ -144,6 +159,7 @@ function whole({ key, frames, title }) {
  * @param {{key: string, frame: number, last?: number}} place
  */
 export async function append(studio, place) {
+  added++;
   const edit = insert(newId(studio.window), place);
   if (await studio.once(`append ${JSON.stringify(place)}`, () => studio.api.edit(edit))) studio.viewer.back();
 }

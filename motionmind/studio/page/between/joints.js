@@ -31,7 +31,8 @@ function words(stretch) {
 /** The stretches of each joint. @param {{account: import("./desk.js").Account, point: (joint: string | null) => void}} props */
 export function Joints({ account, point }) {
   return html`<details class="joints">
-    <summary>Joint by joint</summary>
+    <summary>Details</summary>
+    ${account.details && html`<p class="hint">${account.details}</p>`}
     <dl>
       ${Object.entries(account.joints).map(
         ([joint, stretches]) => html`<div tabindex="0" onMouseEnter=${() => point(joint)} onMouseLeave=${() => point(null)} onFocus=${() => point(joint)} onBlur=${() => point(null)}>

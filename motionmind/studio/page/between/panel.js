@@ -6,6 +6,7 @@ import { icon } from "../shell/icons.js";
 import { thumbnail } from "../places.js";
 import { deskOf, dropped } from "./desk.js";
 import { append, Gallery } from "./gallery.js";
+import { Places } from "./places.js";
 
 export { Centre } from "./alternatives.js";
 
@@ -23,6 +24,7 @@ export function Panel({ studio }) {
   useKeys(studio, [
     { keys: ["a"], does: "set A to the picked posture, or the viewer's", group: GROUP, act: () => take(studio, "a") },
     { keys: ["b"], does: "set B likewise", group: GROUP, act: () => take(studio, "b") },
+    { shown: ["arrows"], does: "go through the gallery", group: GROUP },
   ]);
   return html`<div class="between">
     <h2 class="aside">From one posture to another</h2>
@@ -55,10 +57,13 @@ export function Panel({ studio }) {
         html`<button class="button" onClick=${() => desk.show(true)}>Show the alternatives</button>`
       }
     </label>
-    <button class="button cut" data-testid="insert-posture" disabled=${!choice} onClick=${() => choice && append(studio, choice)}>
-      Add ${choice?.title ?? "it"} to the time line
-    </button>
+    <${Places} studio=${studio} />
     <${Gallery} studio=${studio} />
+    <div class="onto">
+      <button class="button cut" data-testid="insert-posture" disabled=${!choice} onClick=${() => choice && append(studio, choice)}>
+        Add ${choice?.title ?? "it"} to the time line
+      </button>
+    </div>
   </div>`;
 }
 

@@ -157,7 +157,7 @@ export class Quartet {
     stage.show(this.#timeOf(motion), GHOSTS);
     const joint = this.marked[index];
     if (joint !== null && joint !== undefined) stage.marks.show([joint]);
-    stage.render(this.player.playing);
+    stage.render(this.player.playing, this.pictures.late);
     const { width, height } = stage.canvas;
     if (pen.canvas.width !== width || pen.canvas.height !== height) Object.assign(pen.canvas, { width, height });
     pen.drawImage(stage.canvas, 0, 0);

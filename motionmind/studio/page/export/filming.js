@@ -1,4 +1,4 @@
-/** Film the piece, with a stage of its own so that the page stays usable. */
+/** Film the piece, so that the page stays usable: on the server, or else here, with a stage of its own. */
 
 import { film, obstacle } from "motionmind/film";
 import { Stage } from "motionmind/stage";
@@ -22,21 +22,19 @@ class Filming extends EventTarget {
     addEventListener("beforeunload", (event) => this.share !== null && event.preventDefault()); // the browser asks
   }
 
-  /** Film the piece from the viewer's camera, and offer the file. */
+  /** Film the piece from where the viewer looks, and offer the file. */
   async make() {
     const { studio } = this;
-    const wrong = obstacle();
-    if (wrong) return studio.say(wrong, { kind: "error" });
     if (this.share !== null) return undefined;
     if (!studio.viewer.isHome) studio.viewer.back();
     this.stopper = new AbortController();
     const { signal } = this.stopper;
-    const title = (studio.store.state.title || "piece").replace(UNSAFE, "-").replace(/^[. ]+|[. ]+$/g, "") || "piece";
-    this.#progress(0);
+    const progress = (/** @type {number} */ share) => this.#progress(share);
+    progress(0);
     try {
-      const made = await filmed(studio, (share) => this.#progress(share), signal);
-      offer(made, `${title}.webm`);
-      studio.say(`Film saved: ${title}.webm.`);
+      const { blob, name } = (await drawn(studio, progress, signal)) ?? (await recorded(studio, progress, signal));
+      offer(blob, name);
+      studio.say(`Film saved: ${name}.`);
     } catch (error) {
       if (!signal.aborted) studio.say(`The film failed: ${error instanceof Error ? error.message : error}`, { kind: "error" });
     }
@@ -55,11 +53,49 @@ class Filming extends EventTarget {
 }
 
 /**
- * Film the piece as it is now; later edits do not matter.
+ * Have the studio film the piece as MP4; null if it has no encoder. Later edits do not matter.
  * @param {any} studio @param {(share: number) => void} progress @param {AbortSignal} signal
- * @returns {Promise<Blob>}
+ * @returns {Promise<{blob: Blob, name: string} | null>}
  */
-async function filmed({ api, viewer }, progress, signal) {
+async function drawn({ api, store, viewer }, progress, signal) {
+  if (!viewer.stage) throw new Error("the piece has not loaded yet");
+  const { job } = await api.post("/api/films", direction(viewer.stage));
+  if (job === null) return null;
+  await new Promise((done, failed) => {
+    const look = () => {
+      const { state, words, done: frames, of } = store.jobs.get(job) ?? {};
+      if (of) progress(frames / of);
+      if (signal.aborted) api.delete(`/api/jobs/${job}`).catch(() => {});
+      else if (state === "failed" || state === "cancelled") failed(new Error(words));
+      else if (state !== "done") return;
+      store.removeEventListener("change", look);
+      if (signal.aborted) failed(signal.reason);
+      else done(null);
+    };
+    store.addEventListener("change", look);
+    signal.addEventListener("abort", look);
+    look();
+  });
+  const answer = await api.file(`/api/films/${job}`);
+  return { blob: await answer.blob(), name: nameOf(answer) ?? "piece.mp4" };
+}
+
+/** Where a stage's camera stands, in degrees. @param {Stage} stage */
+function direction({ camera, controls }) {
+  const [x, y, z] = camera.position.clone().sub(controls.target).normalize().toArray();
+  const degrees = 180 / Math.PI;
+  return { azimuth: degrees * Math.atan2(x, z), elevation: degrees * Math.asin(Math.min(Math.max(y, 0), 1)) };
+}
+
+/**
+ * Film the piece as WebM, in this browser: without ffmpeg the studio makes no MP4. Later edits do not matter.
+ * @param {any} studio @param {(share: number) => void} progress @param {AbortSignal} signal
+ * @returns {Promise<{blob: Blob, name: string}>}
+ */
+async function recorded({ api, store, viewer }, progress, signal) {
+  const wrong = obstacle();
+  if (wrong) throw new Error(wrong);
+  const title = (store.state.title || "piece").replace(UNSAFE, "-").replace(/^[. ]+|[. ]+$/g, "") || "piece";
   const { piece, stage: seen, ghosts } = viewer;
   if (!piece || !seen) throw new Error("the piece has not loaded yet");
   // Copy it now: while the movement loads, another panel may turn the camera.
@@ -85,7 +121,8 @@ async function filmed({ api, viewer }, progress, signal) {
     stage.controls.target.copy(target);
     stage.controls.update();
     stage.filming = true; // keeps it
-    return await film(stage, motion, ghosts, (/** @type {number} */ time) => progress(time / Math.max(motion.end, 1e-9)), signal);
+    const told = (/** @type {number} */ time) => progress(time / Math.max(motion.end, 1e-9));
+    return { blob: await film(stage, motion, ghosts, told, signal), name: `${title}.webm` };
   } finally {
     stage?.controls.dispose();
     stage?.renderer.dispose();
@@ -100,4 +137,10 @@ export function offer(blob, name) {
   Object.assign(link, { href: URL.createObjectURL(blob), download: name });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+}
+
+/** The name under which an answer is to be saved. @param {Response} answer */
+export function nameOf(answer) {
+  const encoded = /filename\*=UTF-8''([^;]+)/.exec(answer.headers.get("Content-Disposition") ?? "")?.[1];
+  return encoded && decodeURIComponent(encoded);
 }

@@ -2,7 +2,9 @@
 
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.js";
 import { useChange } from "../shell/hooks.js";
-import { filmingOf, offer } from "./filming.js";
+import { filmingOf, nameOf, offer } from "./filming.js";
+import { Sheet } from "./sheet.js";
+import { Versions } from "./versions.js";
 
 const FILES = [
   { format: "html", testid: "export-html", name: "Web page", words: "One file to send: it plays in any browser, without the studio." },
@@ -23,20 +25,22 @@ export function Panel({ studio }) {
         ? html`<p class="empty">The piece is empty. Go from A to B or add a clip to the time line, then export here.</p>`
         : html`${FILES.map(
             ({ format, testid, name, words }) => html`<${Format} key=${format} name=${name} words=${words}>
-              <${Save} studio=${studio} format=${format} testid=${testid} />
+              <${Save} studio=${studio} path=${() => `/api/export/${format}`} testid=${testid} />
             <//>`,
           )}
           <${Film} studio=${studio} />
+          <${Sheet} studio=${studio} Save=${Save} />
           <${Credits} studio=${studio} />`
     }
+    <${Versions} studio=${studio} />
     <${Format} name="Project" words="The piece with every edit; open it with motionmind studio FILE. It is always saved in ${file}">
-      <${Save} studio=${studio} format="project" testid="export-project" />
+      <${Save} studio=${studio} path=${() => "/api/export/project"} testid="export-project" />
     <//>
   </div>`;
 }
 
 /** Whose movement the piece contains, and what limits sharing it. @param {any} props */
-function Credits({ studio }) {
+export function Credits({ studio }) {
   const revision = useChange(studio.store, () => studio.store.state);
   const [sections, setSections] = useState(/** @type {{heading: string, lines: string[]}[]} */ ([]));
   useEffect(() => {
@@ -66,30 +70,24 @@ function Format({ name, words, children }) {
 }
 
 /** A button that downloads a file. @param {any} props */
-function Save({ studio, format, testid }) {
+function Save({ studio, path, testid, label = "Save" }) {
   const [busy, setBusy] = useState(false);
   const save = async () => {
     setBusy(true);
     await studio.act(async () => {
-      const answer = await studio.api.file(`/api/export/${format}`);
-      offer(await answer.blob(), nameOf(answer) ?? `piece.${format}`);
+      const answer = await studio.api.file(path());
+      offer(await answer.blob(), nameOf(answer) ?? "piece");
     });
     setBusy(false);
   };
-  return html`<button class="button" data-testid=${testid} disabled=${busy} onClick=${save}>${busy ? "Making…" : "Save"}</button>`;
-}
-
-/** @param {Response} answer */
-function nameOf(answer) {
-  const encoded = /filename\*=UTF-8''([^;]+)/.exec(answer.headers.get("Content-Disposition") ?? "")?.[1];
-  return encoded && decodeURIComponent(encoded);
+  return html`<button class="button" data-testid=${testid} disabled=${busy} onClick=${save}>${busy ? "Making…" : label}</button>`;
 }
 
 /** A film continues while another panel is open; the bar leads back here. @param {{studio: any}} props */
 function Film({ studio }) {
   const filming = filmingOf(studio);
   const share = useChange(filming, () => filming.share);
-  return html`<${Format} name="Film" words="The piece as the viewer shows it now, from the same camera (WebM).">
+  return html`<${Format} name="Film" words="The whole piece, seen from where the viewer looks now (MP4).">
     ${
       share === null
         ? html`<button class="button" data-testid="export-film" onClick=${() => filming.make()}>Film</button>`

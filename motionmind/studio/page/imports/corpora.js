@@ -52,7 +52,7 @@ export function Corpora({ studio, imports }) {
 function Sheet({ studio, sheet, onClose }) {
   const play = async (/** @type {any} */ clip) => {
     onClose();
-    studio.viewer.show(await movement(studio.api, clip.key), { title: clip.name, play: true });
+    studio.viewer.show(await movement(studio.api, clip.key), { title: clip.title, play: true });
   };
   return html`<${Modal} label="The clips of ${sheet.name}" wide onClose=${onClose}>
     <div class="stack" data-testid="sheet">
@@ -63,13 +63,13 @@ function Sheet({ studio, sheet, onClose }) {
         .join(" · ")}</p>
       <ul class="sheet-clips">${sheet.clips.map(
         (/** @type {any} */ clip) => html`<li key=${clip.key} class="card">
-          <button class="strip-of" title="Play ${clip.name}" aria-label="Play ${clip.name}, ${clip.seconds} seconds" onClick=${() => play(clip)}>
+          <button class="strip-of" title="Play ${clip.title}" aria-label="Play ${clip.title}, ${clip.seconds} seconds" onClick=${() => play(clip)}>
             ${clip.pictures.map(
               (/** @type {number} */ frame) =>
                 html`<img key=${frame} loading="lazy" alt="" width="64" height="72" src=${thumbnail(clip.key, frame, 72)} />`,
             )}
           </button>
-          <div class="row"><strong class="grow cut">${clip.name}</strong><span class="pale numbers">${clip.seconds.toFixed(1)} s</span></div>
+          <div class="row"><strong class="grow cut">${clip.title}</strong><span class="pale numbers">${clip.seconds.toFixed(1)} s</span></div>
           ${clip.about && html`<p class="hint cut" title=${clip.about}>${clip.about}</p>`}
         </li>`,
       )}</ul>

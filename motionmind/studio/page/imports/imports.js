@@ -3,12 +3,6 @@
 const PARALLEL_UPLOADS = 2;
 const MAX_BYTES = 64 * 2 ** 20; // of a file, as on the server
 const READABLE = [".bvh", ".glb", ".vrm", ".vrma", ".amc", ".asf", ".npz", ".json", ".score"];
-/** @type {Record<string, string>} */
-const REFUSALS = {
-  ".fbx": "FBX is not supported: import it into Blender (File, Import, FBX) and export glTF (.glb) or BVH",
-  ".c3d": "C3D contains skin markers, not joints: solve a skeleton and export it as BVH",
-  ".gltf": "a .gltf refers to other files: export a single .glb",
-};
 const NAME = /^[\p{L}\p{N}_][\p{L}\p{N}_.-]{0,63}$/u;
 
 export const ACCEPT = READABLE.join(",");
@@ -58,7 +52,7 @@ export class Imports extends EventTarget {
     const sorted = [...files].sort((one, other) => Number(suffix(other.name) === ".asf") - Number(suffix(one.name) === ".asf"));
     const jobs = [];
     for (const file of sorted) {
-      const coming = { number: ++this.count, name: file.name, error: refused(file) };
+      const coming = { number: ++this.count, name: file.name, error: tooLarge(file) };
       this.coming = [...this.coming, coming];
       if (coming.error) continue;
       const lane = suffix(file.name) === ".asf" || suffix(file.name) === ".amc" ? 0 : this.count % PARALLEL_UPLOADS;
@@ -72,7 +66,7 @@ export class Imports extends EventTarget {
   /** @param {File} file @param {Coming} coming */
   async #send(file, coming) {
     try {
-      const upload = await this.api.upload("/api/imports", file, file.name);
+      const upload = await this.api.upload("/api/imports", readable(file) ? file : new Blob(), file.name);
       this.files = [...this.files, upload];
       this.coming = this.coming.filter((other) => other !== coming);
       if (upload.kind === "asf") await this.#readWithSkeleton(upload.id);
@@ -186,11 +180,13 @@ function suffix(name) {
   return name.includes(".") ? name.slice(name.lastIndexOf(".")).toLowerCase() : "";
 }
 
+/** Whether the server may read a file; it says what to do with others. @param {File} file */
+function readable(file) {
+  return READABLE.includes(suffix(file.name));
+}
+
 /** Why a file cannot be uploaded; "" if it can. @param {File} file */
-function refused(file) {
-  const end = suffix(file.name);
-  if (REFUSALS[end]) return `${file.name}: ${REFUSALS[end]}`;
-  if (!READABLE.includes(end)) return `${file.name}: supported formats are ${READABLE.join(", ")}`;
-  if (file.size > MAX_BYTES) return `${file.name}: larger than ${MAX_BYTES / 2 ** 20} MB; upload a part of it`;
-  return "";
+function tooLarge(file) {
+  const large = readable(file) && file.size > MAX_BYTES;
+  return large ? `${file.name}: larger than ${MAX_BYTES / 2 ** 20} MB; upload a part of it` : "";
 }

@@ -1,19 +1,12 @@
 /** The handles over the view: a button on each joint or heel to drag, a mark on every other joint. */
 
 import { Vector3 } from "three";
+import { keyStep, pixelOf, placeUnder } from "../view/pointing.js";
+import { BalanceMark } from "./balance.js";
 
-const KEY_STEP_M = 0.01; // for a body of human size; with Shift five times as far
+const HEEL_DISTANCE_PX = 32; // of its handle from its foot's: half of both
 const KEY_PAUSE_MS = 400; // without a key, which ends a step
 const WORDS = { seen: "seen", near: "nearly seen", unseen: "never seen" };
-const DIRECTIONS = /** @type {Record<string, number[]>} */ ({
-  ArrowLeft: [-1, 0, 0],
-  ArrowRight: [1, 0, 0],
-  ArrowUp: [0, 1, 0],
-  ArrowDown: [0, -1, 0],
-  PageUp: [0, 0, -1], // away from the viewer
-  PageDown: [0, 0, 1],
-});
-
 export class Handles {
   /** @param {import("./session.js").Editor} editor */
   constructor(editor) {
@@ -23,9 +16,9 @@ export class Handles {
     this.element.setAttribute("role", "group");
     this.element.setAttribute("aria-label", "Handles of the body");
     this.viewer.overlay.append(this.element);
+    this.balance = new BalanceMark();
     /** @type {{element: HTMLElement, point: import("./session.js").Handle}[]} one for each joint, then the heels */
     this.marks = [];
-    this.point = new Vector3();
     /** @type {{joint: string, plane: Vector3, away: Vector3, moved: boolean} | null} */
     this.held = null;
     /** @type {{joint: string, place: number[]} | null} target of a handle that keys move */
@@ -53,9 +46,28 @@ export class Handles {
     const heels = editor.handles.filter(({ joint, on }) => joint !== on);
     this.marks = [...joints, ...heels].map((point) => ({ point, element: point.words ? this.#handle(point) : mark() }));
     // The Tab key follows this order.
-    this.element.replaceChildren(...this.marks.map(({ element }) => element));
+    this.element.replaceChildren(this.balance.element, ...this.marks.map(({ element }) => element));
+    for (const { joint, on } of heels) {
+      this.#markOf(joint)?.classList.add("heel");
+      this.#markOf(on)?.classList.add("foot");
+    }
     this.#appear();
     this.#label();
+  }
+
+  /** @param {string} joint */
+  #markOf(joint) {
+    return this.marks.find(({ point }) => point.joint === joint)?.element;
+  }
+
+  /** Where a handle is seen: a foot's in the middle of the foot, apart from its heel. @param {import("./session.js").Handle} point */
+  #seen(point) {
+    const { body, joints } = this.editor.motion;
+    const place = this.editor.place(point);
+    if (!this.#markOf(point.joint)?.classList.contains("foot")) return place;
+    const toes = body.parents.indexOf(joints.indexOf(point.on));
+    const end = toes < 0 ? place : body.place(toes, [0, 0, 0]);
+    return place.map((x, i) => (x + end[i]) / 2);
   }
 
   #appear() {
@@ -101,11 +113,18 @@ export class Handles {
     if (!editor.shown || !viewer.stage) return;
     const { camera } = viewer.stage;
     const { clientWidth: width, clientHeight: height } = this.element;
+    this.balance.follow(editor.balance, camera, width, height);
+    const places = new Map();
     for (const { element, point } of this.marks) {
-      this.point.fromArray(editor.place(point)).project(camera);
-      const [x, y] = [0.5 * (this.point.x + 1) * width, 0.5 * (1 - this.point.y) * height];
+      const [x, y, depth] = pixelOf(this.#seen(point), camera, width, height);
+      places.set(element, [x, y]);
+      element.style.zIndex = String(1001 - Math.round(1000 * depth)); // the nearest is on top
+    }
+    for (const { element, point } of this.marks) {
+      const foot = point.joint === point.on ? null : this.#markOf(point.on); // over its heel, which is beside it
+      if (foot) element.style.zIndex = String(Number(foot.style.zIndex) - 1);
+      const [x, y] = foot ? beside(places.get(element), places.get(foot)) : places.get(element);
       element.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(-50%, -50%)`;
-      element.style.zIndex = String(1000 - Math.round(1000 * this.point.z)); // the nearest is on top
     }
   }
 
@@ -117,13 +136,13 @@ export class Handles {
     handle.setPointerCapture(event.pointerId);
     const plane = new Vector3().fromArray(this.editor.place(point));
     this.held = { joint: point.joint, plane, away: new Vector3(), moved: false };
-    this.held.away.copy(plane).sub(this.#under(event, plane) ?? plane);
+    this.held.away.copy(plane).sub(placeUnder(event, this.element, this.viewer.stage.camera, plane) ?? plane);
   }
 
   /** @param {PointerEvent} event @param {string} words */
   #move(event, words) {
     const { held } = this;
-    const place = held && this.#under(event, held.plane);
+    const place = held && placeUnder(event, this.element, this.viewer.stage.camera, held.plane);
     if (!held || !place) return;
     held.moved = true;
     this.editor.drag(held.joint, place.add(held.away).toArray(), words);
@@ -135,29 +154,14 @@ export class Handles {
     if (held?.moved) this.editor.end();
   }
 
-  /** The position under the pointer in the plane through `place` that faces the camera. @param {PointerEvent} event @param {Vector3} place */
-  #under(event, place) {
-    const { camera } = this.viewer.stage;
-    const { left, top, width, height } = this.element.getBoundingClientRect();
-    const x = (2 * (event.clientX - left)) / width - 1;
-    const y = 1 - (2 * (event.clientY - top)) / height;
-    const ray = new Vector3(x, y, 0.5).unproject(camera).sub(camera.position).normalize();
-    const facing = camera.getWorldDirection(new Vector3());
-    const along = ray.dot(facing);
-    if (along < 1e-6) return null;
-    return ray.multiplyScalar(place.clone().sub(camera.position).dot(facing) / along).add(camera.position);
-  }
-
   /** @param {KeyboardEvent} event @param {import("./session.js").Handle} point */
   #press(event, point) {
     const { joint, words } = point;
-    const direction = DIRECTIONS[event.key];
-    if (!direction || event.ctrlKey || event.metaKey || event.altKey) return;
+    const { editor } = this;
+    const towards = keyStep(event, this.viewer.stage.camera, editor.motion.body.size);
+    if (!towards) return;
     event.preventDefault();
     event.stopPropagation();
-    const { editor } = this;
-    const distance = KEY_STEP_M * editor.motion.body.size * (event.shiftKey ? 5 : 1);
-    const towards = new Vector3(...direction).applyQuaternion(this.viewer.stage.camera.quaternion).multiplyScalar(distance);
     // Keys in quick succession continue from the last target, and make one step.
     const from = editor.began && this.goal?.joint === joint ? this.goal.place : editor.place(point);
     this.goal = { joint, place: new Vector3(...from).add(towards).toArray() };
@@ -165,6 +169,14 @@ export class Handles {
     clearTimeout(this.pause);
     this.pause = setTimeout(() => editor.end(), KEY_PAUSE_MS);
   }
+}
+
+/** Where a heel's handle is seen: moved away from its foot's, below it from the front, until neither covers the other. */
+function beside(/** @type {number[]} */ [x, y], /** @type {number[]} */ [footX, footY]) {
+  const distance = Math.hypot(x - footX, y - footY);
+  if (distance >= HEEL_DISTANCE_PX) return [x, y];
+  const [acrossRatio, alongRatio] = distance > 1 ? [(x - footX) / distance, (y - footY) / distance] : [0, 1];
+  return [footX + HEEL_DISTANCE_PX * acrossRatio, footY + HEEL_DISTANCE_PX * alongRatio];
 }
 
 /** A joint without a handle. @param {string} joint @returns {import("./session.js").Handle} */

@@ -4,6 +4,7 @@ import { html, useEffect, useState } from "../vendor/htm-preact-standalone.js";
 import { dropped } from "../between/desk.js";
 import { stable } from "../places.js";
 import { useChange, useKeys } from "../shell/hooks.js";
+import { balanceWords } from "./balance.js";
 import { Handles } from "./handles.js";
 import { Joints } from "./joints.js";
 import { Keep } from "./keep.js";
@@ -39,10 +40,13 @@ export function Panel({ studio }) {
     { shown: ["arrows", "Page up", "Page down"], does: "move a handle across the view, away, towards (with Shift farther)", group: GROUP },
   ]);
   return html`<div class="pose stack" data-testid="editor">
+    <h2 class="aside">Pose a body by hand</h2>
     <${Start} studio=${studio} />
     ${
       editor.motion
-        ? html`<${Known} editor=${editor} /><${Whole} editor=${editor} />
+        ? html`<${Known} editor=${editor} />
+            <p class="hint" data-testid="balance">${balanceWords(editor.balance)}</p>
+            <${Whole} editor=${editor} />
             <${Keep} studio=${studio} editor=${editor} />
             <${Joints} editor=${editor} />`
         : html`<p class="empty">Show a movement in the viewer, then pose a frame of it.</p>`

@@ -46,6 +46,8 @@ export class Editor extends EventTarget {
     /** @type {Set<string>} standing feet that may leave their places */
     this.released = new Set();
     this.mirrors = false;
+    /** @type {import("./balance.js").Balance | null} null if the body's masses are not known */
+    this.balance = null;
     this.selected = "";
     this.dragged = ""; // the joint or heel dragged last
     this.words = "";
@@ -250,10 +252,10 @@ export class Editor extends EventTarget {
 
   /** @param {any} answer */
   #take(answer) {
-    const { rotations, root, known, corpus, standing, words = "" } = answer;
+    const { rotations, root, known, corpus, standing, balance, words = "" } = answer;
     this.posture = { rotations, root };
     this.motion.take(this.posture);
-    Object.assign(this, { known, corpus, standing, words });
+    Object.assign(this, { known, corpus, standing, balance, words });
     this.turns = answer.turns ?? this.turns.map((turn, i) => ({ ...turn, degrees: answer.degrees[i] }));
     this.#changed();
   }

@@ -1,46 +1,66 @@
 /** The top bar: the piece's title, undo and redo, theme, keys, and the connection's state. */
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { STEPS } from "../between/steps.js";
 import { filmingOf } from "../export/filming.js";
 import { preparing } from "../store.js";
 import { useChange, useKeys } from "./hooks.js";
 import { icon } from "./icons.js";
 import { shownKeys } from "./keys.js";
+import { Saved } from "./saved.js";
+import { Share } from "./share.js";
 
 /** @param {{studio: any}} props */
 export function Bar({ studio }) {
-  const { store, viewer } = studio;
+  const { store } = studio;
   const state = useChange(store, () => store.state);
-  const refusal = useChange(store, () => store.refusal);
   const connected = useChange(store, () => store.connected !== false);
-  const dark = useChange(viewer.theme, () => viewer.theme.dark);
-  const [sheet, setSheet] = useState(false);
   // A key may be pressed with nothing to undo, and before the last edit is answered.
   const undo = () => studio.act(() => studio.api.changed.then(() => store.state?.undo && studio.api.undo()));
   const redo = () => studio.act(() => studio.api.changed.then(() => store.state?.redo && studio.api.redo()));
   useKeys(studio, [
     { keys: ["Ctrl+z"], does: "undo", act: undo },
     { keys: ["Ctrl+Shift+z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "redo", act: redo },
-    { keys: ["d"], does: "dark or light", act: () => viewer.theme.toggle() },
     { keys: ["p"], does: "go to the panels", act: () => focus(".rail [aria-selected=true]") },
     { keys: ["t"], does: "go to the time line", act: () => focus(".timeline .stretches [tabindex='0']") },
-    { keys: ["?"], does: "show the keys", act: () => setSheet(true) },
   ]);
   return html`<header class="bar">
     <h1 class="brand">${icon("brand")}<span>MotionMind</span></h1>
     <${Title} studio=${studio} title=${state?.title} />
+    ${state && connected && html`<${Saved} state=${state} />`}
     ${state?.corpus && html`<span class="hint corpus cut">moves like <strong>${state.corpus}</strong></span>`}
     <span class="space"></span>
     <${Readiness} store=${store} />
     <${Film} studio=${studio} />
-    ${!connected && html`<span class="offline" role="alert" data-testid="offline">Not connected: edits are not saved${refusal && `; ${refusal}`}</span>`}
+    <${Offline} store=${store} words="Not connected: edits are not saved" />
+    ${state?.access === "shared" && html`<${Share} studio=${studio} />`}
     ${button("undo", "Undo", state?.undo, undo)} ${button("redo", "Redo", state?.redo, redo)}
-    <button
+    <${Everywhere} studio=${studio} steps=${STEPS} />
+  </header>`;
+}
+
+/** Says that there is no connection, and why the studio refuses the page, if it does. @param {{store: any, words: string}} props */
+export function Offline({ store, words }) {
+  const refusal = useChange(store, () => store.refusal);
+  const connected = useChange(store, () => store.connected !== false);
+  return !connected && html`<span class="offline" role="alert" data-testid="offline">${words}${refusal && `; ${refusal}`}</span>`;
+}
+
+/** Buttons of every page: dark or light, and the sheet of keys. @param {{studio: any, steps?: string[]}} props */
+export function Everywhere({ studio, steps = [] }) {
+  const { viewer } = studio;
+  const dark = useChange(viewer.theme, () => viewer.theme.dark);
+  const [sheet, setSheet] = useState(false);
+  useKeys(studio, [
+    { keys: ["i"], does: "dark or light (invert)", act: () => viewer.theme.toggle() },
+    { keys: ["?"], does: steps.length ? "show the first steps and the keys" : "show the keys", act: () => setSheet(true) },
+  ]);
+  return html`<button
       class="button quiet icon"
       data-testid="dark"
       aria-label="Dark"
       aria-pressed=${String(dark)}
-      title="Dark or light (D)"
+      title="Dark or light (I)"
       onClick=${() => viewer.theme.toggle()}
     >
       ${icon("dark")}
@@ -48,8 +68,7 @@ export function Bar({ studio }) {
     <button class="button quiet icon" aria-label="Keys" aria-haspopup="dialog" title="Keys (?)" onClick=${() => setSheet(true)}>
       ${icon("keys")}
     </button>
-    ${sheet && html`<${Sheet} studio=${studio} close=${() => setSheet(false)} />`}
-  </header>`;
+    ${sheet && html`<${Sheet} studio=${studio} steps=${steps} close=${() => setSheet(false)} />`}`;
 }
 
 /** Focus the first match. @param {string} selector */
@@ -131,8 +150,8 @@ function Title({ studio, title: known }) {
   />`;
 }
 
-/** The sheet of keys. @param {{studio: any, close: () => void}} props */
-function Sheet({ studio, close }) {
+/** The sheet of keys. @param {{studio: any, steps: string[], close: () => void}} props */
+function Sheet({ studio, steps, close }) {
   const dialog = useRef(/** @type {any} */ (null));
   useLayoutEffect(() => dialog.current.showModal(), []);
   return html`<dialog ref=${dialog} class="sheet" data-testid="keys" aria-label="Keys" onClose=${close}>
@@ -140,6 +159,11 @@ function Sheet({ studio, close }) {
       <h2 class="grow">Keys</h2>
       <button class="button">Close</button>
     </form>
+    ${
+      steps.length > 0 &&
+      html`<h3>First steps</h3>
+        <ol>${steps.map((step, i) => html`<li><span class="number" aria-hidden="true">${i + 1}</span><span>${step}</span></li>`)}</ol>`
+    }
     ${[...studio.keys.groups].map(
       ([group, rows]) => html`<h3>${group}</h3>
         <dl>

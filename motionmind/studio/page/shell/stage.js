@@ -1,6 +1,10 @@
 /** The middle of the page: the viewer, its caption and views, and the transport. */
 
-import { html, useEffect, useLayoutEffect, useRef } from "../vendor/htm-preact-standalone.js";
+import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { Asked } from "../asks/scene.js";
+import { Pane } from "../reference/pane.js";
+import { useStore } from "../store.js";
+import { Sights } from "../view/sights.js";
 import { useChange, useKeys } from "./hooks.js";
 import { icon } from "./icons.js";
 
@@ -22,6 +26,9 @@ export function View({ studio }) {
   const home = useChange(viewer, () => viewer.isHome, "show");
   const title = useChange(viewer, () => viewer.title, "show");
   const piece = useChange(viewer, () => viewer.piece, "show");
+  const path = useStore(studio, ({ state }) => state?.reference.path) ?? "";
+  const [beside, setBeside] = useState(false);
+  useEffect(() => setBeside(path !== ""), [path]);
   useKeys(studio, [
     { keys: [" "], does: "play or pause", group: GROUP, act: () => player.toggle() },
     { keys: ["ArrowLeft"], does: "one frame back", group: GROUP, act: () => player.step(-1) },
@@ -29,6 +36,7 @@ export function View({ studio }) {
     { keys: ["Home"], does: "go to the start", group: GROUP, act: () => player.seek(player.motion.start) },
     { keys: ["End"], does: "go to the end", group: GROUP, act: () => player.seek(player.motion.end) },
     { keys: ["l"], does: "loop", group: GROUP, act: () => (player.loop = !player.loop) },
+    ...(studio.api.looks ? [] : [{ keys: ["v"], does: "show or hide the reference video", group: GROUP, act: () => setBeside(!beside) }]),
     ...VIEWS.map(([view, , words], i) => ({
       keys: [String(i + 1)],
       does: words.replace(/ \(.*/, "").toLowerCase(),
@@ -42,7 +50,7 @@ export function View({ studio }) {
   useEffect(() => {
     studio.keys.controls = () => viewer.stage?.controls;
   }, []);
-  return html`<div class="frame" ref=${place}>
+  return html`<div class="pair"><div class="frame" ref=${place}>
       ${
         !home &&
         html`<div class="caption">
@@ -56,12 +64,28 @@ export function View({ studio }) {
             html`<button class="button quiet" title=${words} onClick=${() => viewer.look(view)}>${name}</button>`,
         )}
       </div>
+      <${Sights} studio=${studio} /><${Asked} studio=${studio} />
     </div>
-    <${Transport} viewer=${viewer} />`;
+    ${!studio.api.looks && html`<${Pane} studio=${studio} hidden=${!beside} />`}</div>
+    <${Transport} viewer=${viewer}>
+      ${
+        !studio.api.looks &&
+        html`<button
+          class="button quiet icon wide"
+          data-testid="reference-toggle"
+          aria-label="Reference video"
+          aria-pressed=${String(beside)}
+          title="Reference video (V)"
+          onClick=${() => setBeside(!beside)}
+        >
+          ${icon("video")}
+        </button>`
+      }
+    <//>`;
 }
 
-/** The controls that play the movement. @param {{viewer: any}} props */
-function Transport({ viewer }) {
+/** The controls that play the movement. @param {{viewer: any, children?: any}} props */
+function Transport({ viewer, children }) {
   const { player } = viewer;
   const playing = useChange(player, () => player.playing);
   const loop = useChange(player, () => player.loop);
@@ -92,6 +116,7 @@ function Transport({ viewer }) {
     <select class="wide" aria-label="Speed" value=${speed} onChange=${(/** @type {any} */ event) => (player.speed = Number(event.target.value))}>
       ${SPEEDS.map((value) => html`<option value=${value}>${value}×</option>`)}
     </select>
+    ${children}
   </div>`;
 }
 
@@ -104,7 +129,7 @@ function Scrub({ viewer, moving }) {
   useEffect(() => {
     const update = () => {
       const { start, end } = player.motion;
-      made.current.hidden = !viewer.motion?.insertedAt(player.time);
+      made.current.classList.toggle("unseen", !viewer.motion?.insertedAt(player.time));
       const span = Math.max(end - start, 1e-9);
       line.current.value = String((player.time - start) / span);
       const words = `${(player.time - start).toFixed(1)} of ${(end - start).toFixed(1)} s`;
@@ -126,6 +151,6 @@ function Scrub({ viewer, moving }) {
     player.seek(start + share * (end - start));
   };
   return html`<input ref=${line} type="range" min="0" max="1" step="any" aria-label="Time" data-testid="scrub" disabled=${!moving} onInput=${seek} />
-    <span ref=${made} class="made" title="The engine made this moment; it was not recorded" data-testid="made" hidden>inserted</span>
+    <span ref=${made} class="made unseen" title="The engine made this moment; it was not recorded" data-testid="made">inserted</span>
     <span ref=${clock} class="hint numbers clock"></span>`;
 }

@@ -4,7 +4,7 @@ import { html } from "../vendor/htm-preact-standalone.js";
 import { useChange } from "./hooks.js";
 import { icon } from "./icons.js";
 
-const NOTE_MS = 8000; // an error stays until the user closes it or three more arrive
+const NOTE_MS = 8000; // an error stays until its cause or the user ends it, or three more arrive
 const MAX_SHOWN = 3;
 
 /** @typedef {{words: string, kind: "error" | "note", number: number}} Toast */
@@ -31,6 +31,11 @@ export class Toasts extends EventTarget {
   /** @param {Toast} toast */
   close(toast) {
     this.#set(this.shown.filter((other) => other !== toast));
+  }
+
+  /** Close the line with these words, whose cause is gone. @param {string} words */
+  withdraw(words) {
+    if (this.shown.some((toast) => toast.words === words)) this.#set(this.shown.filter((toast) => toast.words !== words));
   }
 
   /** @param {Toast[]} shown */

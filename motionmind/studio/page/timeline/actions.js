@@ -1,42 +1,48 @@
 /** The time line's actions, which buttons, keys and gestures share. */
 
-import { bounded, fitting } from "./scale.js";
+import { copyGroup, groupOf, moveGroup, reaching, together } from "./groups.js";
+import { noteFrom } from "./notes.js";
+import { countFrom, fitting, middleOf, nearestCount, revealing, zoomed } from "./scale.js";
 import {
   discard,
-  duplicate,
   EMPTY,
   flip,
+  holding,
   insert,
+  isPosture,
   lasting,
   lengthOf,
+  LONGEST,
   lock,
-  move,
   nameOf,
   neighbour,
   newId,
   pass,
+  play,
   selected,
   selectionOf,
+  SHORTEST,
   split,
   trim,
   wish,
 } from "./items.js";
 
-const DURATION_STEP_S = 0.1; // of an insertion, for each key press
+const DURATION_STEP_S = 0.1; // of an insertion or a held posture, for each key press
+const PACE_STEP = 0.05; // of the recorded pace, for each key press
 const ZOOM_RATIO = 1.4;
 
 export class Actions {
   /**
    * @param {object} studio
    * @param {import("./composed.js").Movements} movements
-   * @param {(change: object) => void} show changes the panel's own state: {scale, left, fits, sheet}
+   * @param {(change: object) => void} show changes the panel's own state: {scale, left, fits, sheet, snaps}
    */
   constructor(studio, movements, show) {
     this.studio = studio;
     this.movements = movements;
     this.show = show;
     /** The visible range: pixels a second, pixels scrolled past, and width in pixels. */
-    this.sight = { scale: 60, left: 0, width: 800, fits: true };
+    this.sight = { scale: 60, left: 0, width: 800, fits: true, snaps: false };
     /** @type {Promise<any>} settles when all edits so far are answered */
     this.turn = Promise.resolve();
     /** @type {{name: string, by: number, done: Promise<any>} | null} steps that wait for their turn: further ones join them */
@@ -73,6 +79,45 @@ export class Actions {
   /** @returns {import("./items.js").Piece} */
   get piece() {
     return this.studio.store.state?.piece ?? EMPTY;
+  }
+
+  /** @returns {import("./scale.js").Meter} */
+  get meter() {
+    const { tempo = 120, counts = 8 } = this.studio.store.state ?? {};
+    return { tempo, counts };
+  }
+
+  snap() {
+    this.show({ snaps: !this.sight.snaps });
+  }
+
+  /** The count nearest to a time, if times snap; otherwise the time. */
+  near(time) {
+    return this.sight.snaps ? nearestCount(time, this.meter) : time;
+  }
+
+  /** How long something that begins at a time and lasts some seconds lasts after some key presses: steps, or counts. */
+  #after(at, seconds, steps) {
+    return this.sight.snaps ? countFrom(at + seconds, steps, this.meter) - at : seconds + steps * DURATION_STEP_S;
+  }
+
+  /** Count the piece by another tempo, or in other phrases. @param {Partial<import("./scale.js").Meter>} change */
+  count(change) {
+    return this.edit(() => {
+      const now = this.meter;
+      const next = { ...now, ...change };
+      return next.tempo === now.tempo && next.counts === now.counts ? null : { edit: "tempo", ...next };
+    });
+  }
+
+  /** Have an insertion end at a time of the piece, as it is now. */
+  land(seam, time) {
+    if (time - seam.at < SHORTEST || time - seam.at > LONGEST) {
+      const [first, last] = [seam.at + SHORTEST, seam.at + LONGEST].map((one) => one.toFixed(2));
+      this.studio.say(`This insertion can land from ${first} to ${last} s.`, { kind: "note" });
+      return Promise.resolve();
+    }
+    return this.last(seam, time - seam.at);
   }
 
   get item() {
@@ -133,6 +178,42 @@ export class Actions {
     if (item) this.select(item);
   }
 
+  /** Select the stretch `by` steps on, too. */
+  extend(by) {
+    const { selection } = this.studio.store;
+    const { blocks } = this.piece;
+    const at = blocks.findIndex(({ id }) => id === selection?.block);
+    const next = at < 0 ? undefined : blocks[at + by];
+    if (next) this.studio.store.set({ selection: reaching(selection, next.id) });
+  }
+
+  /** Select only the stretch with the focus. */
+  single() {
+    const { selection } = this.studio.store;
+    if (selection?.from) this.studio.store.set({ selection: { block: selection.block } });
+  }
+
+  /** Edit the selected stretches, in their state after all earlier edits. @param {(group: any[]) => any} make */
+  #editGroup(make) {
+    const { selection } = this.studio.store;
+    return this.edit(() => make(groupOf(this.piece, selection)));
+  }
+
+  /** Write a note at the playhead. */
+  note() {
+    this.look();
+    this.studio.viewer.player.pause();
+    this.show({ note: "new" });
+  }
+
+  /** Go to the note before or after the playhead. */
+  toNote(by) {
+    const note = noteFrom(this.piece.notes, this.time, by);
+    if (!note) return;
+    this.seek(note.at);
+    this.reveal(note.at, 0);
+  }
+
   /** Show the piece at a time. */
   seek(time) {
     this.look();
@@ -142,12 +223,15 @@ export class Actions {
   }
 
   moveBy(by) {
-    return this.#editSelected(
-      ({ block }) => block && move(this.piece, block, this.piece.blocks.findIndex(({ id }) => id === block.id) + by),
+    return this.#editGroup((group) =>
+      moveGroup(this.piece, group, this.piece.blocks.findIndex(({ id }) => id === group[0]?.id) + by),
     );
   }
 
-  /** Trim a stretch by some frames, or change an insertion's duration by as many steps. Waiting steps become one edit. */
+  /**
+   * Trim a stretch by some frames, or change the duration of a posture or an insertion by as many steps. Waiting steps
+   * become one edit.
+   */
   trimBy(side, by) {
     const { selection } = this.studio.store;
     const name = `${side} ${nameOf(selection)}`;
@@ -159,8 +243,9 @@ export class Actions {
     steps.done = this.edit(() => {
       if (this.steps === steps) this.steps = null;
       const { block, seam } = selected(this.piece, selection) ?? {};
+      if (block && side === "last" && isPosture(block)) return holding(block, this.#after(block.at, block.hold, steps.by));
       if (block) return trim(block, side, block[side] + steps.by);
-      return seam?.stands ? lasting(seam, lengthOf(seam) + steps.by * DURATION_STEP_S) : null;
+      return seam?.stands ? lasting(seam, this.#after(seam.at, lengthOf(seam), steps.by)) : null;
     });
     this.steps = steps;
     return steps.done;
@@ -171,24 +256,59 @@ export class Actions {
     return this.edit(lasting(seam, seconds));
   }
 
+  /** Hold a posture for some seconds, after all earlier edits. @param {import("./items.js").Block} block */
+  hold({ id }, seconds) {
+    return this.edit(() => {
+      const { block } = selected(this.piece, { block: id }) ?? {};
+      return block && holding(block, seconds);
+    });
+  }
+
+  /**
+   * Change a stretch's pace or repeats, given after all earlier edits; of the selected one by default.
+   * @param {(block: import("./items.js").Block) => {pace?: number, repeats?: number}} change
+   */
+  play(change, selection = this.studio.store.selection) {
+    return this.edit(() => {
+      const { block } = selected(this.piece, selection) ?? {};
+      return block && play(block, change(block));
+    });
+  }
+
+  paceBy(steps) {
+    return this.play(({ pace }) => ({ pace: Math.round((pace + steps * PACE_STEP) * 100) / 100 }));
+  }
+
+  repeatBy(by) {
+    return this.play(({ repeats }) => ({ repeats: repeats + by }));
+  }
+
   split() {
     const { time } = this;
     return this.#editSelected(({ block }) => {
       if (!block) return null;
-      const edit = split(block, time, this.times(block), newId(this.studio.window));
+      const edit = split(block, time, this.times(block), this.studio.window);
       if (!edit) this.studio.say("Put the playhead inside the stretch to split it there.", { kind: "note" });
       return edit;
     });
   }
 
   async duplicate() {
-    const id = newId(this.studio.window);
-    await this.#editSelected(({ block }) => block && duplicate(this.piece, block, id));
-    if (this.piece.blocks.some((one) => one.id === id)) this.studio.store.set({ selection: { block: id } });
+    /** @type {string[]} */
+    let ids = [];
+    const done = await this.#editGroup((group) => {
+      if (group.length === 0) return null;
+      const copy = copyGroup(this.piece, group, this.studio.window);
+      ({ ids } = copy);
+      return copy.edit;
+    });
+    if (!done) return;
+    const [from, block] = [ids[0], ids[ids.length - 1]];
+    this.studio.store.set({ selection: ids.length > 1 ? { block, from } : { block } });
   }
 
   mirror() {
-    return this.#editSelected(({ block }) => block && { edit: "mirror", block: block.id });
+    return this.#editGroup((group) => together(group.map(({ id }) => ({ edit: "mirror", block: id })), "mirror"));
   }
 
   /** Delete the stretch, or discard or restore the insertion. */
@@ -198,9 +318,10 @@ export class Actions {
       const { block, seam } = selected(this.piece, selection) ?? {};
       if (seam && seam.alternatives.length > 0) await this.#send(discard(seam));
       if (!block) return;
-      const at = this.piece.blocks.findIndex(({ id }) => id === block.id);
-      const next = this.piece.blocks[at + 1] ?? this.piece.blocks[at - 1];
-      const done = await this.#send({ edit: "delete", block: block.id });
+      const group = groupOf(this.piece, selection);
+      const at = this.piece.blocks.indexOf(group[0]);
+      const next = this.piece.blocks[at + group.length] ?? this.piece.blocks[at - 1];
+      const done = await this.#send(together(group.map(({ id }) => ({ edit: "delete", block: id })), "delete"));
       if (done) this.studio.store.set({ selection: next ? { block: next.id } : null });
     });
   }
@@ -253,18 +374,15 @@ export class Actions {
 
   /** Zoom by a factor; the time at `x` pixels from the left edge stays in place. */
   zoom(factor, x = this.sight.width / 2) {
-    const { scale, left, width } = this.sight;
-    const { seconds, blocks } = this.piece;
-    const next = bounded(scale * factor, seconds, width, blocks.length);
-    this.show({ scale: next, left: Math.max(((left + x) / scale) * next - x, 0), fits: false });
+    this.show(zoomed(this.sight, this.piece, factor, x));
   }
 
   zoomIn() {
-    this.zoom(ZOOM_RATIO, this.#middle());
+    this.zoom(ZOOM_RATIO, middleOf(this.sight, this.time));
   }
 
   zoomOut() {
-    this.zoom(1 / ZOOM_RATIO, this.#middle());
+    this.zoom(1 / ZOOM_RATIO, middleOf(this.sight, this.time));
   }
 
   fit() {
@@ -272,18 +390,8 @@ export class Actions {
     this.show({ scale: fitting(seconds, this.sight.width, blocks.length), left: 0, fits: true });
   }
 
-  /** The playhead if it is visible, or else the middle, in pixels from the left edge. */
-  #middle() {
-    const x = this.time * this.sight.scale - this.sight.left;
-    return x >= 0 && x <= this.sight.width ? x : this.sight.width / 2;
-  }
-
   /** Scroll a stretch of time into view. */
   reveal(at, seconds) {
-    const { scale, left, width } = this.sight;
-    const [from, to] = [at * scale, (at + seconds) * scale];
-    const room = Math.min(48, width / 4);
-    if (from < left + room) this.show({ left: Math.max(from - room, 0) });
-    else if (to > left + width - room) this.show({ left: Math.max(Math.min(to - width + room, from - room), 0) });
+    this.show(revealing(this.sight, at, seconds));
   }
 }

@@ -2,10 +2,11 @@
 
 import { html } from "../vendor/htm-preact-standalone.js";
 import { trimmed } from "./gestures.js";
-import { inSight, nameOf, selectionOf, shown } from "./items.js";
+import { groupOf } from "./groups.js";
+import { inSight, isPosture, nameOf, selectionOf, shown } from "./items.js";
 import { clock } from "./scale.js";
 
-const POSTURE_WIDTH_PX = 28; // of a held posture, which has no duration
+const POSTURE_WIDTH_PX = 28; // of a posture, at least: few are held
 const MIN_PICTURE_DISTANCE_PX = 100;
 const NAME_OFFSET_PX = 52;
 const MAX_PICTURES = 16; // of a stretch
@@ -27,17 +28,19 @@ export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
   const { blocks } = piece;
   const [first, stop] = visible(blocks, sight);
   const chosen = nameOf(selection);
+  const group = new Set(groupOf(piece, selection).map(({ id }) => id));
   const there = blocks.slice(first, stop);
   const stops = there.some(({ id }) => chosen === `block ${id}`) ? chosen : `block ${there[0]?.id}`;
-  return html`<div class="track stretches" role="listbox" aria-label="Stretches" aria-orientation="horizontal">
+  return html`<div class="track stretches" role="listbox" aria-label="Stretches" aria-orientation="horizontal" aria-multiselectable="true">
     ${there.map((block, i) => {
       const name = `block ${block.id}`;
-      const mine = draft?.id === block.id ? draft : null;
-      const change = mine?.kind === "trim" ? trimmed(block, mine, does.times(block)) : null;
-      const held = block.first === block.last;
-      const width = held ? POSTURE_WIDTH_PX : (change?.seconds ?? block.seconds) * sight.scale;
+      const mine = draft?.id === block.id || draft?.ids?.includes(block.id) ? draft : null;
+      const change = mine?.kind === "trim" || mine?.kind === "pace" ? trimmed(block, mine, does.times(block)) : null;
+      const held = isPosture(block);
+      const seconds = mine?.kind === "hold" ? mine.seconds : (change?.seconds ?? block.seconds);
+      const width = Math.max(seconds * sight.scale, held ? POSTURE_WIDTH_PX : 0);
       const strip = held || block.missing ? [] : pictures(block, sight.scale);
-      const left = (block.at + (change?.later ?? 0)) * sight.scale - (held ? POSTURE_WIDTH_PX / 2 : 0);
+      const left = (block.at + (change?.later ?? 0) + seconds / 2) * sight.scale - width / 2;
       const classes = ["stretch", held && "held", block.mirrored && "mirrored", block.missing && "missing", mine?.kind === "move" && "moving"];
       return html`<div
         key=${block.id}
@@ -45,7 +48,7 @@ export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
         role="option"
         data-testid=${`block-${block.id}`}
         data-block=${block.id}
-        aria-selected=${chosen === name}
+        aria-selected=${group.has(block.id)}
         aria-posinset=${first + i + 1}
         aria-setsize=${blocks.length}
         aria-label=${blockLabel(block)}
@@ -58,9 +61,9 @@ export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
         }}
       >
         ${width > 18 && !block.missing && html`<img alt="" loading="lazy" draggable=${false} src=${thumbnail(block.key, block.first)} />`}
-        ${strip.map(({ x, frame }) => html`<img key=${frame} class="later" alt="" loading="lazy" draggable=${false} src=${thumbnail(block.key, frame)} style=${{ left: `${x}px` }} />`)}
-        ${width > 70 && html`<span class="name cut" style=${{ maxWidth: strip.length ? `${strip[0].x - NAME_OFFSET_PX}px` : "" }}>${block.missing ? "? " : ""}${block.mirrored ? "⇋ " : ""}${block.title}</span>`}
-        ${!held && html`<i class="edge first" data-edge="first"></i><i class="edge last" data-edge="last"></i>`}
+        ${strip.map(({ x, frame }) => html`<img key=${block.repeats > 1 ? `${x} ${frame}` : frame} class="later" alt="" loading="lazy" draggable=${false} src=${thumbnail(block.key, frame)} style=${{ left: `${x}px` }} />`)}
+        ${width > 70 && html`<span class="name cut" style=${{ maxWidth: strip.length ? `${strip[0].x - NAME_OFFSET_PX}px` : "" }}>${block.missing ? "? " : ""}${block.mirrored ? "⇋ " : ""}${block.title}${playedAs(block)}</span>`}
+        ${!held && html`<i class="edge first" data-edge="first"></i>`}<i class="edge last" data-edge="last"></i>
       </div>`;
     })}
     ${draft?.kind === "move" &&
@@ -85,7 +88,9 @@ export function Seams({ piece, sight, draft, selection, over }) {
       const width = stands ? (mine?.seconds ?? seam.seconds) * sight.scale : POSTURE_WIDTH_PX;
       const left = stands ? seam.at * sight.scale : (seam.at + seam.seconds / 2) * sight.scale - POSTURE_WIDTH_PX / 2;
       const locked = seam.decision === "locked";
-      return html`<div
+      return html`${again(piece, seam).map(
+        (later) => html`<i key=${`${name} ${later}`} class=${`seam again ${seam.state.replace(" ", "-")}`} aria-hidden="true" style=${{ left: `${left + later * sight.scale}px`, width: `${Math.max(width, 8)}px` }}></i>`,
+      )}<div
         key=${name}
         class=${`seam ${seam.state.replace(" ", "-")}${locked ? " locked" : ""}${over === seam.left ? " target" : ""}`}
         role="option"
@@ -109,6 +114,12 @@ export function Seams({ piece, sight, draft, selection, over }) {
       </div>`;
     })}
   </div>`;
+}
+
+/** How much later a seam between repeats comes again, seconds. */
+function again({ blocks }, { left, right, seconds }) {
+  const block = left === right && blocks.find(({ id }) => id === left);
+  return block ? Array.from({ length: block.repeats - 2 }, (_, i) => (i + 1) * (block.once + seconds)) : [];
 }
 
 /** Wishes for insertions: postures to pass, hands and feet to hold. */
@@ -136,11 +147,12 @@ export function Wishes({ piece, sight, thumbnail }) {
 }
 
 /** Further pictures of a stretch; their number doubles with its width, so that the others stay in place. */
-function pictures({ first, last, seconds }, scale) {
+function pictures({ first, last, seconds, repeats }, scale) {
   const wide = seconds * scale;
-  const count = Math.min(2 ** Math.floor(Math.log2(wide / MIN_PICTURE_DISTANCE_PX)), MAX_PICTURES, last - first);
+  const count = Math.min(2 ** Math.floor(Math.log2(wide / MIN_PICTURE_DISTANCE_PX)), MAX_PICTURES, (last - first) * repeats);
   const later = Array.from({ length: Math.max(Math.ceil(count) - 1, 0) }, (_, i) => (i + 1) / count);
-  return later.map((share) => ({ x: share * wide, frame: first + Math.round(share * (last - first)) }));
+  const frame = (share) => first + Math.round(((share * repeats) % 1) * (last - first));
+  return later.map((share) => ({ x: share * wide, frame: frame(share) }));
 }
 
 /** The range of items to render. */
@@ -149,20 +161,28 @@ function visible(items, { scale, left, width }) {
 }
 
 /** The approximate start of a dragged stretch. */
-function landing({ blocks, seconds }, { id, place }) {
-  const rest = blocks.filter((block) => block.id !== id);
+function landing({ blocks, seconds }, { ids, place }) {
+  const rest = blocks.filter((block) => !ids.includes(block.id));
   if (place < rest.length) return rest[place].at;
   return seconds;
 }
 
-function blockLabel({ title, missing, mirrored, at, seconds, first, last }) {
-  const long = first === last ? "a posture" : `${clock(seconds)} seconds`;
-  return `${title}${missing ? ", missing" : ""}, ${long}${mirrored ? ", mirrored" : ""}, from ${clock(at)}`;
+/** Pace and repeats, as a tile shows them. */
+function playedAs({ first, last, pace, repeats }) {
+  const percent = pace === 1 || first === last ? "" : ` ${Math.round(100 * pace)} %`;
+  return `${percent}${repeats > 1 ? ` ×${repeats}` : ""}`;
+}
+
+function blockLabel(block) {
+  const { title, missing, mirrored, at, seconds, first, last } = block;
+  const held = seconds > 0 ? `a posture held ${clock(seconds)} seconds` : "a posture";
+  const long = first === last ? held : `${clock(seconds)} seconds`;
+  return `${title}${missing ? ", missing" : ""}, ${long}${mirrored ? ", mirrored" : ""}${playedAs(block)}, from ${clock(at)}`;
 }
 
 function seamLabel(seam, word) {
   const chosen = seam.alternatives[seam.chosen - 1];
-  const said = [`Seam ${seam.number}: ${word}`];
+  const said = [`Seam ${seam.number}: ${word}${seam.left === seam.right ? ", between repeats" : ""}`];
   if (seam.state === "inserted") {
     said.push(`${seam.chosen} of ${seam.alternatives.length}, ${clock(seam.seconds)} seconds`);
     if (seam.decision === "locked") said.push("locked");

@@ -94,14 +94,15 @@ export class Composed {
     this.insertions = [];
     for (const part of this.parts) {
       const motion = this.movements.at(part.key);
-      const clock = part.at - (motion?.times[part.first] ?? 0);
+      const [begin, speed] = motion ? [motion.times[part.first], speedOf(part, motion)] : [0, 1];
       const steps = Math.max(part.last - part.first, 1);
       for (let frame = part.first; frame <= part.last; frame++) {
-        times.push(motion ? motion.times[frame] + clock : part.at + (part.seconds * (frame - part.first)) / steps);
+        times.push(motion ? part.at + (motion.times[frame] - begin) / speed : part.at + (part.seconds * (frame - part.first)) / steps);
       }
+      if (part.first === part.last && part.seconds > 0) times.push(part.at + part.seconds); // the end of a held posture
       if (!part.inserted) continue;
       const marks = motion?.insertions.length ? motion.insertions : [{ times: [0, part.seconds], bridged: [] }];
-      const own = motion?.insertions.length ? clock : part.at;
+      const own = motion?.insertions.length ? part.at - begin : part.at;
       for (const mark of marks) this.insertions.push({ ...mark, times: mark.times.map((time) => time + own) });
     }
     this.times = Float64Array.from(times);
@@ -146,17 +147,19 @@ export class Composed {
   #sampleWithin(part, time, rotations, root) {
     const motion = this.movements.at(part.key);
     const begin = motion.times[part.first];
-    const own = Math.min(begin + Math.max(time - part.at, 0), motion.times[part.last]);
+    const own = Math.min(begin + Math.max(time - part.at, 0) * speedOf(part, motion), motion.times[part.last]);
     motion.sample(own, rotations, root);
     place(part, rotations, root);
   }
 
   /** The movement and the frame nearest to `time`. */
   placeAt(time) {
-    const { key, first, last, at } = this.parts[this.partAt(time)];
-    const times = this.movements.at(key)?.times;
-    if (!times) return null;
-    const wanted = times[first] + time - at;
+    const part = this.parts[this.partAt(time)];
+    const { key, first, last, at } = part;
+    const motion = this.movements.at(key);
+    if (!motion) return null;
+    const { times } = motion;
+    const wanted = times[first] + (time - at) * speedOf(part, motion);
     const frame = lastBefore(times, wanted);
     const nearer = frame < last && times[frame + 1] - wanted < wanted - times[frame] ? frame + 1 : frame;
     return { key, frame: Math.min(nearer, last) };
@@ -188,6 +191,11 @@ export class Composed {
     const now = bridged.filter(({ move }) => times[move] - MOMENT < time && time < times[move + 1] + MOMENT);
     return [...new Set(now.map(({ joint }) => joint))];
   }
+}
+
+/** How many times as fast as its movement a part plays; 1 for a single frame. @param {Part} part @param {any} motion */
+function speedOf({ first, last, seconds }, { times }) {
+  return seconds > 0 && last > first ? (times[last] - times[first]) / seconds : 1;
 }
 
 /** Turn a posture about the vertical and move it over the floor, as its part says. */

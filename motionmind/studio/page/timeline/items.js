@@ -5,19 +5,23 @@ import { lastBefore } from "./composed.js";
 /**
  * @typedef {{posture: string, frame: number}} Passing
  * @typedef {{joint: string, hold: "start"|"end"|"throughout"|"place", begins: number, ends: number}} Pin
- * @typedef {{seconds: number|null, passing: Passing[], pins: Pin[]}} Ask
- * @typedef {{id: string, source: string, first: number, last: number, mirrored: boolean, key: string, title: string,
- *   frames: number, missing: boolean, at: number, seconds: number}} Block
+ * @typedef {{seconds: number|null, passing: Passing[], pins: Pin[], reaches: import("../asks/asked.js").Reach[]}} Ask
+ * @typedef {{id: string, source: string, first: number, last: number, mirrored: boolean, hold: number, pace: number,
+ *   repeats: number, key: string, title: string, frames: number, missing: boolean, at: number, once: number,
+ *   seconds: number}} Block
  * @typedef {{left: string, right: string, number: number, state: string, words: string, chosen: number,
  *   alternatives: {key: string, seconds: number, words: string}[], decision: string, ask: Ask, at: number, stands: boolean,
  *   seconds: number}} Seam
  * @typedef {{block?: Block, seam?: Seam}} Item
- * @typedef {{blocks: Block[], seams: Seam[], parts: object[], seconds: number}} Piece
+ * @typedef {{blocks: Block[], seams: Seam[], parts: object[], notes: any[], seconds: number}} Piece
  */
 
 /** An empty piece. @type {Piece} */
-export const EMPTY = { seconds: 0, parts: [], blocks: [], seams: [] };
+export const EMPTY = { seconds: 0, parts: [], blocks: [], seams: [], notes: [] };
 export const [SHORTEST, LONGEST] = [0.1, 60]; // seconds of an insertion, as a wish
+export const LONGEST_HOLD = 3600; // seconds of a posture
+export const [SLOWEST, FASTEST] = [0.5, 2]; // multiples of the recorded pace
+export const MOST_REPEATS = 100;
 
 /** The item that a selection names, or undefined. @param {Piece} piece */
 export function selected(piece, selection) {
@@ -52,11 +56,11 @@ export function shown(seam) {
 /** The item `by` places on from the selected one. @param {Piece} piece */
 export function neighbour(piece, selection, by) {
   const items = [];
-  piece.blocks.forEach((block, i) => {
+  let next = 0;
+  for (const block of piece.blocks) {
     items.push({ block });
-    const seam = piece.seams[i];
-    if (seam && shown(seam)) items.push({ seam });
-  });
+    for (; piece.seams[next]?.left === block.id; next++) if (shown(piece.seams[next])) items.push({ seam: piece.seams[next] });
+  }
   const name = nameOf(selection);
   const at = items.findIndex((item) => nameOf(selectionOf(item)) === name);
   if (at < 0) return by > 0 ? items[0] : items.at(-1);
@@ -92,9 +96,9 @@ export function newId(window) {
 
 /** Insert a copy of a block after it. @param {Piece} piece @param {Block} block */
 export function duplicate(piece, block, id) {
-  const { source, first, last, mirrored } = block;
+  const { source, first, last, mirrored, hold, pace, repeats } = block;
   const after = piece.blocks[piece.blocks.findIndex((one) => one.id === block.id) + 1];
-  return { edit: "insert", id, source, first, last, mirrored, before: after?.id ?? null };
+  return { edit: "insert", id, source, first, last, mirrored, hold, pace, repeats, before: after?.id ?? null };
 }
 
 /** Move a block to index `to`; null if it is there. @param {Piece} piece */
@@ -106,20 +110,20 @@ export function move(piece, block, to) {
   return { edit: "move", block: block.id, before: rest[place]?.id ?? null };
 }
 
-/** The index, without block `without`, for a drop at `time`. @param {Piece} piece */
-export function placeAt(piece, time, without = "") {
-  return piece.blocks.filter(({ id, at, seconds }) => id !== without && at + seconds / 2 < time).length;
+/** The index, without the blocks `without`, for a drop at `time`. @param {Piece} piece @param {string[]} without */
+export function placeAt(piece, time, without = []) {
+  return piece.blocks.filter(({ id, at, seconds }) => !without.includes(id) && at + seconds / 2 < time).length;
 }
 
-/** The frame of a block at `time`. @param {Block} block @param {Float64Array|undefined} times its movement's */
+/** The frame of a block at `time`, in the first of its repeats. @param {Block} block @param {Float64Array|undefined} times its movement's */
 export function frameAt(block, time, times) {
   if (times) {
-    const own = lastBefore(times, times[block.first] + time - block.at);
+    const wanted = times[block.first] + (time - block.at) * block.pace;
+    const own = lastBefore(times, wanted);
     const later = Math.min(own + 1, times.length - 1);
-    const wanted = times[block.first] + time - block.at;
     return Math.abs(times[later] - wanted) < Math.abs(times[own] - wanted) ? later : own;
   }
-  const rate = (block.last - block.first) / Math.max(block.seconds, 1e-6);
+  const rate = (block.last - block.first) / Math.max(block.once, 1e-6);
   return Math.min(Math.max(Math.round(block.first + (time - block.at) * rate), 0), block.frames - 1);
 }
 
@@ -131,11 +135,39 @@ export function trim(block, side, frame) {
   return { edit: "trim", block: id, first, last, [side]: to };
 }
 
-/** Split a block at a time; null if the time is outside of it. @param {Block} block */
-export function split(block, time, times, id) {
-  const within = time > block.at && time < block.at + block.seconds;
-  const at = Math.min(Math.max(frameAt(block, time, times), block.first + 1), block.last);
-  return within ? { edit: "split", block: block.id, at, id } : null;
+/** Whether a block is a posture, which can be held. @param {Block} block */
+export function isPosture({ first, last }) {
+  return first === last;
+}
+
+/** Hold a posture for some seconds; null if it is. @param {Block} block */
+export function holding(block, seconds) {
+  const to = Math.round(Math.min(Math.max(seconds || 0, 0), LONGEST_HOLD) * 1000) / 1000;
+  return to === block.hold ? null : { edit: "hold", block: block.id, seconds: to };
+}
+
+/** Play a block at another pace, or another number of times; null if it does. @param {Block} block */
+export function play(block, { pace = block.pace, repeats = block.repeats }) {
+  const wanted = {
+    pace: Math.round(Math.min(Math.max(pace || 1, SLOWEST), FASTEST) * 1000) / 1000,
+    repeats: Math.min(Math.max(Math.round(repeats || 1), 1), MOST_REPEATS),
+  };
+  if (isPosture(block) || (wanted.pace === block.pace && wanted.repeats === block.repeats)) return null;
+  return { edit: "play", block: block.id, ...wanted };
+}
+
+/**
+ * Split a block at a time, in the playing that is then; null if the time is in none.
+ * @param {Block} block @param {string} window
+ */
+export function split(block, time, times, window) {
+  const every = block.repeats > 1 ? (block.seconds - block.once) / (block.repeats - 1) : block.seconds; // with its insertion
+  const turn = Math.min(Math.floor((time - block.at) / every), block.repeats - 1) + 1;
+  const own = time - (turn - 1) * every;
+  if (own <= block.at || own >= block.at + block.once) return null;
+  const at = Math.min(Math.max(frameAt(block, own, times), block.first + 1), block.last);
+  const others = { turn, half: newId(window), rest: newId(window) };
+  return { edit: "split", block: block.id, at, id: newId(window), ...(block.repeats > 1 && others) };
 }
 
 /** Change the wishes at a seam. @param {Seam} seam @param {Partial<Ask>} change */
@@ -145,7 +177,7 @@ export function wish({ left, right, ask }, change) {
 
 /** Set the duration of a seam's insertion. @param {Seam} seam */
 export function lasting(seam, seconds) {
-  return wish(seam, { seconds: Math.round(Math.min(Math.max(seconds, SHORTEST), LONGEST) * 100) / 100 });
+  return wish(seam, { seconds: Math.round(Math.min(Math.max(seconds, SHORTEST), LONGEST) * 1000) / 1000 });
 }
 
 /** The duration of an insertion, or the wished one until it is found. @param {Seam} seam */

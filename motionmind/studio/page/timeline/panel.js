@@ -7,13 +7,14 @@ import { useStore } from "../store.js";
 import { Actions } from "./actions.js";
 import { Composed, Movements } from "./composed.js";
 import { EMPTY, selected } from "./items.js";
+import { useKeys } from "../shell/hooks.js";
 import { act, KEYS } from "./keys.js";
+import { NoteSheet } from "./notes.js";
 import { fitting } from "./scale.js";
 import { Toolbar } from "./toolbar.js";
 import { Tracks } from "./tracks.js";
 import { WishSheet } from "./wishes.js";
 
-const TEMPO = "motionmind-tempo"; // key in the browser's storage
 const THUMBNAIL_HEIGHT_PX = 48;
 /** Rows for the sheet of keys, without actions: the focused tracks handle these keys. */
 const ROWS = KEYS.filter(([, , shown]) => shown).map(([, , shown, does]) => ({ shown: [shown], does, group: "Time line" }));
@@ -28,8 +29,12 @@ export function Panel({ studio }) {
     width: 800,
     fits: true,
     sheet: false,
+    note: "", // the id of the one that is written; "new" for another
+    snaps: false,
   }));
-  const [tempo, setTempo] = useState(() => Number(localStorage.getItem(TEMPO)) || 120);
+  const tempo = useStore(studio, ({ state }) => state?.tempo) ?? 120;
+  const counts = useStore(studio, ({ state }) => state?.counts) ?? 8;
+  const meter = { tempo, counts };
   const does = useMemo(() => new Actions(studio, new Movements((key) => movement(studio.api, key)), show), [studio]);
   does.sight = sight;
   const joints = usePlayed(studio, does.movements, piece).filter((name) => LIMBS.test(name));
@@ -38,7 +43,13 @@ export function Panel({ studio }) {
   }, [piece.seconds, piece.blocks.length, sight.width, sight.fits]);
   const stopped = useStore(studio, (store) => store.stopped);
   useEffect(() => studio.keys.add(ROWS), [studio]);
+  useKeys(studio, [
+    { keys: ["n"], does: "write a note, marker or section", group: "Time line", act: () => piece.blocks.length > 0 && does.note() },
+    { keys: ["["], does: "go to the note before", group: "Time line", act: () => does.toNote(-1) },
+    { keys: ["]"], does: "go to the note after", group: "Time line", act: () => does.toNote(1) },
+  ]);
   const seam = selected(piece, selection)?.seam;
+  const note = piece.notes.find(({ id }) => id === sight.note);
   return html`<section
     class="timeline"
     data-testid="timeline"
@@ -51,16 +62,13 @@ export function Panel({ studio }) {
       does=${does}
       piece=${piece}
       selection=${selection}
-      tempo=${tempo}
-      onTempo=${(next) => {
-        localStorage.setItem(TEMPO, String(next));
-        setTempo(next);
-      }}
+      meter=${meter}
+      snaps=${sight.snaps}
       stopped=${stopped}
       onStop=${(stop) => does.smooth(!stop)}
       sheet=${sight.sheet}
     />
-    <${Tracks} does=${does} piece=${piece} sight=${sight} selection=${selection} tempo=${tempo} thumbnail=${picture} />
+    <${Tracks} does=${does} piece=${piece} sight=${sight} selection=${selection} meter=${meter} thumbnail=${picture} />
     ${sight.sheet &&
     seam &&
     html`<${WishSheet}
@@ -75,12 +83,24 @@ export function Panel({ studio }) {
         does.focused = true;
       }}
     />`}
+    ${(note || sight.note === "new") &&
+    html`<${NoteSheet}
+      key=${sight.note}
+      does=${does}
+      note=${note}
+      onClose=${() => {
+        show({ note: "" });
+        const opener = document.querySelector(note ? `[data-note="${note.id}"]` : "[data-testid=note]");
+        /** @type {HTMLElement | null} */ (opener)?.focus();
+      }}
+    />`}
   </section>`;
 }
 
 /** Whether the focused element needs a key for itself. */
 function kept({ key, target }) {
-  return target.closest("input, select, [role=slider], [role=dialog]") || (key === "Enter" && target.closest("button"));
+  if (target.closest("[role=slider]")) return key.length > 1; // the ruler, which needs no letters
+  return target.closest("input, select, [role=dialog]") || (key === "Enter" && target.closest("button"));
 }
 
 /** Apply a change to the visible range; return the same object if nothing changes. */
@@ -92,7 +112,7 @@ function same(old, change) {
  * Show the piece in the viewer as soon as its first movement has loaded, and again when all have.
  * Return the names of its joints; none until they are known.
  */
-function usePlayed(studio, movements, { parts }) {
+export function usePlayed(studio, movements, { parts }) {
   const told = JSON.stringify(parts);
   const [joints, setJoints] = useState([]);
   useEffect(() => {

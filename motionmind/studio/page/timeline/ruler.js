@@ -1,12 +1,12 @@
 /** The ruler, in seconds and counts, and the playhead over all tracks. */
 
 import { html, useEffect, useRef } from "../vendor/htm-preact-standalone.js";
-import { clock, countAt, countTicks, secondTicks } from "./scale.js";
+import { clock, countAt, countFrom, countTicks, secondTicks } from "./scale.js";
 
 const KEY_STEP_S = 0.1; // of the playhead, for an arrow key
 
-/** @param {{does: any, sight: any, seconds: number, tempo: number}} props */
-export function Ruler({ does, sight, seconds, tempo }) {
+/** @param {{does: any, sight: any, seconds: number, meter: import("./scale.js").Meter}} props */
+export function Ruler({ does, sight, seconds, meter }) {
   const [from, to] = [sight.left / sight.scale, (sight.left + sight.width) / sight.scale];
   const end = Math.max(seconds, to);
   const element = useRef(null);
@@ -14,22 +14,24 @@ export function Ruler({ does, sight, seconds, tempo }) {
     const { current } = element;
     if (!current) return;
     current.setAttribute("aria-valuenow", time.toFixed(2));
-    current.setAttribute("aria-valuetext", `${clock(time)} seconds, ${countAt(time, tempo)}`);
-  }), [does, tempo]);
+    current.setAttribute("aria-valuetext", `${clock(time)} seconds, ${countAt(time, meter)}`);
+  }), [does, meter.tempo, meter.counts]);
   const scrub = (event) => {
     if (event.button !== 0) return;
     const { currentTarget: ruler } = event;
     ruler.setPointerCapture(event.pointerId);
-    does.seek(timeAt(event, ruler, does));
+    does.seek(does.near(timeAt(event, ruler, does)));
   };
   const drag = (event) => {
-    if (event.currentTarget.hasPointerCapture(event.pointerId)) does.seek(timeAt(event, event.currentTarget, does));
+    if (event.currentTarget.hasPointerCapture(event.pointerId)) does.seek(does.near(timeAt(event, event.currentTarget, does)));
   };
   const key = (event) => {
     if (event.altKey || event.ctrlKey || event.metaKey) return;
-    const beat = 60 / tempo;
-    const by = { ArrowLeft: -KEY_STEP_S, ArrowRight: KEY_STEP_S, ArrowDown: -KEY_STEP_S, ArrowUp: KEY_STEP_S, PageUp: beat, PageDown: -beat };
-    const to_ = { Home: 0, End: seconds }[event.key] ?? (event.key in by ? does.time + by[event.key] : null);
+    const beat = 60 / meter.tempo;
+    const steps = { ArrowLeft: -1, ArrowRight: 1, ArrowDown: -1, ArrowUp: 1 };
+    const by = { PageUp: beat, PageDown: -beat };
+    let to_ = { Home: 0, End: seconds }[event.key] ?? (event.key in by ? does.time + by[event.key] : null);
+    if (event.key in steps) to_ = does.sight.snaps ? countFrom(does.time, steps[event.key], meter) : does.time + steps[event.key] * KEY_STEP_S;
     if (to_ === null) return;
     event.preventDefault();
     event.stopPropagation();
@@ -53,7 +55,7 @@ export function Ruler({ does, sight, seconds, tempo }) {
     ${secondTicks(from, Math.min(to, end), sight.scale).map(
       ({ at, label }) => html`<span key=${`s${label}`} class="second" style=${{ left: `${at * sight.scale}px` }}>${label}</span>`,
     )}
-    ${countTicks(from, Math.min(to, end), sight.scale, tempo).map(
+    ${countTicks(from, Math.min(to, end), sight.scale, meter).map(
       ({ at, label, strong }) => html`<span
         key=${`c${at}`}
         class=${strong ? "count strong" : "count"}

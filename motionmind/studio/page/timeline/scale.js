@@ -4,7 +4,7 @@ const [MIN_SCALE, MAX_SCALE] = [2, 1200]; // pixels a second
 const MIN_LABEL_DISTANCE_PX = 64;
 const STEPS_S = [0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1200, 3600];
 const DIGIT_PX = 8;
-const COUNTS = 8; // dancers count eights
+const COUNT_SLACK = 0.01; // of a count: the project keeps milliseconds
 const MAX_VISIBLE = 300; // stretches
 const MARGIN_PX = 40; // of a piece shown whole: a posture at its end extends beyond it
 
@@ -19,6 +19,29 @@ export function bounded(scale, seconds, width, stretches) {
   return Math.min(Math.max(scale, MIN_SCALE, Math.min(crowded, MAX_SCALE)), MAX_SCALE);
 }
 
+/** @typedef {{scale: number, left: number, width: number}} Sight pixels a second, pixels scrolled past, and width in pixels */
+
+/** Zoom by a factor: the time at `x` pixels from the left edge stays in place. @param {Sight} sight */
+export function zoomed({ scale, left, width }, { seconds, blocks }, factor, x) {
+  const next = bounded(scale * factor, seconds, width, blocks.length);
+  return { scale: next, left: Math.max(((left + x) / scale) * next - x, 0), fits: false };
+}
+
+/** A time if it is visible, or else the middle, in pixels from the left edge. @param {Sight} sight */
+export function middleOf({ scale, left, width }, time) {
+  const x = time * scale - left;
+  return x >= 0 && x <= width ? x : width / 2;
+}
+
+/** Scroll a stretch of time into view. @param {Sight} sight */
+export function revealing({ scale, left, width }, at, seconds) {
+  const [from, to] = [at * scale, (at + seconds) * scale];
+  const room = Math.min(48, width / 4);
+  if (from < left + room) return { left: Math.max(from - room, 0) };
+  if (to > left + width - room) return { left: Math.max(Math.min(to - width + room, from - room), 0) };
+  return {};
+}
+
 /** Ticks of seconds from `from` to `to`: [{at, label}], labels where there is room. */
 export function secondTicks(from, to, scale) {
   const step = STEPS_S.find((each) => each * scale >= MIN_LABEL_DISTANCE_PX) ?? 3600;
@@ -29,17 +52,26 @@ export function secondTicks(from, to, scale) {
   return ticks;
 }
 
-/** Ticks of counts at so many beats a minute: [{at, label, strong}]; each eight begins with a strong one. */
-export function countTicks(from, to, scale, tempo) {
+/**
+ * How the piece is counted.
+ * @typedef {{tempo: number, counts: number}} Meter counts a minute, and counts of a phrase
+ */
+
+/** Ticks of counts: [{at, label, strong}]; each phrase begins with a strong one. @param {Meter} meter */
+export function countTicks(from, to, scale, meter) {
+  const { tempo, counts } = meter;
   const beat = 60 / tempo;
-  const digits = String(Math.floor(to / beat / COUNTS) + 1).length; // of the last eight
-  const room = (each) => (each < COUNTS / 2 ? 26 : 40) + DIGIT_PX * (digits - 1);
-  const every = [1, 2, 4, 8, 16, 32, 64, 128].find((each) => each * beat * scale >= room(each)) ?? 256;
+  const digits = String(Math.floor(to / beat / counts) + 1).length; // of the last phrase
+  const room = (each) => (each < counts / 2 ? 26 : 40) + DIGIT_PX * (digits - 1);
+  // Parts of a phrase that divide it, then whole phrases: each of these has a strong tick.
+  const parts = [1, 2, 4].filter((each) => each < counts && counts % each === 0);
+  const steps = [...parts, ...[1, 2, 4, 8, 16, 32].map((each) => each * counts)];
+  const every = steps.find((each) => each * beat * scale >= room(each)) ?? 64 * counts;
   const ticks = [];
   for (let i = Math.max(Math.floor(from / (beat * every)), 0) * every; i * beat <= to; i += every) {
-    const eight = Math.floor(i / COUNTS) + 1;
-    const count = (i % COUNTS) + 1;
-    ticks.push({ at: i * beat, label: count === 1 ? `${eight}·1` : String(count), strong: count === 1 });
+    const phrase = Math.floor(i / counts) + 1;
+    const count = (i % counts) + 1;
+    ticks.push({ at: i * beat, label: count === 1 ? `${phrase}·1` : String(count), strong: count === 1 });
   }
   return ticks;
 }
@@ -52,8 +84,22 @@ export function clock(seconds, step = 0.01) {
   return minutes > 0 ? `${minutes}:${rest.padStart(digits ? digits + 3 : 2, "0")}` : `${rest}`;
 }
 
-/** The eight and the count at a time, in words. */
-export function countAt(seconds, tempo) {
+/** The phrase and the count at a time, in words. @param {Meter} meter */
+export function countAt(seconds, meter) {
+  const { tempo, counts } = meter;
   const count = Math.floor((seconds * tempo) / 60 + 1e-6);
-  return `eight ${Math.floor(count / COUNTS) + 1}, count ${(count % COUNTS) + 1}`;
+  return `${counts === 8 ? "eight" : "phrase"} ${Math.floor(count / counts) + 1}, count ${(count % counts) + 1}`;
+}
+
+/** The time of the count nearest to a time. @param {Meter} meter */
+export function nearestCount(seconds, meter) {
+  return (Math.max(Math.round((seconds * meter.tempo) / 60), 0) * 60) / meter.tempo;
+}
+
+/** The time `by` counts on from a time; between counts, from the one before or after. @param {Meter} meter */
+export function countFrom(seconds, by, meter) {
+  const { tempo } = meter;
+  const count = (seconds * tempo) / 60;
+  const whole = by > 0 ? Math.floor(count + COUNT_SLACK) : Math.ceil(count - COUNT_SLACK);
+  return (Math.max(whole + by, 0) * 60) / tempo;
 }

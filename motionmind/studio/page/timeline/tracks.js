@@ -4,14 +4,16 @@ import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/ht
 import { dropped, POSTURE_TYPE } from "../between/desk.js";
 import { Seams, Stretches, Wishes } from "./blocks.js";
 import { Drag } from "./gestures.js";
-import { placeAt, selected } from "./items.js";
+import { groupOf, reaching } from "./groups.js";
+import { nameOf, placeAt, selected } from "./items.js";
 import { act, KEYS } from "./keys.js";
+import { Notes } from "./notes.js";
 import { Playhead, Ruler } from "./ruler.js";
 
 const LEAD_PX = 16; // before the piece, as in timeline.css: a posture at its start extends to both sides of 0
 const END_PX = 160; // after the piece, to drop postures
 
-export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
+export function Tracks({ does, piece, sight, selection, meter, thumbnail }) {
   const scroller = useRef(null);
   const drag = useRef(null);
   const [draft, setDraft] = useState(null);
@@ -50,7 +52,7 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
   useLayoutEffect(() => {
     const { activeElement: at } = document;
     if (!does.focused || !(at === document.body || at?.closest("[role=option]"))) return;
-    const chosen = scroller.current.querySelector("[aria-selected=true]");
+    const chosen = scroller.current.querySelector("[aria-selected=true][tabindex='0']");
     if (chosen && chosen !== at) chosen.focus({ preventScroll: true });
   });
 
@@ -60,7 +62,14 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
     if (!held) return;
     does.focused = true;
     does.look();
-    does.select(held.block ? { block: held.block } : { seam: held.seam });
+    const group = groupOf(piece, selection);
+    const within = held.kind === "move" && group.includes(held.block);
+    if (event.shiftKey && held.block) {
+      does.studio.store.set({ selection: reaching(selection, held.block.id) });
+      return;
+    }
+    if (!within) does.select(held.block ? { block: held.block } : { seam: held.seam });
+    held.group = within ? group : [held.block];
     if (held.kind !== "select" && !(event.pointerType === "touch" && held.kind === "move" && !held.chosen)) {
       event.currentTarget.setPointerCapture(event.pointerId);
       drag.current = new Drag(does, held, event);
@@ -72,6 +81,7 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
   const up = async () => {
     const ending = drag.current;
     drag.current = null;
+    if (ending && !ending.moved && ending.held.block) does.select({ block: ending.held.block }); // alone
     await ending?.end();
     setDraft(null);
   };
@@ -114,7 +124,8 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
     onDrop=${drop}
   >
     <div class="inner" style=${{ width: `${Math.max(piece.seconds * sight.scale + END_PX, sight.width)}px` }}>
-      <${Ruler} does=${does} sight=${sight} seconds=${piece.seconds} tempo=${tempo} />
+      <${Ruler} does=${does} sight=${sight} seconds=${piece.seconds} meter=${meter} />
+      <${Notes} does=${does} notes=${piece.notes} sight=${sight} />
       <div
         onPointerDown=${down}
         onPointerMove=${moved}
@@ -168,7 +179,10 @@ function heldBy(event, piece) {
 function focusIn(event, does, piece) {
   does.focused = true;
   const held = heldBy(event, piece);
-  if (held && !held.chosen) does.select(held.block ? { block: held.block } : { seam: held.seam });
+  const { selection } = does.studio.store;
+  if (!held || groupOf(piece, selection).includes(held.block)) return;
+  if (nameOf(selection) !== nameOf(held.block ? { block: held.block.id } : { seam: [held.seam.left, held.seam.right] }))
+    does.select(held.block ? { block: held.block } : { seam: held.seam });
 }
 
 function openAt(event, does, piece) {

@@ -1,9 +1,10 @@
 /** Wishes for an insertion: its duration, postures to pass, hands and feet to hold. */
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { Reaches } from "../asks/reaches.js";
 import { NumberField } from "../shell/fields.js";
 import { limbName } from "./blocks.js";
-import { lasting, LONGEST, SHORTEST } from "./items.js";
+import { lasting, lengthOf, LONGEST, SHORTEST } from "./items.js";
 
 const HOLDS = {
   start: "keeps its start",
@@ -70,6 +71,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
         }}
       />
     </label>
+    <${Landing} does=${does} seam=${seam} locked=${locked} />
     <div class="stack">
       <h3>Postures to pass</h3>
       <${Wished}
@@ -136,7 +138,36 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
       </div>
       ${hold === "place" && html`<${Stay} seam=${seam} stay=${stay} locked=${locked} onStay=${setStay} />`}
     </div>
+    <div class="stack">
+      <h3>Places for hands and feet</h3>
+      <${Reaches} studio=${studio} reaches=${ask.reaches} seconds=${lengthOf(seam)} locked=${locked}
+        onChange=${(change) => does.wish(seam, ({ reaches }) => ({ reaches: change(reaches) }))} />
+    </div>
   </section>`;
+}
+
+/** The time and the count at which the insertion ends. */
+function Landing({ does, seam, locked }) {
+  const { meter } = does;
+  const end = seam.at + lengthOf(seam);
+  const field = (name, words, first, seconds) => html`<label class="hold row">
+    ${words}
+    <${NumberField}
+      min=${first}
+      step=${name === "time" ? 0.1 : 1}
+      aria-label=${`Lands at ${words}`}
+      data-testid=${`wish-${name}`}
+      disabled=${locked}
+      value=${Number((end / seconds + first).toFixed(2))}
+      use=${(given) => {
+        does.land(seam, (given - first) * seconds);
+        return given;
+      }}
+    />
+  </label>`;
+  return html`<div class="row" role="group" aria-label="Lands at" title="As long as nothing earlier changes">
+    <span class="grow">Lands at</span> ${field("time", "second", 0, 1)} ${field("count", "count", 1, 60 / meter.tempo)}
+  </div>`;
 }
 
 /** The times between which a hand or foot stays in place. */

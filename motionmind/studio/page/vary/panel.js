@@ -116,9 +116,9 @@ function Order({ studio, varying, shown, isPiece, view }) {
   const locked = proposal?.locked ?? [];
   return html`<div class="stack">
     <div class="row">
-      <h3 class="grow" aria-live="polite">${count} stretch${count === 1 ? "" : "es"}, ${shown.seconds.toFixed(0)} s${
+      <h3 class="grow" aria-live="polite" data-testid="length">${count} stretch${count === 1 ? "" : "es"}, ${lengthOf(shown, waiting ? proposal?.forecast : null, waiting)}${
         isPiece && waiting ? ` · ${waiting} seam${waiting > 1 ? "s" : ""} to smooth` : ""
-      }${isPiece && !waiting ? ` · ${Math.round(100 * insertedShare(shown))} % inserted` : ""}${isPiece ? " · this is the piece" : ""}</h3>
+      }${isPiece ? " · this is the piece" : ""}</h3>
       ${wish.kept.length + wish.stay.length > 0 &&
       html`<button class="button quiet" data-testid="let-go" onClick=${() => varying.letGo()}>Release all</button>`}
     </div>
@@ -129,6 +129,20 @@ function Order({ studio, varying, shown, isPiece, view }) {
       onKeep=${(/** @type {string} */ id) => varying.keep(id)} onPlay=${(/** @type {any} */ block) => view.look(block.at)} />
     <p class="hint">Keep what you like: it stays in place, and the rest varies.</p>
   </div>`;
+}
+
+/**
+ * How long a variation lasts, with all its insertions: the forecast until they are found.
+ * @param {any} piece @param {import("./varying.js").Forecast | null | undefined} forecast @param {number} waiting seams
+ */
+function lengthOf(piece, forecast, waiting) {
+  const percent = (/** @type {number} */ share) => `${Math.round(100 * share)} % inserted`;
+  if (forecast) {
+    const { seconds, least, most, inserted } = forecast;
+    const [from, to] = [Math.round(least), Math.round(most)];
+    return `about ${seconds.toFixed(0)} s${from < to ? ` (${from} to ${to})` : ""} · about ${percent(inserted)}`;
+  }
+  return waiting ? `${piece.seconds.toFixed(0)} s and insertions` : `${piece.seconds.toFixed(0)} s · ${percent(insertedShare(piece))}`;
 }
 
 /** @param {{varying: Varying}} props */

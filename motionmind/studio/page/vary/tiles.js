@@ -35,11 +35,12 @@ export function Tiles({ piece, kept, locked, onKeep, onPlay }) {
     ${blocks.slice(0, MAX_TILES).map((/** @type {any} */ block, /** @type {number} */ i) => {
       const keeps = kept.includes(block.id);
       const fixed = locked.includes(block.id);
-      const [sign, words] = i ? SEAMS[seams[i - 1].state] ?? ["…", ""] : ["", ""];
-      const inserted = i && seams[i - 1].state === "inserted" ? ` ${seams[i - 1].seconds.toFixed(1)} s` : "";
+      const before = seams.find(({ left, right }) => right === block.id && left !== right);
+      const [sign, words] = before ? SEAMS[before.state] ?? ["…", ""] : ["", ""];
+      const inserted = before?.state === "inserted" ? ` ${before.seconds.toFixed(1)} s` : "";
       const label = `${i + 1}: ${block.title}, ${block.seconds.toFixed(1)} seconds`;
       return html`<li key=${block.id} class=${keeps ? "kept" : ""} data-testid="tile-${i + 1}">
-        ${i > 0 && html`<span class="seam ${seams[i - 1].state.replace(" ", "-")}" title=${words}>${sign}${inserted}</span>`}
+        ${before && html`<span class="seam ${before.state.replace(" ", "-")}" title=${words}>${sign}${inserted}</span>`}
         <button class="picture" title="Play ${block.title}" aria-label="Play ${label}" onClick=${() => onPlay(block)}>
           <img loading="lazy" alt="" width="56" height="64" src=${picture(block)}
             onLoad=${(/** @type {any} */ event) => loaded.add(event.target.getAttribute("src"))} />

@@ -3,7 +3,9 @@
 import { points } from "./chart.js";
 
 /**
- * @typedef {{id: string, source: string, first: number, last: number, mirrored: boolean}} Block
+ * @typedef {{seconds: number, least: number, most: number, inserted: number}} Forecast with all insertions; nine of ten
+ *   last from `least` to `most`
+ * @typedef {{id: string, source: string, first: number, last: number, mirrored: boolean, hold: number, pace: number, repeats: number}} Block
  * @typedef {{block: Block, place: number}} Kept
  * @typedef {{flow: string, depart: number, nudge: number | null, start: [number, number, number] | null, stretch: number, inserted: number | null, kept: Kept[], stay: string[]}} Wish
  * @typedef {object} Proposal
@@ -21,6 +23,7 @@ import { points } from "./chart.js";
  * @property {number[]} jumps postures of the variation that do not follow
  * @property {object} about the edit's description of it
  * @property {string} basis hash of the piece that it varies
+ * @property {Forecast | null} forecast null if the corpus cannot tell how long insertions take
  * @property {string} unlimited why insertions could not be limited as wished; "" if they could
  */
 
@@ -137,8 +140,8 @@ export class Varying extends EventTarget {
 }
 
 /** @param {Block} block */
-function bare({ id, source, first, last, mirrored }) {
-  return { id, source, first, last, mirrored };
+function bare({ id, source, first, last, mirrored, hold, pace, repeats }) {
+  return { id, source, first, last, mirrored, hold, pace, repeats };
 }
 
 /** Whether two lists of blocks are equal. @param {Block[]} one @param {Block[]} other */
@@ -152,10 +155,9 @@ export function departure(share) {
   return `1 step in ${Math.max(Math.round(1 / share), 1)}`;
 }
 
-/** The share of its time that insertions take. @param {{seconds: number, seams: any[]}} piece */
-export function insertedShare({ seconds, seams }) {
-  const inserted = seams.filter(({ state }) => state === "inserted");
-  return inserted.reduce((sum, seam) => sum + seam.seconds, 0) / Math.max(seconds, 1e-9);
+/** The share of its time that insertions take. @param {{seconds: number, parts: any[]}} piece */
+export function insertedShare({ seconds, parts }) {
+  return parts.reduce((sum, part) => sum + (part.inserted ? part.seconds : 0), 0) / Math.max(seconds, 1e-9);
 }
 
 /** The place among all postures at a time, with its fraction. @param {Proposal} proposal @param {number} time */
