@@ -12,15 +12,18 @@ from collections.abc import Sequence
 import click
 
 from motionmind.cli.catalogue import postures
+from motionmind.cli.cleaning import clean
 from motionmind.cli.conversion import convert, posture
 from motionmind.cli.corpora import corpora
 from motionmind.cli.credits import credits as credit
 from motionmind.cli.exits import ExitCode
 from motionmind.cli.gaps import gaps
 from motionmind.cli.looks import explain, graph
+from motionmind.cli.loops import loop
 from motionmind.cli.measures import measure
 from motionmind.cli.options import group, show_help_without_command
 from motionmind.cli.pictures import render, sheet
+from motionmind.cli.plans import plan
 from motionmind.cli.printing import Notes, Warned
 from motionmind.cli.reviews import review
 from motionmind.cli.scores import compose, library
@@ -28,6 +31,7 @@ from motionmind.cli.serving import serve
 from motionmind.cli.shells import completion
 from motionmind.cli.streams import forgiving
 from motionmind.cli.studio import studio
+from motionmind.cli.transcriptions import transcribe
 from motionmind.cli.tweens import tween
 from motionmind.cli.variations import attractor, vary
 from motionmind.cli.warming import warm
@@ -50,8 +54,8 @@ def app(context: click.Context) -> None:
 
 
 for _command in (
-    *(tween, postures, posture, convert, corpora, explain, credit, graph, measure, sheet, render, compose, library),
-    *(vary, review, attractor, studio, serve, warm, completion),
+    *(tween, postures, posture, convert, clean, loop, corpora, explain, credit, graph, measure, sheet, render, plan),
+    *(compose, transcribe, library, vary, review, attractor, studio, serve, warm, completion),
 ):
     app.add_command(_command)
 corpora.add_command(gaps)
@@ -93,7 +97,8 @@ def _run(arguments: Sequence[str] | None, warned: Warned) -> int:
     except click.Abort:  # Ctrl-C
         return ExitCode.INTERRUPTED
     except click.UsageError as error:
-        message = error.format_message() + (f" ({error.ctx.command_path} --help shows how)" if error.ctx else "")
+        help_hint = f" ({error.ctx.command_path} --help shows how)" if error.ctx else ""
+        message = " ".join(error.format_message().split()) + help_hint
     except NoPathError as error:
         message, code = str(error), ExitCode.NO_PATH
     except MotionMindError as error:

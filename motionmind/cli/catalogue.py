@@ -1,8 +1,10 @@
-"""The postures command: list the named postures and the clips of a corpus."""
+"""The postures command: list the named postures and the clips of a corpus, a score or a file."""
 
 from __future__ import annotations
 
 import json
+import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,11 +14,14 @@ from motionmind.cli import completion
 from motionmind.cli.files import check_outputs
 from motionmind.cli.options import HOME, JSON, command, output
 from motionmind.cli.printing import count, print_written
+from motionmind.cli.sources import spelled
+from motionmind.clip_names import CLIP_SUFFIXES
 from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
-from motionmind.names.spelling import parse_source
+from motionmind.names.spelling import Source, parse_source
 
 if TYPE_CHECKING:
+    from motionmind.body.motion import Motion, Posture
     from motionmind.names.finding import Collection
 
 _MAX_CHARS = 300  # a sentence rather than a name
@@ -28,29 +33,37 @@ _MAX_CHARS = 300  # a sentence rather than a name
 @JSON
 @HOME
 def postures(source: str, output: Path | None, as_json: bool, home: Path | None) -> None:
-    """List the postures and clips of a corpus or a score, by the names that other commands take.
+    """List the postures and clips of a corpus, a score or a file, by the names that other commands take.
 
-    SOURCE is a corpus, by name or folder, or a score. Clips are listed with their number of postures; ballet/adagio@23
-    is posture 23 of a clip.
+    SOURCE is a corpus, by name or folder, a score, or a file that may hold several clips: glTF, BVH or .npy. Clips are
+    listed with their number of postures; ballet/adagio@23 is posture 23 of a clip, 'hero.glb#Dance@23' of a clip of a
+    file, and 'duo.bvh#Hips@23' of a body in BVH.
     """
     from motionmind.names.finding import check_exists, open_collection
 
     named = parse_source(source, home)
     check_exists(named, home)
-    if named.kind == "file":
-        raise MotionMindError(f"{source}: not a corpus or a score; `motionmind sheet` draws the frames of a file")
+    is_file = named.kind == "file"
+    if is_file and Path(named.place).suffix.lower() not in CLIP_SUFFIXES:
+        raise MotionMindError(
+            f"{source}: not a corpus or a score, nor glTF, BVH or .npy; `motionmind sheet` draws the frames of a file"
+        )
     if named.name:
         raise MotionMindError(f"{source}: give {named.place} alone; `motionmind sheet` draws the postures of a clip")
     if output:
         check_outputs([(output, (".png",))], named.paths)
-    found = open_collection(named, home)
+    if is_file:
+        word, captions, drawn, listed = named.place, *_list_file(named)
+    else:
+        found = open_collection(named, home)
+        word, captions, listed = found.word, list(found.postures), _list(found)
+        drawn = [found.posture(name) for name in captions] if output else []
     if output:
-        _draw(found, output)
-    listed = _list(found)
+        _draw(word, captions, drawn, output)
     if as_json:
         click.echo(json.dumps(listed))
         return
-    _print(displayed_path(found.word), **listed)
+    _print(displayed_path(word), **listed)
     if output:
         print_written([output])
 
@@ -61,14 +74,35 @@ def _list(found: Collection) -> dict[str, list[Any]]:
     return {
         "postures": [f"{found.word}/{name}" for name in found.postures],
         "clips": [
-            {
-                "name": f"{found.word}/{name}",
-                "postures": len(motion),
-                "seconds": float(motion.times[-1] - motion.times[0]),
-                "about": about,
-            }
+            _row(f"{found.word}/{name}", motion, about)
             for (name, about), motion in zip(found.clips.items(), motions, strict=True)
         ],
+    }
+
+
+def _list_file(source: Source) -> tuple[list[str], list[Posture], dict[str, list[Any]]]:
+    """List the clips of a file as `_list` does; return the names of its poses and these, too."""
+    from motionmind.formats import read_clips
+    from motionmind.retarget.retarget import own_skeleton
+
+    motions = [own_skeleton(motion) for motion in read_clips(source.place)]
+    poses = [motion for motion in motions if len(motion) == 1]
+    return (
+        [motion.name.partition("#")[2] or motion.name for motion in poses],
+        [motion.posture(0) for motion in poses],
+        {
+            "postures": [spelled(source, motion) for motion in poses],
+            "clips": [_row(spelled(source, motion), motion, "") for motion in motions if len(motion) > 1],
+        },
+    )
+
+
+def _row(name: str, motion: Motion, about: str) -> dict[str, Any]:
+    return {
+        "name": name,
+        "postures": len(motion),
+        "seconds": float(motion.times[-1] - motion.times[0]),
+        "about": about,
     }
 
 
@@ -78,7 +112,7 @@ def _print(word: str, postures: list[str], clips: list[dict[str, Any]]) -> None:
     for name in postures:
         click.echo(f"  {_display_name(name)}")
     if clips:
-        last = f"{_display_name(clips[0]['name'])}@{clips[0]['postures'] - 1}"
+        last = _display_name(f"{clips[0]['name']}@{clips[0]['postures'] - 1}")
         click.echo(f"clips (postures count from 0, so the first clip ends with {last})")
     width = max((len(_display_name(clip["name"])) for clip in clips), default=0)
     for clip in clips:
@@ -89,25 +123,28 @@ def _print(word: str, postures: list[str], clips: list[dict[str, Any]]) -> None:
 
 
 def _display_name(name: str) -> str:
-    return displayed(name, _MAX_CHARS)
+    """Return a name to display; with #, in the quotes that some shells need."""
+    shown = displayed(name, _MAX_CHARS)
+    return shlex.quote(shown) if "#" in shown else shown
 
 
-def _draw(found: Collection, output: Path) -> None:
-    """Draw the named postures of a collection."""
+def _draw(word: str, names: Sequence[str], drawn: Sequence[Posture], output: Path) -> None:
+    """Draw the named postures of a source."""
     import numpy as np
 
     from motionmind.body.motion import Motion
     from motionmind.files import write_atomically
     from motionmind.render.sheet import draw_sheet, png
 
-    if not found.postures:
-        raise MotionMindError(f"{found.word}: has no named postures; `motionmind sheet` draws its clips")
-    drawn = [found.posture(name) for name in found.postures]
+    if not names:
+        raise MotionMindError(f"{word}: has no named postures; `motionmind sheet` draws its clips")
+    if any(posture.skeleton.difference(drawn[0].skeleton) is not None for posture in drawn):
+        raise MotionMindError(f"{word}: its postures are of different bodies; `motionmind sheet` draws each")
     motion = Motion(
         drawn[0].skeleton,
         np.stack([posture.rotations for posture in drawn]),
         np.stack([posture.root for posture in drawn]),
         np.arange(float(len(drawn))),
-        found.word,
+        word,
     )
-    write_atomically(output, png(draw_sheet(motion, captions=found.postures)))
+    write_atomically(output, png(draw_sheet(motion, captions=names)))

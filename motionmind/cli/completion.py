@@ -1,4 +1,4 @@
-"""Values that shells complete: corpora, postures, clips, joints and flows.
+"""Values that shells complete: corpora, postures, clips of corpora and glTF files, joints and flows.
 
 A shell starts the program for each tab, so nothing here imports numpy or parses a score: names come from manifests and
 from lines of scores that define them. Unreadable files complete to nothing.
@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import click
 from click.shell_completion import CompletionItem
 
+from motionmind.clip_names import read_names, split_clip
 from motionmind.errors import MotionMindError
 
 FLOWS = ("chua", "duffing", "halvorsen", "lorenz", "rossler", "thomas")  # as `motionmind.chaos.flows.FLOWS`
@@ -57,12 +58,12 @@ def published(context: click.Context, _: click.Parameter, incomplete: str) -> li
 
 
 def postures(context: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Complete a posture of a corpus, or a file; a clip completes to its first posture."""
+    """Complete a posture of a corpus, a clip of a glTF file, or a file; a clip completes to its first posture."""
     return _complete_named(context, incomplete, "@0")
 
 
 def movement(context: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Complete a clip or a posture of a corpus, or a file."""
+    """Complete a clip or a posture of a corpus, a clip of a glTF file, or a file."""
     return _complete_named(context, incomplete, "")
 
 
@@ -85,7 +86,11 @@ def flows(_: click.Context, __: click.Parameter, incomplete: str) -> list[Comple
 
 
 def _complete_named(context: click.Context, incomplete: str, suffix: str) -> list[CompletionItem]:
-    """Complete names in corpora, and files; append `suffix` to the name of a clip."""
+    """Complete names in corpora and glTF files, and files; append `suffix` to the name of a clip."""
+    file, clip = split_clip(incomplete)
+    if clip is not None:
+        clips = read_names(file)
+        return [CompletionItem(f"{file}#{name}{suffix}") for name in clips if name.startswith(clip)]
     word, slash, _ = incomplete.partition("/")
     known = [name for name in _folders(context) if (name == word if slash else name.startswith(word))]
     found = [f"{name}/" for name in known]

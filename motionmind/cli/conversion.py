@@ -8,27 +8,44 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli import completion
-from motionmind.cli.delivery import Delivery, check_delivery, for_program, on_rig
+from motionmind.cli.delivery import Delivery, check_delivery, for_program, on_rig, rig_files
+from motionmind.cli.ensembles import (
+    describe_ensemble,
+    is_ensemble,
+    keep_ensemble,
+    open_ensemble,
+    write_ensemble,
+    write_steps,
+)
 from motionmind.cli.files import (
     MOTION_SUFFIXES,
     check_outputs,
     note_licences,
     note_lossy_fields,
+    numbered,
     question_recording,
     read_mapping,
     write_all,
 )
+from motionmind.cli.loops import find_loop, print_loop
 from motionmind.cli.options import HOME, OUTPUT_KINDS, Section, command, option, outputs, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_movement, read_part
-from motionmind.cli.types import FILE, FRAME, RATE
+from motionmind.cli.stages import move_onto_stage
+from motionmind.cli.types import FILE, FRAME, RATE, Area, Number
+from motionmind.cli.warming import preparing
 from motionmind.display import displayed, displayed_path
+from motionmind.ensemble import KEEP_RANGE_M
 from motionmind.errors import MotionMindError
+from motionmind.files import all_or_none
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
+    from motionmind.ensemble.dancers import Ensemble
     from motionmind.formats.papers import Form
+
+ENSEMBLES = (".glb", ".bvh", ".toml")  # what an ensemble becomes
 
 
 @command("motionmind posture ballet/adagio --frame 23 -o A.json")
@@ -39,7 +56,7 @@ if TYPE_CHECKING:
     "name",
     section=Section.PART,
     metavar="NAME",
-    help="Clip of a score or a corpus  [default: its only one]",
+    help="Clip of a score, a corpus or a glTF file  [default: the only one; of glTF the first]",
 )
 @option(
     "--frame",
@@ -55,7 +72,8 @@ def posture(
 ) -> None:
     """Extract one posture from a clip.
 
-    SOURCE is a motion file, a score, a corpus, CORPUS/CLIP, or a posture such as ballet/arabesque or clip.bvh@240.
+    SOURCE is a motion file, a score, a corpus, CORPUS/CLIP, a clip of a glTF file such as 'hero.glb#Dance', or a
+    posture such as ballet/arabesque or clip.bvh@240.
 
     The posture is on human23 if the clip's joints map to it, by known names or by --joints; otherwise on the clip's own
     skeleton, such as human44.
@@ -93,8 +111,36 @@ def posture(
     metavar="UNIT",
     help="Unit of length of a .bvh OUT, as in --unit  [default: cm]",
 )
+@option(
+    "--loop",
+    "is_loop",
+    section=Section.MOTION,
+    is_flag=True,
+    help="Write only the stretch that repeats best, closed as by the loop command.",
+)
+@option(
+    "--stage",
+    section=Section.MOTION,
+    type=Area(),
+    metavar="WIDTHxDEPTH",
+    help="Stage to stay on, metres, around the origin: turns and moves the movement as a whole.",
+)
 @for_program("Program to open OUT in: OUT gets the unit, frames per second and root that it expects.")
 @on_rig("File with the rig for OUT: the skeleton of a .bvh OUT, or the character of a .glb OUT.")
+@option(
+    "--keep",
+    section=Section.MOTION,
+    type=Number(*KEEP_RANGE_M),
+    metavar="METRES",
+    help="Shift entries and places of an ensemble by the least that keeps all dancers so far apart; OUT is a .toml.",
+)
+@option(
+    "--steps",
+    section=Section.MOTION,
+    shell_complete=completion.corpora,
+    metavar="CORPUS",
+    help="Corpus whose steps take the dancers of an ensemble between formations; OUT is a .toml, with numbered .json.",
+)
 @option(
     "--form",
     section=Section.OUTPUT,
@@ -113,6 +159,10 @@ def convert(
     program: str | None,
     rig: Path | None,
     form: Form,
+    is_loop: bool,
+    keep: float | None,
+    steps: str | None,
+    stage: tuple[float, float] | None,
     joints: Path | None,
     home: Path | None,
     **options: Any,
@@ -120,7 +170,10 @@ def convert(
     """Convert movement from one format to another.
 
     IN is a clip or posture of a score or a corpus, such as ballet/adagio, or a file: .bvh, .amc with its .asf, .glb,
-    .gltf, .vrm, .vrma, .json, .npz (AMASS), .pkl (AIST++), .npy (FineDance) or .txt (the papers' notation).
+    .gltf, .vrm, .vrma, .json or .txt (the papers' notation). On SMPL's joints it is .npz (AMASS; also Kimodo), .pkl
+    (AIST++), .npy (FineDance, HumanML3D, MDM) or .pt (GVHMR).
+    'hero.glb#Dance' names one clip of several in glTF. An ensemble (.toml, or a BVH file of several bodies)
+    becomes one .glb, a .bvh for each dancer, or a .toml.
 
     OUT is .bvh, .json, .glb (a skinned body, for Blender and others), .vrma (a VRM animation), .npz (SMPL's joints) or
     .txt, which holds orientations only, on human23 (human44 if IN is). A note lists the data that OUT cannot hold.
@@ -131,26 +184,36 @@ def convert(
     from motionmind.retarget.joint_mapping import is_human44
     from motionmind.retarget.retarget import own_skeleton, to_human23
 
+    if is_ensemble(source, [output], ENSEMBLES):
+        _convert_ensemble(source, output, home, fps, keep, steps, options | {"joints": joints})
+        return
+    if keep is not None or steps is not None:
+        flag = "--steps" if keep is None else "--keep"
+        raise MotionMindError(f"{flag} is for an ensemble (.toml), and {displayed(source)} is not one")
     named = parse_movement(source, home)
-    read_from = [*named.source.paths, *([rig] if rig else [])]
+    read_from = [*named.source.paths, *rig_files(rig)]
     check_outputs([(output, (".bvh", ".json", ".txt", ".glb", ".npz", ".vrma"))], read_from)
     suffix = output.suffix.lower()
     if out_unit and suffix != ".bvh":
         raise MotionMindError(f"--out-unit {out_unit}: only BVH needs a unit, and {output} is not BVH")
-    if out_unit and rig and rig.suffix.lower() == suffix:
+    if out_unit and suffix in {file.suffix.lower() for file in rig_files(rig)}:
         raise MotionMindError(f"--out-unit {out_unit}: {output} gets the unit of {rig}")
     taker = check_delivery([output], program, rig)
     on = read_rig(rig) if rig else None
-    motion = read_part(named, None, home, raw=True, **options)
+    motion = read_part(named, home, raw=True, **options)
     upright = "y" if options["up"] else None  # the reader has turned it
     if named.source.kind == "file":
-        question_recording(named.source.paths[0], motion, upright)
+        question_recording(named.source.file, motion, upright)
+    if is_loop:
+        cycle = find_loop(source, motion, up=upright)
+        motion = cycle.motion
     if skeleton == "human23" or joints or (suffix == ".txt" and not is_human44(motion.skeleton)):
         motion = to_human23(motion, read_mapping(joints), up=upright)
     if on and motion.skeleton.difference(on.armature.motion.skeleton) is not None:
         motion = own_skeleton(motion, up=upright)
     if fps is not None:
         motion = motion.resample(fps)
+    motion = move_onto_stage(source, motion, stage)
     source_file = next(iter(named.source.paths), None)
     delivery = Delivery(taker, on, taker.fps if taker and fps is None else None, out_unit)
     if suffix == ".txt":
@@ -162,6 +225,76 @@ def convert(
     size, body = _written_body(suffix, motion)
     click.echo(f"{displayed_path(output)}: {count(len(motion), 'frame')}, {count(size, 'joint')} ({displayed(body)})")
     delivery.print([output])
+    if is_loop:
+        print_loop(cycle)
+
+
+def _convert_ensemble(
+    source: str,
+    output: Path,
+    home: Path | None,
+    fps: float | None,
+    keep: float | None,
+    steps: str | None,
+    options: dict[str, Any],
+) -> None:
+    """Write an ensemble as one .glb with a body for each dancer, as numbered .bvh files, or as .toml."""
+    from motionmind.formats.bvh import write_bvh
+    from motionmind.formats.glb import write_group_glb
+
+    without = ["skeleton", "out_unit", "program", "rig", "form", "is_loop", "stage"]
+    is_file = output.suffix.lower() == ".toml" or keep is not None or steps is not None
+    suffixes = ENSEMBLES if keep is None and steps is None else (".toml",)
+    without += ["fps"] if is_file else []
+    own = ".json" if steps is not None else output.suffix if output.suffix.lower() == ".bvh" else ""  # of each dancer
+
+    def written(dancers: int) -> list[Path]:
+        return ([] if own == output.suffix else [output]) + (_own_files(output, own, dancers) if own else [])
+
+    ensemble = open_ensemble(source, [output], suffixes, home, without, written, **options)
+    if is_file:
+        _write_changed(source, output, ensemble, home, keep, steps)
+        return
+    motions = ensemble.motions(ensemble.times(fps))
+    files = [output]
+    with all_or_none():
+        if output.suffix.lower() == ".glb":
+            write_group_glb(output, motions)
+        else:
+            files = _own_files(output, output.suffix, len(motions))
+            for file, motion in zip(files, motions, strict=True):
+                write_bvh(file, motion)
+    names = ", ".join(map(displayed_path, files))
+    click.echo(f"{names}: " + "\n".join(describe_ensemble(ensemble)))
+
+
+def _own_files(output: Path, suffix: str, dancers: int) -> list[Path]:
+    """Return the file of each dancer, as "duo-1.bvh" of "duo.bvh"."""
+    return [numbered(output.with_suffix(suffix), number, dancers) for number in range(1, dancers + 1)]
+
+
+def _write_changed(
+    source: str, output: Path, ensemble: Ensemble, home: Path | None, keep: float | None, steps: str | None
+) -> None:
+    """Write an ensemble as .toml, kept apart and with steps on its ways if asked for."""
+    lines = list[str]()
+    if keep is not None:
+        ensemble, lines = keep_ensemble(ensemble, keep)
+    with all_or_none():
+        if steps is not None:
+            from motionmind.corpus.store import locate
+            from motionmind.ensemble.stepping import dance_ways
+            from motionmind.tween.engine import Engine
+
+            if not any(dancer.ways for dancer in ensemble.dancers):
+                raise MotionMindError(f"--steps {steps}: {displayed(source)} changes no formation")
+            locate(steps, home)
+            files = _own_files(output, ".json", len(ensemble.dancers))
+            with preparing():
+                ensemble = write_steps(output, files, dance_ways(ensemble, Engine.load(steps, home)))
+        write_ensemble(source if steps is None else str(output), output, ensemble)
+    lines += describe_ensemble(ensemble) if keep is None or steps else []
+    click.echo(f"{displayed_path(output)}: " + "\n".join(lines))
 
 
 def _written_body(suffix: str, motion: Motion) -> tuple[int, str]:

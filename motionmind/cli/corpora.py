@@ -161,8 +161,9 @@ def build(
 ) -> None:
     """Learn a corpus from movement.
 
-    Learn it from files, from other corpora (--mix), or from both. The files may have any formats, scores included.
-    The build leaves out unreadable files, and files whose joints differ from those of most.
+    Learn it from files, from other corpora (--mix), or from both. The files may have any formats, scores included; a
+    glTF file gives all its clips, or one as 'hero.glb#Dance'. The build leaves out unreadable files, and files whose
+    joints differ from those of most.
     """
     if not (files or mix):
         raise click.UsageError("Missing argument 'FILES...', or --mix.", click.get_current_context())

@@ -13,7 +13,8 @@ import click
 from motionmind.cli.files import evened, note_licences, note_lossy_fields, read, read_mapping, write
 from motionmind.cli.options import Section, option
 from motionmind.cli.printing import count
-from motionmind.cli.types import EXISTING_FILE
+from motionmind.cli.types import EXISTING_CLIP
+from motionmind.clip_names import split_clip
 from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from motionmind.body.motion import Motion, Posture
     from motionmind.formats._rig_file import RigFile
     from motionmind.formats.programs import Program
+    from motionmind.music import Sound
     from motionmind.names.spelling import PostureName
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -35,8 +37,13 @@ def for_program(text: str) -> Callable[[_Function], _Function]:
 
 
 def on_rig(text: str) -> Callable[[_Function], _Function]:
-    """Add --rig, also called --into, as `rig`: an existing file, or None; `text` is its help."""
-    return option("--rig", "--into", "rig", section=Section.OUTPUT, type=EXISTING_FILE, help=text)
+    """Add --rig, also called --into, as `rig`: an existing file or a clip of one, or None; `text` is its help."""
+    return option("--rig", "--into", "rig", section=Section.OUTPUT, type=EXISTING_CLIP, help=text)
+
+
+def rig_files(rig: Path | None) -> list[Path]:
+    """Return the file of --rig, without the name of a clip; none without it."""
+    return [Path(split_clip(rig)[0])] if rig else []
 
 
 @dataclass(frozen=True)
@@ -48,12 +55,14 @@ class Delivery:
         rig: the rig to write them on; None for the movement's own skeleton.
         fps: frames a second to stretch the movement to; None for its own.
         unit: the unit of BVH's lengths; None for that of the rig or the program, or else centimetres.
+        sound: the sound of films and pages beside them; None for none.
     """
 
     program: Program | None = None
     rig: RigFile | None = None
     fps: float | None = None
     unit: str | None = None
+    sound: Sound | None = None
 
     def write(self, path: Path, motion: Motion, source: Path | None = None) -> Motion:
         """Write a motion, note what the file cannot hold of it and of `source`, and return the motion as written."""
@@ -62,7 +71,7 @@ class Delivery:
         from motionmind.formats.rig_files import retarget_to_rig, write_on_rig
 
         if not takes_delivery(path):
-            write(path, motion, source)
+            write(path, motion, source, self.sound)
             return motion
         motion = evened(path, motion.stretch_to(self.fps) if self.fps else motion)
         note_licences(path, motion)
@@ -123,7 +132,7 @@ def find_rig(
     """Return the rig of --rig, or else the rig that the files of both ends share; None if there is neither.
 
     Args:
-        rig: the file of --rig; None without it.
+        rig: the value of --rig; None without it.
         ends: the names of A and B.
         a: the posture A.
         joints: the value of --joints.
@@ -140,16 +149,16 @@ def find_rig(
     mapping = read_mapping(joints)
 
     @cache
-    def read_once(path: Path) -> Motion:
+    def read_once(path: Path | str) -> Motion:
         return read(path, unit, None, source_fps, None)
 
     def find_end(end: PostureName) -> RigFile | None:
         path = next(iter(end.source.paths), None)
         if end.source.kind != "file" or path is None or path.suffix.lower() not in RIG_SUFFIXES:
             return None
-        motion = read_once(path)
+        motion = read_once(end.source.file)
         frame = frame_of(end, motion)
-        return read_rig(path, (frame, frame), motion=motion, unit=unit, joints=mapping, up=up)
+        return read_rig(end.source.file, (frame, frame), motion=motion, unit=unit, joints=mapping, up=up)
 
     first, last = map(find_end, ends)
     if rig is not None:

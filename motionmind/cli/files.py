@@ -10,30 +10,33 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionmind.cli.printing import note
+from motionmind.clip_names import split_clip
 from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError
-from motionmind.files import all_or_none, as_text
-from motionmind.render import PICTURES
+from motionmind.files import FilePath, all_or_none, as_text
+from motionmind.render import PICTURES, SOUNDING
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion, Posture
+    from motionmind.music import Sound
 
 MOTION_SUFFIXES = (".json", ".bvh", ".glb", ".npz", ".vrma")
 EVEN_SUFFIXES = (".bvh", ".npz")  # formats with evenly spaced frames
 _DEFAULT_FPS = 30.0  # rate of motions resampled for these formats
+_SPARSE_FPS = 5.0  # the rate of a corpus's postures; slower frames are keys
 
 
-def read(path: Path, unit: str | None, asf: Path | None, source_fps: float | None, up: str | None) -> Motion:
+def read(path: FilePath, unit: str | None, asf: Path | None, source_fps: float | None, up: str | None) -> Motion:
     """Read a motion file, given the values of the options that `options.reading` adds."""
     from motionmind.formats import read_motion
 
     return read_motion(path, unit=unit, asf=asf, fps=source_fps, up=up)
 
 
-def question_recording(path: Path, motion: Motion, up: str | None = None) -> None:
+def question_recording(path: FilePath, motion: Motion, up: str | None = None) -> None:
     """Warn if the movement in a file contradicts its frame rate, drops frames, or stands off the floor, y = 0.
 
     Args:
-        path: the file.
+        path: the file, with its clip if it has several.
         motion: its movement; joints that do not map to human23 are not checked.
         up: the axis that is up in the movement; None finds it.
     """
@@ -67,13 +70,14 @@ def question_recording(path: Path, motion: Motion, up: str | None = None) -> Non
         warnings.warn(f"{path}: {doubt}", MotionMindWarning, stacklevel=2)
 
 
-def write(path: Path, movement: Motion | Posture, source: Path | None = None) -> None:
+def write(path: Path, movement: Motion | Posture, source: Path | None = None, sound: Sound | None = None) -> None:
     """Write a motion or a posture as movement or as a picture, by the suffix of `path`; note the data left out.
 
     Args:
         path: the file.
         movement: the motion or the posture.
         source: the file that the movement comes from, whose other data may be left out, too; None for none.
+        sound: the sound of a film or a page; None for none.
     """
     from motionmind.body.motion import Posture
     from motionmind.formats import lossy_fields, write_motion, write_posture
@@ -82,7 +86,7 @@ def write(path: Path, movement: Motion | Posture, source: Path | None = None) ->
     motion = movement.as_motion() if isinstance(movement, Posture) else evened(path, movement)
     note_licences(path, motion)
     if path.suffix.lower() in PICTURES:
-        draw_picture(path, motion)
+        draw_picture(path, motion, sound=sound if path.suffix.lower() in SOUNDING else None)
         return
     if isinstance(movement, Posture):
         write_posture(path, movement)
@@ -100,13 +104,18 @@ def note_licences(path: Path, motion: Motion) -> None:
 
 
 def evened(path: Path, motion: Motion) -> Motion:
-    """Return a motion as its file can hold it: resampled, with a note, if the format needs evenly spaced frames."""
-    if path.suffix.lower() not in EVEN_SUFFIXES or motion.is_even:
+    """Return a motion as its file can hold it: resampled, with a note, if the format needs evenly spaced frames.
+
+    Evenly spaced keys are resampled, too, unless their rate is stated or chosen: programs play frames, and show no
+    movement between frames that are seconds apart.
+    """
+    is_sparse = len(motion) > 1 and motion.fps < _SPARSE_FPS - 1e-6 and not motion.rate
+    if path.suffix.lower() not in EVEN_SUFFIXES or (motion.is_even and not is_sparse):
         return motion
     even = motion.stretch_to(_DEFAULT_FPS)
     note(
-        f"{path}: this format needs evenly spaced frames: resampled {len(motion)} frames to {len(even)}, "
-        f"{_DEFAULT_FPS:g} per second (--fps sets another rate)"
+        f"{path}: this format needs {'frames, not keys' if motion.is_even else 'evenly spaced frames'}: resampled "
+        f"{len(motion)} frames to {len(even)}, {_DEFAULT_FPS:g} per second (--fps sets another rate)"
     )
     return even
 
@@ -134,13 +143,22 @@ def read_mapping(path: Path | None) -> dict[str, str] | None:
 def clip_names(files: Sequence[Path]) -> dict[Path, str]:
     """Name each file's clip: by its stem, or by as much more of its path as tells it from the others.
 
+    The name of a clip in a glTF file follows, as in "hero#Dance".
+
     Raises:
         MotionMindError: a file is given twice.
     """
     if len(set(files)) < len(files):
         repeated = next(file for file, number in Counter(files).items() if number > 1)
         raise MotionMindError(f"{repeated}: given twice")
-    schemes = [{f: f.stem for f in files}, {f: f.name for f in files}, {f: f.with_suffix("").as_posix() for f in files}]
+    parts = {file: split_clip(file) for file in files}
+    places = {file: Path(place) for file, (place, _) in parts.items()}
+    ends = {file: "" if clip is None else f"#{clip}" for file, (_, clip) in parts.items()}
+    schemes = [
+        {file: f"{place.stem}{ends[file]}" for file, place in places.items()},
+        {file: f"{place.name}{ends[file]}" for file, place in places.items()},
+        {file: f"{place.with_suffix('').as_posix()}{ends[file]}" for file, place in places.items()},
+    ]
     uses = [Counter(names.values()) for names in schemes]
     unique = ([names[f] for names, used in zip(schemes, uses, strict=True) if used[names[f]] == 1] for f in files)
     return {file: as_text(next(iter(names), file.as_posix())) for file, names in zip(files, unique, strict=True)}

@@ -57,7 +57,7 @@ def measure(
     from motionmind.tween.engine import Engine
     from motionmind.tween.report import read_report
 
-    motion = read_part(parse_movement(source, home), None, home, **options)
+    motion = read_part(parse_movement(source, home), home, **options)
     engine = Engine.load(corpus, home)
     path = None
     if report is not None:

@@ -257,8 +257,8 @@ def reading(function: _Function) -> _Function:
             section=Section.INPUT,
             advanced=True,
             type=RATE,
-            help="Frames per second of a BVH, .amc, .npz, .pkl, .npy or .txt file  "
-            "[default: the file's own; .amc 120, .pkl 60, .npy 30, .txt 1]",
+            help="Frames per second of a BVH, .amc, .npz, .pkl, .npy, .pt or .txt file  "
+            "[default: the file's own; .amc 120, .pkl 60, .npy 30 or 20, .pt 30, .txt 1]",
         ),
         option(
             "--asf",

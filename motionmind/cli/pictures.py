@@ -12,20 +12,32 @@ import click
 
 from motionmind.cli import completion
 from motionmind.cli.delivery import for_program
+from motionmind.cli.ensembles import describe_ensemble, is_ensemble, open_ensemble
 from motionmind.cli.files import check_outputs, note_licences
+from motionmind.cli.music import check_sounding, may_sound, read_part_of_sound, track_beside, with_music
 from motionmind.cli.options import HOME, Section, command, option, output, outputs, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_movement, read_movements, select_part
 from motionmind.cli.types import COUNT, FILE_OR_FOLDER, FRAME, RATE, Whole
+from motionmind.clip_names import GLTF_SUFFIXES, distinct_names
 from motionmind.display import displayed_path
-from motionmind.errors import MotionMindError
+from motionmind.errors import MotionMindError, enumerated
 from motionmind.files import all_or_none
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
+    from motionmind.music.sound import Sound
 
+PRINTS, FILMS = (".png", ".pdf"), (".gif", ".mp4", ".html")  # of ensembles
 
+CLIP = option(
+    "--clip",
+    "name",
+    section=Section.PART,
+    metavar="NAME",
+    help="Clip of a score, a corpus or a glTF file  [default: the only one; of glTF the first]",
+)
 FIRST = option(
     "--from",
     "start",
@@ -48,14 +60,14 @@ LAST = option(
 
 @command("motionmind sheet ballet/adagio -o adagio.png")
 @click.argument("source", shell_complete=completion.movement)
-@output("Picture (.png), or a folder for a picture of each clip.", type=FILE_OR_FOLDER)
+@output("Picture (.png; of an ensemble also .pdf), or a folder for a picture of each clip.", type=FILE_OR_FOLDER)
 @option(
     "--clip",
     "names",
     section=Section.PART,
     multiple=True,
     metavar="NAME",
-    help="Clip of a score or a corpus  [default: all]. Repeatable.",
+    help="Clip of a score, a corpus or a glTF file  [default: all]. Repeatable.",
 )
 @FIRST
 @LAST
@@ -99,21 +111,28 @@ def sheet(
     """Draw the postures of clips side by side.
 
     SOURCE is a motion file, a score, a corpus by name or folder, CORPUS/CLIP, or a posture such as ballet/arabesque.
-    --clip selects clips of a score or a corpus.
+    A clip of a glTF file is 'hero.glb#Dance'. --clip selects clips of a score, a corpus or a glTF file.
 
     The sheet draws each posture from the front and from the side, and its feet from above, with its time and frame
-    number: frame 23 is the posture SOURCE@23.
+    number: frame 23 is the posture SOURCE@23. Of an ensemble (.toml) it draws all dancers before one camera, at counts,
+    --every so many (seconds without a tempo), by default at most 24 times.
     """
     from motionmind.files import write_atomically
     from motionmind.render.sheet import check_frames, draw_sheet, png
 
+    if is_ensemble(source, [output], PRINTS):
+        _print_ensemble(source, output, home, every, postures, reading_options)
+        return
     named = parse_movement(source, home)
-    folder = output if named.source.kind != "file" and (output.is_dir() or not output.suffix) else None
+    is_gltf = Path(named.source.place).suffix.lower() in GLTF_SUFFIXES
+    has_clips = named.source.kind != "file" or (is_gltf and not named.source.name)
+    folder = output if has_clips and (output.is_dir() or not output.suffix) else None
     if not folder:
         check_outputs([(output, (".png",))], named.source.paths)
-    motions = read_movements(named.source, names, home, **reading_options)
+    motions = read_movements(named.source, names, home, whole=named.moment is None, **reading_options)
     if not folder and len(motions) != 1:
-        raise MotionMindError(f"{output}: {source} holds {len(motions)} clips; choose one by --clip, or give a folder")
+        clips = f"{source} holds {len(motions)} clips, {enumerated(one.name for one in motions)}"
+        raise MotionMindError(f"{output}: {clips}; choose one by --clip, or give a folder")
     frames = [_select_drawn(select_part(named, motion, start, end), every, postures) for motion in motions]
     for motion, drawn in zip(motions, frames, strict=True):
         check_frames(motion, drawn)
@@ -129,13 +148,7 @@ def sheet(
 @command("motionmind render clip.bvh -o clip.html")
 @click.argument("source", shell_complete=completion.movement)
 @outputs("Picture (.png), film (.gif, .mp4, .svg) or page (.html).")
-@option(
-    "--clip",
-    "name",
-    section=Section.PART,
-    metavar="NAME",
-    help="Clip of a score or a corpus  [default: its only one]",
-)
+@CLIP
 @FIRST
 @LAST
 @option(
@@ -158,6 +171,11 @@ def sheet(
     metavar="PIXELS",
     help="Height of a film or the picture of a posture  [default: 480]",
 )
+@with_music(
+    Section.DRAW,
+    "Sound of an .mp4 or .html (.wav, .flac, .ogg, .mp3)  [default: the file beside it, as clip.wav beside clip.bvh]",
+    "Seconds of the music at frame 0 of the clip  [default: 0]",
+)
 @reading
 @HOME
 def render(
@@ -168,19 +186,30 @@ def render(
     end: int,
     program: str | None,
     home: Path | None,
+    music: Path | None,
+    offset: float | None,
     **options: Any,
 ) -> None:
     """Draw movement as a picture, a film, or a page that plays it.
 
-    SOURCE is a motion file, a score, a corpus by name or folder, CORPUS/CLIP, or a posture such as ballet/arabesque.
+    SOURCE is a motion file, a score, a corpus by name or folder, CORPUS/CLIP, a clip of a glTF file such as
+    'hero.glb#Dance', or a posture such as ballet/arabesque. An ensemble (.toml, or a BVH file of several bodies)
+    becomes .gif, .mp4 or .html.
+
     A .png shows one posture, or a sheet of up to 48 evenly spaced ones (the sheet command has more options); an .html
-    page plays the movement in any browser, from disk, offline. Inserted movement is violet; a green
-    ball marks a bridged joint.
+    page plays the movement in any browser, from disk, offline. Inserted movement is violet; a green ball marks a
+    bridged joint.
     """
     from motionmind.formats.programs import PROGRAMS
     from motionmind.render.pictures import draw_picture
 
     drawing = {key: options.pop(key) for key in ("fps", "view", "size")}
+    check_sounding(outputs, music, offset)
+    if is_ensemble(source, outputs, FILMS):
+        drawing = {key: value for key, value in drawing.items() if value}
+        sound = read_part_of_sound(music, offset or 0.0) if music else None
+        _film_ensemble(source, outputs, home, drawing, sound, options)
+        return
     named = parse_movement(source, home)
     check_outputs([(path, PICTURES) for path in outputs], named.source.paths)
     whole = read_movement(named.source, name, home, **options)
@@ -191,10 +220,13 @@ def render(
             raise MotionMindError(f"--fps and --for {program} both set the frames per second; give one of them")
         motion = motion.stretch_to(PROGRAMS[program].fps)
         drawing["fps"] = motion.fps
+    track = music or track_beside(named.source.paths, outputs)
+    since = float(whole.times[frames.start] - whole.times[0])
+    sound = read_part_of_sound(track, (offset or 0.0) + since) if track else None
     with all_or_none():
         for path in outputs:
             note_licences(path, motion)
-            draw_picture(path, motion, first=frames.start, **drawing)
+            draw_picture(path, motion, first=frames.start, sound=sound if may_sound(path) else None, **drawing)
     seconds = motion.times[-1] - motion.times[0]
     for path in outputs:
         kilobytes = path.stat().st_size / 1000
@@ -208,7 +240,7 @@ def _make_files(folder: Path, motions: Sequence[Motion], read_from: Sequence[Pat
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise MotionMindError(f"{folder}: cannot be made: {error.strerror or error}") from error
-    names = (re.sub(r"[^\w.()-]+", "-", motion.name) for motion in motions)
+    names = distinct_names([re.sub(r"[^\w.()-]+", "-", motion.name) for motion in motions])
     try:
         return check_outputs([(folder / f"{name}.png", (".png",)) for name in names], read_from)
     except MotionMindError:
@@ -225,3 +257,44 @@ def _select_drawn(frames: range, every: int | None, postures: int | None) -> Seq
     from motionmind.render.sheet import evenly
 
     return evenly(frames, postures) if postures else frames[:: every or 1]
+
+
+def _print_ensemble(
+    source: str, output: Path, home: Path | None, every: int | None, postures: int | None, options: dict[str, Any]
+) -> None:
+    """Draw the sheet of an ensemble."""
+    if every and postures:
+        raise MotionMindError("--every and --postures both choose the times to draw; give one of them")
+    without = ["names", "start", "end", "columns", "side"]
+    ensemble = open_ensemble(source, [output], PRINTS, home, without, **options)
+    from motionmind.render.group_sheet import write_group_sheet
+
+    pictures = write_group_sheet(output, ensemble, every=every, postures=postures)
+    click.echo(f"{displayed_path(output)}: {count(pictures, 'picture')}, " + "\n".join(describe_ensemble(ensemble)))
+
+
+def _film_ensemble(
+    source: str,
+    outputs: tuple[Path, ...],
+    home: Path | None,
+    drawing: dict[str, Any],
+    sound: Sound | None,
+    options: dict[str, Any],
+) -> None:
+    """Film an ensemble, or write the page that plays it."""
+    ensemble = open_ensemble(source, outputs, FILMS, home, ["name", "start", "end", "program"], **options)
+    pages = [path for path in outputs if path.suffix.lower() == ".html"]
+    if pages and drawing:
+        raise MotionMindError(f"{pages[0]}: --fps, --view and --size are for films, not for a page")
+    with all_or_none():
+        for path in outputs:
+            if path in pages:
+                from motionmind.render.group_page import write_group_page
+
+                write_group_page(path, ensemble, sound)
+            else:
+                from motionmind.render.film import write_group_film
+
+                write_group_film(path, ensemble, sound=sound if may_sound(path) else None, **drawing)
+    names = ", ".join(map(displayed_path, outputs))
+    click.echo(f"{names}: " + "\n".join(describe_ensemble(ensemble)))

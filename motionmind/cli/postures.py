@@ -19,7 +19,7 @@ def read_end(
     named: PostureName,
     side: Literal["before", "after"],
     home: Path | None = None,
-    read: Callable[[Path], Motion] = read_motion,
+    read: Callable[[Path | str], Motion] = read_motion,
 ) -> tuple[Posture, Motion | None]:
     """Read the posture at one end of a tween, and the movement on its other side if a ~ asks for it.
 

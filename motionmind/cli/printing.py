@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from motionmind.cli.noted import Noted
-from motionmind.display import displayed, displayed_path, printable
+from motionmind.display import displayed, displayed_path, one_line
 from motionmind.errors import MotionMindWarning, enumerated
 from motionmind.files import FilePath
+from motionmind.tween.counts import moment
 
 if TYPE_CHECKING:
     from motionmind.search.solve import Progress
@@ -68,7 +69,7 @@ def progress(message: str) -> None:
 def note(message: str) -> None:
     """Print a note to standard error, in place of a progress bar if one stands there."""
     clear = "\r\x1b[2K" if sys.stderr.isatty() else ""
-    click.echo(f"{clear}note: {printable(message)}", err=True)
+    click.echo(f"{clear}note: {one_line(message)}", err=True)
 
 
 def count(number: int, noun: str) -> str:
@@ -117,8 +118,11 @@ class Interruption:
         self.is_requested = True
 
 
-def print_tween(result: Tween, files: Sequence[Path], *, with_details: bool = False) -> None:
-    """Print the summary of a tween and the files written; with details, costs, states and distances from the corpus."""
+def print_tween(result: Tween, files: Sequence[Path] | None, *, with_details: bool = False) -> None:
+    """Print the summary of a tween, and the files written unless `files` is None.
+
+    With details, print costs, states and distances from the corpus, too.
+    """
     from motionmind.tween.headline import headline, reached_share
 
     click.echo(headline(result))
@@ -129,7 +133,8 @@ def print_tween(result: Tween, files: Sequence[Path], *, with_details: bool = Fa
         click.echo(f"without   {format_what_if(one)}")
     if with_details:
         _print_details(result)
-    print_written(files)
+    if files is not None:
+        print_written(files)
 
 
 def _print_seen(result: Tween, indent: str = "") -> None:
@@ -211,7 +216,7 @@ def _search_lines(result: Tween) -> list[tuple[str, str]]:
     bridged = [f"{displayed(b.joint)} in move {b.move + 1} ({b.degrees:.0f} degrees)" for b in result.bridges]
     waited = Counter(displayed(wait.joint) for wait in result.waits)
     return [
-        ("moves", f"{result.moves}, in {seconds:.2f} s ({count(len(result.motion), 'frame')})"),
+        ("moves", f"{result.moves}, in {seconds:.2f} s ({count(len(result.motion), 'frame')}){_counts(result)}"),
         ("cost", f"{result.cost:.3f} nats"),
         ("proven", f"{result.status}: no path costs less than {result.lower_bound:.3f}, gap {result.gap:.2%}"),
         ("attested", f"{result.attested:.1%} of the joints' transitions occur in the corpus{_shares(result)}"),
@@ -220,12 +225,20 @@ def _search_lines(result: Tween) -> list[tuple[str, str]]:
     ]
 
 
+def _counts(result: Tween) -> str:
+    """Format the length in counts: ", 8 counts at 120 a minute"; "" without any."""
+    request = result.request
+    return "" if request.counts is None else f", {request.counts:g} counts at {request.tempo:g} a minute"
+
+
 def _distance_lines(result: Tween) -> list[tuple[str, str]]:
     """Return pairs of a heading and a line with the distances of A, B, vias and the motion from their states."""
     ends = zip("AB", (result.before, result.after), result.snap_degrees, strict=True)
     stops = [(end, "" if seconds is None else "moving, ", row) for end, seconds, row in ends]
-    for number, (move, row) in enumerate(zip(result.passed, result.via_degrees, strict=True), start=1):
-        stops.insert(number, (f"via {number}", f"after move {move}, ", row))
+    vias = zip(result.request.vias, result.passed, result.via_degrees, strict=True)
+    for number, ((_, _, seconds), move, row) in enumerate(vias, start=1):
+        time = "" if seconds is None else f"at {moment(seconds, result.request.tempo)}, "
+        stops.insert(number, (f"via {number}", f"after move {move}, {time}", row))
     lines = []
     for stop, where, row in stops:
         worst = int(row.argmax())
@@ -235,7 +248,8 @@ def _distance_lines(result: Tween) -> list[tuple[str, str]]:
         off, share = result.path_degrees[1:-1], result.followed[1:-1].mean()
         degrees = f"{off.mean():.1f} degrees per joint from the path's states, at most {off.max():.1f}"
         lines.append(("motion", f"{degrees}; within their tolerance in {share:.0%} of joints and moves"))
-    return lines
+    lines += [*(("reach", str(one)) for one in result.reached), *(("accent", str(one)) for one in result.accented)]
+    return lines + ([("travel", str(result.travelled))] if result.travelled else [])
 
 
 def _shares(result: Tween) -> str:

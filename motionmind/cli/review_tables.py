@@ -53,6 +53,8 @@ def print_review(report: dict[str, Any], names: Sequence[str], is_chosen: bool =
         shortest = min(end - begin + 1 for begin, end in zip(begins, ends, strict=True))
         kept = _format_limits(report["limits"], counts["inserted_share"], shortest)
         click.echo(f"{kept}without limits, {course['departed']:.0%} of steps leave the piece")
+    if report["on_beat"]:
+        click.echo(_format_on_beat(report["on_beat"]))
     if counts["stays"]:
         click.echo(_format_stillness(counts))
     spans = [(report["order"][first], report["order"][last]) for first, last in zip(begins, ends, strict=True)]
@@ -190,3 +192,15 @@ def _print_advice_on_insertions(variation: Variation, counts: dict[str, Any]) ->
         )
     else:
         note(f"insertions take {share:.0%} of the time: --inserted {most:g} keeps more of the piece")
+
+
+def _format_on_beat(on_beat: dict[str, Any]) -> str:
+    """Format how many parts start on the beat, at which pace, and what that costs in length."""
+    parts, paces = on_beat["parts"], [part["pace"] for part in on_beat["parts"]]
+    inserted = sum(part["kind"] == "insertion" for part in parts)
+    longer = on_beat["seconds"] / on_beat["own_seconds"] - 1.0 if on_beat["own_seconds"] else 0.0
+    every = {1: "every", 2: "every 2nd", 3: "every 3rd"}.get(on_beat["every"], f"every {on_beat['every']}th")
+    return (
+        f"on {every} beat: {count(len(parts) - inserted, 'stretch')} and {count(inserted, 'insertion')}, at "
+        f"{min(paces):.0%} to {max(paces):.0%} of their pace; {on_beat['seconds']:.1f} s, {longer:+.0%}"
+    )

@@ -1,6 +1,6 @@
 """The options of commands that search for movement: one for each option of a tween, with its default.
 
-`tween` sets the others itself: `unlike` by --alternatives, `what_if` by --what-if.
+`tween` sets the others itself: `unlike` by --alternatives, and `what_if`, `reach`, `to` and `along` by their own.
 """
 
 from __future__ import annotations
@@ -15,11 +15,13 @@ from click.shell_completion import CompletionItem
 
 from motionmind.cli import completion
 from motionmind.cli.options import Section, given_option, option
-from motionmind.cli.types import COUNT, NATS, NATURAL, POSITIVE, RATE, Moves, Number, Size
+from motionmind.cli.types import COUNT, NATS, NATURAL, POSITIVE, RATE, Counts, Moves, Number, Size
 from motionmind.cli.words import parse_avoided, parse_pins, parse_vias
 from motionmind.errors import MotionMindError
 from motionmind.footing.corrections import Correction
 from motionmind.grammar.schemes import Scheme, Weights
+from motionmind.synthesis.accent_times import AccentKind
+from motionmind.tween.counts import COUNTS_RANGE, TEMPO_RANGE_BPM
 from motionmind.tween.options import PACE_RANGE, SearchOptions
 from motionmind.tween.request import TweenRequest
 
@@ -64,8 +66,8 @@ SEARCH_OPTIONS = (
         "via",
         "--via",
         Section.THROUGH,
-        "Posture to pass through after move N (the first is 1), or after any; a frame of a clip is CLIP@FRAME@N, or "
-        "CLIP@FRAME@. Repeatable, in order.",
+        "Posture to pass through after move N (the first is 1), or after any, or at a count, as @count4; a frame of a "
+        "clip is CLIP@FRAME@N, or CLIP@FRAME@. Repeatable, in order.",
         str,
         "POSTURE[@N]",
         multiple=True,
@@ -78,6 +80,7 @@ SEARCH_OPTIONS = (
         "Joint to keep in A's state until the last move; with =B, in B's state from the first move on. Repeatable.",
         str,
         "JOINT[=B]",
+        advanced=True,
         multiple=True,
         complete=completion.joints,
     ),
@@ -88,6 +91,7 @@ SEARCH_OPTIONS = (
         "Joints, separated by commas, to keep in one state, which A and B must share. Repeatable.",
         str,
         "JOINTS",
+        advanced=True,
         multiple=True,
         complete=completion.joints,
     ),
@@ -119,6 +123,38 @@ SEARCH_OPTIONS = (
         "SECONDS",
     ),
     SearchOption(
+        "tempo",
+        "--tempo",
+        Section.SEARCH,
+        "Counts per minute, for --counts and --via POSTURE@count4.",
+        Number(*TEMPO_RANGE_BPM),
+        "BPM",
+    ),
+    SearchOption(
+        "counts",
+        "--counts",
+        Section.SEARCH,
+        "Duration in counts, in place of --duration: with 8, B comes on count 9.",
+        Number(*COUNTS_RANGE),
+        "N",
+    ),
+    SearchOption(
+        "accent",
+        "--accent",
+        Section.SEARCH,
+        "Counts of the accents, such as 3,5, with --tempo and a length: the movement peaks, or rests, there.",
+        Counts(),
+        "COUNTS",
+    ),
+    SearchOption(
+        "accent_kind",
+        "--accent-kind",
+        Section.SEARCH,
+        "What an accent is: the greatest speed, or the least.",
+        click.Choice(get_args(AccentKind)),
+        advanced=True,
+    ),
+    SearchOption(
         "pace",
         "--pace",
         Section.SEARCH,
@@ -126,7 +162,9 @@ SEARCH_OPTIONS = (
         Number(*PACE_RANGE),
         "FACTOR",
     ),
-    SearchOption("strict", "--strict", Section.SEARCH, "Allow only attested transitions: no bridges.", bool),
+    SearchOption(
+        "strict", "--strict", Section.SEARCH, "Allow only attested transitions: no bridges.", bool, advanced=True
+    ),
     SearchOption(
         "whole_body",
         "--whole-body",
@@ -168,6 +206,7 @@ SEARCH_OPTIONS = (
         "Minimum share of joints' states between A and B in which an alternative differs from each earlier one.",
         Number(min=0, max=1),
         "SHARE",
+        advanced=True,
     ),
     SearchOption(
         "within",
@@ -254,6 +293,7 @@ SEARCH_OPTIONS = (
         "Start of the passage to follow in place of the mean, such as adagio@3.2s.",
         str,
         "CLIP@TIME",
+        advanced=True,
     ),
     SearchOption(
         "without",
@@ -261,6 +301,7 @@ SEARCH_OPTIONS = (
         Section.MOTION,
         "Part of the synthesis to leave out. Repeatable.",
         click.Choice(get_args(Correction)),
+        advanced=True,
         multiple=True,
     ),
     SearchOption("fps", "--fps", Section.MOTION, "Frames per second of the motion.", RATE, advanced=True),
@@ -296,7 +337,7 @@ def searching(*, few: bool = False) -> Callable[[_Function], _Function]:
 
 
 def request_options(
-    options: Mapping[str, Any], home: Path | None, read: Callable[[Path], Motion] | None = None
+    options: Mapping[str, Any], home: Path | None, read: Callable[[Path | str], Motion] | None = None
 ) -> dict[str, Any]:
     """Convert the values of the search options to options of `Engine.tween`; read the vias.
 
@@ -326,7 +367,9 @@ def via_sources(options: Mapping[str, Any], home: Path | None) -> list[Source]:
     return [posture.source for posture, _ in parse_vias(options["via"], home)]
 
 
-def _find_via(name: PostureName, move: int | None, home: Path | None, read: Callable[[Path], Motion] | None) -> Posture:
+def _find_via(
+    name: PostureName, move: int | str | None, home: Path | None, read: Callable[[Path | str], Motion] | None
+) -> Posture:
     from motionmind.formats import read_motion
     from motionmind.names.finding import find_motion
     from motionmind.names.postures import find_posture

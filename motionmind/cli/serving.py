@@ -15,8 +15,6 @@ from motionmind.cli.warming import prepare
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 
-_KEEP_ALIVE_S = 5
-
 
 @command("motionmind serve --corpus ballet")
 @option(
@@ -46,6 +44,7 @@ def serve(corpus: str, host: str, port: int, home: Path | None) -> None:
     try:
         import uvicorn
 
+        from motionmind.connections import config
         from motionmind.serve.guard import Guard
         from motionmind.serve.mmcp import app
     except ImportError as error:
@@ -59,14 +58,4 @@ def serve(corpus: str, host: str, port: int, home: Path | None) -> None:
         if is_open:
             note(f"no password: anyone who can reach {url.removeprefix('http://')} can request movement")
         click.echo(f"serving {displayed(engine.corpus.name)} at {url} (Ctrl-C ends)")
-        config = uvicorn.Config(
-            Guard(app(engine), host),
-            log_level="error",
-            access_log=False,
-            ws="none",
-            server_header=False,
-            limit_concurrency=16,
-            timeout_keep_alive=_KEEP_ALIVE_S,
-            timeout_graceful_shutdown=_KEEP_ALIVE_S,
-        )
-        uvicorn.Server(config).run(sockets=[listening])
+        uvicorn.Server(config(Guard(app(engine), host))).run(sockets=[listening])

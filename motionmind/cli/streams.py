@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import sys
@@ -24,6 +25,8 @@ class _Escaping:
             self._stream.write(escaped(text))
         except BrokenPipeError:
             _silence(self._stream)
+        except io.UnsupportedOperation as error:
+            raise OSError(errno.EBADF, "standard output is closed") from error
         return len(text)
 
     def flush(self) -> None:
@@ -76,20 +79,21 @@ def forgiving() -> Iterator[None]:
 
     Bytes of names that are not UTF-8 are escaped, too.
     """
-    if sys.stderr is None:  # closed; a file of ours would get its descriptor, and the output of libraries
+    # A closed stream is opened anew, or a file of ours would get its descriptor, and the output of libraries.
+    if sys.stdout is None:
+        sys.stdout = open(os.devnull, encoding="utf-8")  # noqa: PTH123, SIM115 - for reading, so that writing fails
+    if sys.stderr is None:
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123, SIM115 - it stays open
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     given = sys.stdout, sys.stderr
     sys.stderr = _Forgiving(sys.stderr)
-    if sys.stdout is not None:
-        sys.stdout = _Escaping(sys.stdout)
+    sys.stdout = _Escaping(sys.stdout)
     try:
         yield
     finally:
         for stream in (sys.stdout, sys.stderr):
             with suppress(OSError):  # a full disk, which Python reports again at exit
-                if stream is not None:
-                    stream.flush()
+                stream.flush()
         sys.stdout, sys.stderr = given

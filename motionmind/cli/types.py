@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from pathlib import Path
 from typing import Any, ClassVar
 
 import click
+
+from motionmind.clip_names import split_clip
 
 
 class Number(click.FloatRange):
@@ -109,6 +112,55 @@ class Point(click.ParamType["tuple[float, ...]"]):
         return point
 
 
+class Counts(click.ParamType["tuple[float, ...]"]):
+    """Counts, "3" or "1,5.5"."""
+
+    name = "counts"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+        """Return the counts."""
+        if isinstance(value, tuple):  # the default
+            return value
+        try:
+            counts = tuple(float(word) for word in str(value).split(","))
+        except ValueError:
+            counts = ()
+        if not counts or not all(map(math.isfinite, counts)):
+            self.fail(f"{value!r} is neither a count such as 3 nor a list such as 1,5.", param, ctx)
+        return counts
+
+
+class Place(click.ParamType["tuple[float, ...]"]):
+    """A place on the floor, "2,1.5", or a place and a facing, "2,1.5,90"."""
+
+    name = "place"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+        """Return x and z, and the facing if there is one."""
+        try:
+            place = tuple(float(word) for word in str(value).split(","))
+        except ValueError:
+            place = ()
+        if len(place) not in (2, 3) or not all(map(math.isfinite, place)):
+            self.fail(
+                f"{value!r} is neither a place in metres such as 2,1.5 nor one with a facing: 2,1.5,90.", param, ctx
+            )
+        return place
+
+
+class Area(click.ParamType["tuple[float, float]"]):
+    """A width and a depth in metres, "8x6"."""
+
+    name = "area"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+        """Return the width and the depth."""
+        parts = re.fullmatch(r"(\d{1,4}(?:\.\d{1,6})?)x(\d{1,4}(?:\.\d{1,6})?)", str(value), re.ASCII)
+        if not parts:
+            self.fail(f"{value!r} is not a width and a depth in metres such as 8x6.", param, ctx)
+        return float(parts[1]), float(parts[2])
+
+
 class Span(click.ParamType["tuple[int, int]"]):
     """The number of a posture, "10", or a range of postures, "10..14"."""
 
@@ -158,9 +210,19 @@ class Size(click.ParamType[int]):
         return round(size)
 
 
+class ClipFile(click.Path):
+    """An existing file, or a clip of one, as in hero.glb#Walk."""
+
+    def convert(self, value: str | os.PathLike[str], param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Return the path, with the name of the clip; fail with a usage error if there is no such file."""
+        super().convert(split_clip(value)[0], param, ctx)
+        return Path(value)
+
+
 FILE = click.Path(dir_okay=False, readable=False, path_type=Path)
 FILE_OR_FOLDER = click.Path(readable=False, path_type=Path)
 EXISTING_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+EXISTING_CLIP = ClipFile(exists=True, dir_okay=False)
 FOLDER = click.Path(file_okay=False, path_type=Path)
 FRAME = FrameNumber()
 COUNT = Whole(min=1)

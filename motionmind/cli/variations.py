@@ -11,21 +11,25 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli import completion
+from motionmind.cli.canons import MAX_VARIED_DANCERS, check_canon, vary_canon, write_canon
 from motionmind.cli.exits import ExitCode
 from motionmind.cli.files import EVEN_SUFFIXES, MOTION_SUFFIXES, check_outputs, note_licences, write
+from motionmind.cli.music import in_seconds, with_music
 from motionmind.cli.options import HOME, OUTPUT_KINDS, Section, command, given_option, option, output, outputs, reading
 from motionmind.cli.printing import Interruption, note, print_written
 from motionmind.cli.review_tables import print_advice, print_review
 from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searching, via_sources
+from motionmind.cli.sounding import SOUNDS, Sounding, find_sounding
 from motionmind.cli.sources import parse_movement, read_movement, select_part
-from motionmind.cli.types import COUNT, FILE, FRAME, NATURAL, POSITIVE, RATE, Number, Point
+from motionmind.cli.stages import note_overstep
+from motionmind.cli.types import COUNT, FILE, FRAME, NATURAL, POSITIVE, RATE, Area, Number, Point, Whole
 from motionmind.cli.warming import prepare
 from motionmind.cli.words import parse_parameters
 from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError, enumerated
 from motionmind.files import all_or_none, sha256_of
 from motionmind.render import PICTURES
-from motionmind.variation.orders import DEFAULT_INSERTED_SHARE, ORDERS, RANDOM, REFUSED, By
+from motionmind.variation.orders import DEFAULT_INSERTED_SHARE, MAX_EVERY, ORDERS, RANDOM, REFUSED, By
 
 if TYPE_CHECKING:
     from motionmind.corpus.corpus import Facing
@@ -39,7 +43,14 @@ if TYPE_CHECKING:
 @click.argument("source", metavar="PIECE", shell_complete=completion.movement)
 @outputs(f"File to write: {OUTPUT_KINDS}; review reads .json.")
 @option("--report", section=Section.OUTPUT, type=FILE, help="File of the report, as JSON; - prints it.")
-@option("--json", "as_json", section=Section.OUTPUT, is_flag=True, help="Print the report as JSON, like --report -.")
+@option(
+    "--json",
+    "as_json",
+    section=Section.OUTPUT,
+    advanced=True,
+    is_flag=True,
+    help="Print the report as JSON, like --report -.",
+)
 @option(
     "--corpus",
     "--smooth",
@@ -54,7 +65,7 @@ if TYPE_CHECKING:
     "--clip",
     section=Section.PART,
     metavar="NAME",
-    help="Clip of a score or a corpus  [default: its only one]",
+    help="Clip of a score, a corpus or a glTF file  [default: the only one; of glTF the first]",
 )
 @option(
     "--from",
@@ -138,6 +149,22 @@ if TYPE_CHECKING:
     "else 1]",
 )
 @option(
+    "--dancers",
+    section=Section.TRAJECTORY,
+    type=Whole(2, MAX_VARIED_DANCERS),
+    metavar="N",
+    help="Number of dancers, at nearby starting points, who begin together and part; -o is an ensemble (.toml), beside "
+    "which each dancer's variation is written.",
+)
+@option(
+    "--stage",
+    section=Section.MOTION,
+    type=Area(),
+    metavar="WIDTHxDEPTH",
+    help="Stage to stay on, metres, around the origin: turns and moves all of it or, with a corpus, lets insertions "
+    "travel.",
+)
+@option(
     "--skip",
     section=Section.TRAJECTORY,
     advanced=True,
@@ -179,10 +206,32 @@ if TYPE_CHECKING:
 @option(
     "--alternatives",
     section=Section.SEARCH,
+    advanced=True,
     type=COUNT,
     metavar="K",
     default=3,
     help="Number of movements to find for each insertion.",
+)
+@option(
+    "--on-beat",
+    section=Section.TRAJECTORY,
+    type=Whole(1, MAX_EVERY),
+    metavar="N",
+    help="Start stretches and insertions on every Nth beat of --tempo or --music, faster or slower.",
+)
+@option(
+    "--sound",
+    section=Section.TRAJECTORY,
+    advanced=True,
+    type=click.Choice(SOUNDS),
+    help="Sound of PIECE, as clip.wav beside clip.bvh: each stretch's own, or straight on; written as .wav beside "
+    "movement, and in .mp4 and .html.",
+)
+@with_music(
+    Section.SEARCH,
+    "Music whose beats are counts (sound, .txt, .mid), in place of --tempo; sound of an .mp4 or .html.",
+    "Seconds of the music before count 1, the next beat  [default: to the first downbeat]",
+    advanced=True,
 )
 @searching(few=True)
 @reading
@@ -199,6 +248,7 @@ def vary(
     parameter: tuple[str, ...],
     corpus: str | None,
     home: Path | None,
+    dancers: int | None,
     **options: Any,
 ) -> None:
     """Vary a piece along a chaotic trajectory.
@@ -218,33 +268,52 @@ def vary(
     files: list[tuple[Path, tuple[str, ...]]] = [(path, MOTION_SUFFIXES + PICTURES) for path in outputs]
     files += [(report, ())] if report else []
     named = parse_movement(source, home)
+    choices = {name: options.pop(name) for name in ("sound", "music", "offset", "on_beat")}
+    heard = find_sounding(named.source.paths, tempo=options["tempo"], **choices)
+    files += [(path, (".wav",)) for path in heard.tracks(outputs)]
     sources = (named.source, *via_sources(options, home))
-    check_outputs(files, [path for source in sources for path in source.paths])
-    refused = REFUSED[by]
-    _check_refused(context, by, refused)
-    request = request_options({row.field: options.pop(row.field) for row in SEARCH_OPTIONS}, home)
-    names = ("depart", "start", "skip", "step", "transient", "length", "inserted", "stretch")
+    given = [path for source in sources for path in source.paths] + heard.files
+    if dancers and (by != "attractor" or report or as_json or heard.track or options["stage"]):
+        raise click.UsageError(
+            "--dancers follows the attractor, writes no report or sound, and keeps to no stage: leave out --by, "
+            "--report, --json, --sound, --stage"
+        )
+    shared = check_canon(outputs, dancers, given) if dancers else []
+    if not shared:
+        check_outputs(files, given)
+    _check_refused(context, by, refused := REFUSED[by])
+    wished = request_options({row.field: options.pop(row.field) for row in SEARCH_OPTIONS}, home)
+    request = in_seconds(wished, heard.beats if heard.music else None)
+    names = ("depart", "start", "skip", "step", "transient", "length", "inserted", "stretch", "stage", "alternatives")
     arguments = {name: options.pop(name) for name in names}
     nudge = options.pop("nudge")
     if arguments["depart"] is not None and nudge is not None:
         raise click.UsageError("--depart chooses a nudge, and --nudge sets one; give one of them", context)
     arguments["nudge"] = nudge[0] if nudge is not None and len(nudge) == 1 else nudge
     arguments["flow"] = find_flow(attractor, **parse_parameters(parameter))
-    alternatives = options.pop("alternatives")
-    piece, engine = _read_piece(context, named, corpus, home, by, **options)
+    piece, engine, begins = _read_piece(context, named, corpus, home, by, **options)
     with Interruption() as interruption:
-        variation = make_variation(
-            piece,
-            engine,
-            by=by,
-            alternatives=alternatives,
-            on_progress=interruption.on_progress,
-            watch=interruption.watch,
-            **{name: value for name, value in arguments.items() if name not in refused},
-            **request,
-        )
-    is_chosen = by == "attractor" and nudge is None
-    print_variation(variation, as_json, _write(outputs, report, variation, request["fps"]), home, is_chosen)
+
+        def make(**changes: Any) -> Variation:
+            return make_variation(
+                piece,
+                engine,
+                by=by,
+                beats=heard.beats if choices["on_beat"] else None,
+                on_beat=choices["on_beat"],
+                on_progress=interruption.on_progress,
+                watch=interruption.watch,
+                **{name: value for name, value in (arguments | changes).items() if name not in refused},
+                **request,
+            )
+
+        variation = make()
+        others = vary_canon(variation, len(shared), make) if shared else []
+    if shared:
+        write_canon(outputs[0], shared, others)
+        context.exit(ExitCode.INTERRUPTED if interruption.is_requested else 0)
+    written = _write(outputs, report, variation, request["fps"], heard, begins)
+    print_variation(variation, as_json, written, home, is_chosen=by == "attractor" and nudge is None)
     if engine and not as_json:
         print_seams_beyond(variation, engine)
     depart = arguments["depart"] if by == "attractor" else None  # a control does not depart as its trajectory does
@@ -253,6 +322,7 @@ def vary(
     print_advice(variation, engine, depart)
     if not as_json:
         print_written([path for path, _ in files])
+    note_overstep(source, variation.motion(), arguments["stage"], may_turn=variation.piece.facing == "free")
     if interruption.is_requested:
         context.exit(ExitCode.INTERRUPTED)
 
@@ -350,22 +420,22 @@ def _read_piece(
     end: int,
     rate: float | None,
     **reading_options: Any,
-) -> tuple[Piece, Engine | None]:
-    """Read the piece to vary, and load the engine of the corpus that judges it, if any."""
+) -> tuple[Piece, Engine | None, float]:
+    """Read the piece to vary, load the engine of the corpus that judges it, if any, and return when its clip begins."""
     from motionmind.corpus.recordings import posture_rate
     from motionmind.variation.piece import Piece
 
     source = named.source
     motion = read_movement(source, clip, home, **reading_options)
     own = source.place if source.kind == "corpus" else None
-    judge = corpus or own
-    useful = ("fps", "seed") if by in RANDOM else ("fps",)
+    judge = own if corpus is None else corpus
+    useful = ("fps", *["seed"] * (by in RANDOM), *["tempo"] * bool(given_option(context, ["on_beat"])))
     unused = given_option(
         context, ["alternatives", "inserted", *(row.field for row in SEARCH_OPTIONS if row.field not in useful)]
     )
-    if unused and not judge:
+    if unused and judge is None:
         raise click.UsageError(f"{unused} needs --corpus", context)
-    engine = load_engine(judge, home) if judge else None
+    engine = None if judge is None else load_engine(judge, home)
     if engine and source.kind == "file" and not motion.keyframed:
         rate = engine.corpus.rate if rate is None else rate
         if engine.corpus.skip and not given_option(context, ["begin"]) and named.moment is None:
@@ -381,7 +451,7 @@ def _read_piece(
         )
     frames = select_part(named, motion, begin, end)
     facing = _read_facing(own, home) if own else engine.corpus.facing if engine else "free"
-    return Piece.of(motion.slice(frames.start, frames.stop), rate, facing), engine
+    return Piece.of(motion.slice(frames.start, frames.stop), rate, facing), engine, float(motion.times[0])
 
 
 def _read_facing(corpus: str, home: Path | None) -> Facing:
@@ -392,8 +462,15 @@ def _read_facing(corpus: str, home: Path | None) -> Facing:
     return facing
 
 
-def _write(outputs: Sequence[Path], report: Path | None, variation: Variation, fps: float) -> str | None:
-    """Write a variation, and its report if requested, or nothing if a file fails.
+def _write(
+    outputs: Sequence[Path],
+    report: Path | None,
+    variation: Variation,
+    fps: float,
+    heard: Sounding,
+    begins: float,
+) -> str | None:
+    """Write a variation, its sound tracks, and its report if requested, or nothing if a file fails.
 
     JSON holds the whole variation; other files hold its movement, resampled for formats with evenly spaced frames.
 
@@ -403,6 +480,7 @@ def _write(outputs: Sequence[Path], report: Path | None, variation: Variation, f
     from motionmind.files import write_atomically
     from motionmind.variation.variation_json import write_variation
 
+    sound = heard.sound_of(variation, begins, outputs)
     with all_or_none() as written:
         for path in outputs:
             suffix = path.suffix.lower()
@@ -411,7 +489,10 @@ def _write(outputs: Sequence[Path], report: Path | None, variation: Variation, f
                 write_variation(path, variation)
             else:
                 motion = variation.motion()
-                write(path, motion.resample(fps) if suffix in EVEN_SUFFIXES else motion)
+                write(path, motion.resample(fps) if suffix in EVEN_SUFFIXES else motion, sound=sound)
+        for path in heard.tracks(outputs):
+            assert sound is not None
+            write_atomically(path, sound.encode("WAV"))
         motion_sha256 = sha256_of(written, next(iter(outputs), None))
         if report:
             content = variation.report() | {"motion_sha256": motion_sha256}

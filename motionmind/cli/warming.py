@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 import click
 
 from motionmind.cli.options import Section, command, option
+from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError
 from motionmind.files import lock_alone
 
@@ -55,7 +56,7 @@ def warm(is_stopping: bool) -> None:
     The first run starts this in the background. It takes one or two minutes, once per version of MotionMind and Python.
     The code is stored in the user's cache directory, or in NUMBA_CACHE_DIR.
     """
-    from motionmind.codecache import compiled_names, is_all_compiled, place_of_code
+    from motionmind.codecache import compiled_names, decorated_names, is_all_compiled, place_of_code
 
     if (place := place_of_code()) is None:
         raise MotionMindError("cannot store compiled code: make the cache directory or NUMBA_CACHE_DIR writable")
@@ -67,6 +68,9 @@ def warm(is_stopping: bool) -> None:
         return
     began = monotonic()
     _wait_or_compile(place)
+    if missing := decorated_names() - compiled_names():
+        stored = f"{len(missing)} of {len(decorated_names())} functions could not be compiled and stored"
+        raise MotionMindError(f"{displayed_path(place)}: {stored}; is the disk full? run it again")
     click.echo(f"compiled {len(compiled_names())} functions in {monotonic() - began:.0f} s; the next search needs none")
 
 
@@ -167,7 +171,7 @@ def _compile(works: Sequence[Callable[[], None]], processes: int, *, hidden: boo
 
     Ignore workers that fail: the next run compiles their part.
     """
-    from motionmind.codecache import note_all_compiled
+    from motionmind.codecache import compiled_names, decorated_names, note_all_compiled
 
     side_by_side = min(processes, 3)
     programs = [works[first::side_by_side] for first in range(side_by_side)]
@@ -179,7 +183,8 @@ def _compile(works: Sequence[Callable[[], None]], processes: int, *, hidden: boo
             with suppress(OSError):
                 worker.kill()
             worker.wait()
-    note_all_compiled()
+    if decorated_names() <= compiled_names():
+        note_all_compiled()
 
 
 def _show_progress(is_running: Callable[[], bool], *, hidden: bool) -> None:
@@ -393,7 +398,9 @@ def film() -> None:
 
 
 def draw() -> None:
-    """Draw a clip in all other formats."""
+    """Draw a clip in all other formats, and keep two dancers of it apart."""
+    from motionmind.ensemble.dancers import Dancer, Ensemble
+    from motionmind.ensemble.keeping import keep_apart
     from motionmind.plots.attractor import draw_attractor
     from motionmind.render.pictures import draw_picture
     from motionmind.tween.engine import Engine
@@ -404,6 +411,8 @@ def draw() -> None:
     with tempfile.TemporaryDirectory(prefix="motionmind-") as folder:
         draw_picture(Path(folder) / "clip.svg", clip.slice(0, 2))
         draw_attractor(Path(folder) / "attractor.png", vary(clip, stretch=4))
+    pair = (Dancer(name, clip.slice(0, 2), (place, 0.0)) for name, place in (("a", 0.0), ("b", 0.3)))
+    keep_apart(Ensemble("pair", tuple(pair)), 0.6)
 
 
 def _problem() -> Problem:

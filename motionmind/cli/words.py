@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -127,24 +128,54 @@ def parse_avoided(words: Sequence[str]) -> list[tuple[str, int | str]]:
     return avoided
 
 
-def parse_vias(words: Sequence[str], home: Path | None = None) -> list[tuple[PostureName, int | None]]:
-    """Parse postures to pass through: "C.json", after any move, "C.json@3", after move 3; "clip.bvh@150@3" and
-    "clip.bvh@150@" are frame 150 after move 3 and after any.
+def parse_reaches(words: Sequence[str]) -> list[tuple[str, tuple[float, ...], float]]:
+    """Parse places for joints, such as "right_wrist=0.3,1.4,0.5@1.2s".
+
+    Args:
+        words: values of --reach.
+
+    Returns:
+        Each joint, its place in metres and its time in seconds.
+
+    Raises:
+        MotionMindError: a word is not JOINT=X,Y,Z@SECONDS.
+    """
+    reaches: list[tuple[str, tuple[float, ...], float]] = []
+    for word in words:
+        joint, _, rest = word.partition("=")
+        place, _, seconds = rest.partition("@")
+        try:
+            numbers = *map(float, place.split(",")), float(seconds.removesuffix("s"))
+        except ValueError:
+            numbers = ()
+        if not joint or len(numbers) != 4 or not all(map(math.isfinite, numbers)):
+            raise MotionMindError(
+                f"--reach {word}: give a joint, its place in metres and the seconds from A, such as "
+                "right_wrist=0.3,1.4,0.5@1.2s"
+            )
+        reaches.append((joint, numbers[:3], numbers[3]))
+    return reaches
+
+
+def parse_vias(words: Sequence[str], home: Path | None = None) -> list[tuple[PostureName, int | str | None]]:
+    """Parse postures to pass through: "C.json", after any move, "C.json@3", after move 3, and "C.json@count4", on
+    count 4; "clip.bvh@150@3" and "clip.bvh@150@" are frame 150 after move 3 and after any.
 
     Args:
         words: values of --via.
         home: the folder of the user's corpora; None for the default folder.
 
     Returns:
-        Each posture and its move.
+        Each posture and its move, or its count as "count 4".
 
     Raises:
         MotionMindError: a frame's number is given without an @ for the move, or a posture is to move.
     """
-    vias: list[tuple[PostureName, int | None]] = []
+    vias: list[tuple[PostureName, int | str | None]] = []
     for word in words:
         name, _, move = word.rpartition("@")
-        has_place = bool(name and re.fullmatch(r"\d{0,9}", move, re.ASCII)) and not is_file(word)
+        counted = re.fullmatch(r"count(\d{1,6}(?:\.\d{1,6})?)", move, re.ASCII)
+        has_place = bool(name and (counted or re.fullmatch(r"\d{0,9}", move, re.ASCII))) and not is_file(word)
         posture = parse_posture(name if has_place else word, home)
         is_ambiguous = posture.moment is not None and posture.moment.seconds is None and not has_place
         if posture.is_moving or is_ambiguous:
@@ -152,5 +183,8 @@ def parse_vias(words: Sequence[str], home: Path | None = None) -> list[tuple[Pos
                 f"--via {word}: give a posture and its move, as C.json@3 or clip.bvh@150@3, or clip.bvh@150@ for any "
                 "move; it is passed without a velocity of its own"
             )
-        vias.append((posture, int(move) if has_place and move else None))
+        if has_place and counted:
+            vias.append((posture, f"count {counted[1]}"))
+        else:
+            vias.append((posture, int(move) if has_place and move else None))
     return vias

@@ -28,7 +28,7 @@ REPORT = {
     *("expansions", "peak_nodes", "node_budget", "seconds", "joints", "path"),
     *("attested", "bridges", "waits", "differs", "what_if", "vias", "snap_degrees", "path_degrees", "followed"),
     *("sources", "detail", "left_out", "shown", "times", "names", "degrees", "likelihood", "costs", "credits"),
-    *("motion_sha256", "gave", "motion_attested", "parts", "changes"),
+    *("motion_sha256", "gave", "reached", "stayed", "travelled", "accented", "motion_attested", "parts", "changes"),
 }
 
 

@@ -33,6 +33,7 @@ def test_every_control_has_words() -> None:
     assert MADE.keys() == {*CONTROLS}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("by", CONTROLS)
 def test_a_control_is_made_printed_reviewed_and_drawn(
     by: str, clip: str, run: Run, monkeypatch: pytest.MonkeyPatch

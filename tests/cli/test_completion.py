@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from bundled_clips import ballet_clip
 from command_line import Run
+from gltf_files import with_clips
 
 import motionmind
 from motionmind.chaos.flows import FLOWS
@@ -92,6 +93,15 @@ def test_files_are_completed_by_the_shell_or_beside_corpora(complete: Complete) 
     assert complete("tween", "nowhere/A") == ["file,nowhere/A"]
 
 
+def test_clips_of_gltf_files_are_completed(complete: Complete) -> None:
+    jump = ballet_clip("jump")
+    with_clips(Path("hero.glb"), [("Walk", jump), ("Wave@2", jump), ("Dance", jump), ("", jump)]).write()
+    assert complete("sheet", "hero.glb#") == [f"hero.glb#{name}" for name in ("Walk", "Wave@2", "Dance", "4")]
+    assert complete("tween", "hero.glb#Wa") == ["hero.glb#Walk@0", "hero.glb#Wave@2@0"]
+    assert complete("sheet", "hero.glb#x") == complete("sheet", "none.glb#") == []
+    assert complete("sheet", "her") == ["file,her"]
+
+
 @pytest.mark.parametrize("corpus", ["ballet", "karate", "medley", "walk-hexapod", "mine"])
 def test_what_is_completed_is_what_there_is(complete: Complete, corpus: str) -> None:
     Engine.load(corpus)
@@ -128,10 +138,12 @@ def test_a_tab_imports_no_numerics(home: Path) -> None:
         "try: main()\n"
         "finally: print([m for m in ('numpy', 'numba', 'scipy') if m in sys.modules], file=sys.stderr)"
     )
+    with_clips(Path("hero.glb"), [("Walk", ballet_clip("jump"))]).write()
     for words in (
         "motionmind tween ballet/",
         "motionmind tween a b --corpus ballet --pin ",
         "motionmind vary x --attractor ",
+        "motionmind sheet hero.glb#",
     ):
         environment = {
             **os.environ,

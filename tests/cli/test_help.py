@@ -63,6 +63,10 @@ def test_there_are_the_commands_that_the_documents_name() -> None:
             "postures",
             "posture",
             "convert",
+            "clean",
+            "loop",
+            "plan",
+            "transcribe",
             "corpus",
             "corpus build",
             "corpus add",
@@ -152,9 +156,10 @@ def test_help_hides_the_advanced_options_alone_and_help_all_none(path: tuple[str
 
 def test_each_field_of_a_request_has_one_option_but_for_those_of_tween_alone() -> None:
     options = [row.field for row in SEARCH_OPTIONS]
-    assert sorted(options) == sorted(OPTIONS.keys() - {"unlike", "what_if"})
+    assert sorted(options) == sorted(OPTIONS.keys() - {"unlike", "what_if", "reach", "stay", "to", "along"})
 
 
+@pytest.mark.long
 def test_the_examples_run_outside_a_checkout(run: Run) -> None:
     write_motion("clip.bvh", ballet_clip("plies").resample(30.0).slice(0, 300))
     Path("new").mkdir()
@@ -162,7 +167,7 @@ def test_the_examples_run_outside_a_checkout(run: Run) -> None:
     write_motion("new/jump.bvh", ballet_clip("jump").resample(30.0))
     run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "-o", "tween.json", "--report", "report.json")
     run("vary", "ballet/jump", "-o", "variation.json")
-    assert len(EXAMPLES) == 32
+    assert len(EXAMPLES) == 36
     in_readme = {line.strip() for line in README.read_text("utf-8").splitlines() if line.startswith("    motionmind ")}
     for line in EXAMPLES:
         if line.startswith(("motionmind serve", "motionmind studio")):  # which do not end

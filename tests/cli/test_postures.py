@@ -15,6 +15,7 @@ from command_line import Run
 from PIL import Image
 
 from motionmind.body.motion import Motion
+from motionmind.bundled import bundled
 from motionmind.cli.postures import read_end
 from motionmind.cli.words import parse_vias
 from motionmind.errors import MotionMindError
@@ -117,6 +118,7 @@ def test_movement_next_to_the_ends_of_a_clip_is_what_there_is() -> None:
 # --- on the command line ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_tween_begins_and_ends_as_fast_as_the_clip(run: Run) -> None:
     write_motion("clip.bvh", clip())
     by_tilde = tween(run, "clip.bvh@10~", "clip.bvh@30~").json["asked"]
@@ -128,6 +130,7 @@ def test_a_tween_begins_and_ends_as_fast_as_the_clip(run: Run) -> None:
     assert rot.angle(read_motion("out.json").rotations[0], read_motion("clip.bvh").rotations[10]).max() < 1e-6
 
 
+@pytest.mark.long
 def test_a_frame_of_a_clip_is_passed(run: Run) -> None:
     write_motion("clip.bvh", clip())
     assert tween(run, "clip.bvh@0", FIFTH, "--via", "clip.bvh@15@4").json["asked"]["via"] == [4]
@@ -192,6 +195,7 @@ def test_a_clip_on_another_rig_is_retargeted_with_its_movement(run: Run) -> None
 # --- by name ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_tween_of_named_postures_is_of_their_corpus(run: Run) -> None:
     named = run("tween", "ballet/arabesque", "ballet/fifth", "--report", "-").json
     files = tween(run, BALLET / "postures" / "arabesque.json", FIFTH).json
@@ -239,6 +243,7 @@ def test_posture_takes_what_sheet_numbers(run: Run, words: Sequence[object], fra
     assert rot.angle(find_posture("A.json").posture.rotations, ballet_clip("jump").rotations[frame]).max() < 1e-6
 
 
+@pytest.mark.long
 def test_a_posture_by_name_is_drawn_measured_and_converted(run: Run) -> None:
     assert run("sheet", "ballet/arabesque", "-o", "sheet.png").out.startswith("sheet.png: 1 posture of 1, ")
     assert run("sheet", "ballet/adagio@23", "-o", "one.png").out.startswith("one.png: 1 posture of 68, ")
@@ -278,3 +283,23 @@ def test_postures_lists_what_other_commands_take_and_draws_it(run: Run) -> None:
         ran = run("postures", *words)
         assert (ran.code, ran.out) == (2, "")
         assert message in ran.err
+
+
+@pytest.mark.parametrize("source", ["hands", "walk-hexapod", "three.score"])
+def test_commands_that_take_one_clip_name_one_of_several(source: str, run: Run) -> None:
+    Path("three.score").write_bytes((bundled("corpora") / "hands" / "hands.score").read_bytes())
+    for words in (
+        ("convert", source, "out.json"),
+        ("loop", source, "-o", "out.json"),
+        ("measure", source, "--corpus", "ballet"),
+        ("posture", source, "--frame", 1, "-o", "out.json"),
+        ("render", source, "-o", "out.gif"),
+        ("vary", source, "-o", "out.json"),
+    ):
+        ran = run(*words)
+        assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+        found = re.fullmatch(r"error: (\S+): holds \d clips; name one, such as (\S+)\n", ran.err)
+        assert found, ran.err
+        assert found[1] == source
+    assert run("convert", found[2], "out.json").code == 0
+    assert run("posture", source, "--frame", 1, "--clip", found[2].rpartition("/")[2], "-o", "A.json").code == 0

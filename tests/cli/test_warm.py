@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import io
+import re
+import resource
 import shutil
 import subprocess
 import sys
@@ -267,6 +270,36 @@ def test_the_first_search_says_what_it_waits_for_before_it_learns_a_corpus(
     ]:
         assert run("tween", *words).err.startswith(said)
     assert run("vary", "macarena", "-o", "v.json").err == "compiling\nerror: learning\n"
+
+
+@pytest.mark.parametrize("fault", ["killed", "full"])
+def test_what_could_not_be_stored_is_compiled_by_the_next_run(
+    run: Run, own_cache: Path, monkeypatch: pytest.MonkeyPatch, fault: str
+) -> None:
+    """A worker that is killed, or that finds the disk full, leaves its functions to the next run."""
+    for file in [*own_cache.glob("walks.means-*/mean_rotations-*.nbc"), *own_cache.glob("all-*")]:
+        file.unlink()
+    start, popen = warming._start, subprocess.Popen
+
+    def failing(programs: Any, **options: Any) -> Any:
+        if fault == "full":  # files hold no more than the lock's
+            limit = functools.partial(resource.setrlimit, resource.RLIMIT_FSIZE, (64, 64))
+            with monkeypatch.context() as patch:
+                patch.setattr(subprocess, "Popen", functools.partial(popen, preexec_fn=limit))
+                return start(programs, **options)
+        for worker in (workers := start(programs, **options)):
+            worker.kill()
+        return workers
+
+    # The functions that lack are those of one of the works.
+    monkeypatch.setattr(warming, "_wait_or_compile", lambda _: warming._compile([warming.turn], 1, hidden=True))
+    with monkeypatch.context() as patch:
+        patch.setattr(warming, "_start", failing)
+        done = run("warm")
+    assert done.code == 2
+    said = r"\d+ of \d+ functions could not be compiled and stored; is the disk full\? run it again"
+    assert re.fullmatch(rf"error: \S+: {said}\n", done.err)
+    assert run("warm").out.startswith(f"compiled {len(codecache.decorated_names())} functions in ")
 
 
 def test_a_place_that_cannot_be_written_is_an_error_in_one_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -68,6 +68,7 @@ def opened(tabs: Tabs, tmp_path: Path) -> Iterator[Callable[..., Any]]:
         yield call
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_cell_plays_the_movement_and_asks_nothing_of_the_network(kind: str, opened: Callable[..., Any]) -> None:
     thing = KINDS[kind]()
@@ -92,6 +93,7 @@ def test_the_frame_knows_nothing_of_the_notebook(opened: Callable[..., Any]) -> 
     assert frame.evaluate("fetch('https://example.org').then(() => 'open', () => 'shut')") == "shut"
 
 
+@pytest.mark.long
 def test_a_film_is_saved_from_the_frame(opened: Callable[..., Any]) -> None:
     tab = opened(html_of(ADAGIO.resample(25.0).slice(0, 6)))
     with tab.expect_download(timeout=60_000) as download:
@@ -100,11 +102,13 @@ def test_a_film_is_saved_from_the_frame(opened: Callable[..., Any]) -> None:
     assert download.value.failure() is None
 
 
+@pytest.mark.long
 def test_cells_stand_beside_each_other(opened: Callable[..., Any]) -> None:
     tab = opened(*(html_of(ADAGIO.slice(0, frames)) for frames in (3, 5, 8)))
     assert [frame.evaluate("motionmind.motion.length") for frame in tab.frames[1:]] == [3, 5, 8]
 
 
+@pytest.mark.long
 def test_names_are_words_and_never_markup(opened: Callable[..., Any]) -> None:
     name = "</title></script>\"'><script>window.taken = 1</script><b>&amp;"
     tab = opened(html_of(replace(ADAGIO, name=name)), vary(replace(ADAGIO, name=name))._repr_html_())
@@ -114,11 +118,13 @@ def test_names_are_words_and_never_markup(opened: Callable[..., Any]) -> None:
     assert tab.frames[1].evaluate("document.querySelector('h1').textContent")[:20] == name[:20]
 
 
+@pytest.mark.long
 def test_a_tween_s_words_stand_above_it() -> None:
     html = KINDS["tween"]()._repr_html_()
     assert re.search(r"^<p>\d moves, \d\.\d s\. [^<]+</p>.*<iframe ", html, re.S)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_cell_is_the_same_each_time_and_a_fraction_of_the_page(kind: str) -> None:
     thing = KINDS[kind]()
@@ -139,6 +145,7 @@ def test_movement_that_is_too_long_is_said_to_be() -> None:
     assert "<iframe" in html_of(motion.slice(0, frames - 1))
 
 
+@pytest.mark.long
 def test_movement_imports_nothing_that_draws() -> None:
     code = (
         "import sys; from motionmind import Motion, Tween, Variation\n"

@@ -24,6 +24,8 @@ pytest.importorskip("anywidget", reason="anywidget is not installed")
 
 from motionmind.notebook import Player
 
+pytestmark = pytest.mark.long
+
 ADAGIO = replace(ballet_clip("adagio").resample(10.0).slice(0, 21), name="adagio")  # 0 to 2 seconds
 
 

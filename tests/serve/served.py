@@ -15,6 +15,7 @@ from motionmind._typing import Floats
 from motionmind.body.human import human23
 from motionmind.body.motion import Posture
 from motionmind.body.skeleton import Skeleton
+from motionmind.connections import config
 from motionmind.geometry import rotations as rot
 from motionmind.names.postures import find_posture
 from motionmind.serve.guard import Guard
@@ -48,17 +49,14 @@ RIG = {
 def serving(application: Any, **options: Any) -> Iterator[str]:
     """Serve an application at a free port of this computer, behind the guard; yield its address."""
     with socket.create_server(("127.0.0.1", 0)) as listening:
-        config = uvicorn.Config(
-            Guard(application, "127.0.0.1", **options), log_level="critical", ws="none", timeout_graceful_shutdown=1
-        )
-        server = uvicorn.Server(config)
+        server = uvicorn.Server(config(Guard(application, "127.0.0.1", **options)))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
         thread.start()
         try:
             yield f"http://127.0.0.1:{listening.getsockname()[1]}"
         finally:
             server.should_exit = True
-            thread.join(10.0)
+            thread.join(60.0)
 
 
 def wire(skeleton: Skeleton, stands: Sequence[float] = STANDS) -> dict[str, Any]:

@@ -52,6 +52,7 @@ def test_the_client_finds_the_model_and_the_schema_accepts_it(url: str) -> None:
     assert abs(lowest) < 1e-9  # it stands on the floor
 
 
+@pytest.mark.long
 def test_poses_are_exact_and_each_stretch_has_its_certificate(url: str) -> None:
     asked = {0: A, 40: B, 90: C}
     document, (sample,) = generate(url, ask([keyframe(*one) for one in asked.items()], 91))
@@ -68,6 +69,7 @@ def test_poses_are_exact_and_each_stretch_has_its_certificate(url: str) -> None:
         assert one["moves"] > 0
 
 
+@pytest.mark.long
 def test_movement_goes_on_through_a_pose(url: str) -> None:
     _, (sample,) = generate(url, ask([keyframe(0, A), keyframe(50, B), keyframe(90, C)], 91))
     velocity = 30.0 * np.diff(root_of(sample, "pelvis")[48:53], axis=0)
@@ -84,6 +86,7 @@ def test_the_same_request_has_the_same_answer(url: str) -> None:
     assert client.generate(url, request) == client.generate(url, request)
 
 
+@pytest.mark.long
 def test_samples_differ_and_so_do_seeds(url: str) -> None:
     constraints = [keyframe(0, A), keyframe(60, B)]
     document, best = generate(url, ask(constraints, 61, options={"num_samples": 3}))
@@ -97,6 +100,7 @@ def test_samples_differ_and_so_do_seeds(url: str) -> None:
     assert costs[0] == min(costs)
 
 
+@pytest.mark.long
 def test_waypoints_are_passed_and_faced(url: str) -> None:
     frames, places = [0, 20, 40, 60, 80], [[0.0, 0.0], [0.2, 0.1], [0.4, 0.3], [0.5, 0.6], [0.6, 0.9]]
     path = {"type": "root_path", "frames": frames, "positions_xz": places, "heading_radians": [0, 0.1, 0.3, 0.5, 0.6]}
@@ -108,6 +112,7 @@ def test_waypoints_are_passed_and_faced(url: str) -> None:
     assert len(certificates(document)[0]["stretches"]) == 4
 
 
+@pytest.mark.long
 def test_waypoints_of_a_dense_path_are_all_passed(url: str) -> None:
     frames = list(range(0, 81, 5))
     places = [[0.01 * frame, 0.1 * np.sin(0.05 * frame)] for frame in frames]
@@ -203,6 +208,7 @@ def test_frames_are_those_of_the_request(fps: float, url: str) -> None:
     assert_at(sample, 50, B)
 
 
+@pytest.mark.long
 def test_a_foreign_rig_gets_movement_of_its_own(url: str) -> None:
     a, b = on_rig(A), on_rig(B)
     document, (sample,) = generate(url, ask([keyframe(0, a), keyframe(45, b)], 46, a.skeleton))

@@ -1,0 +1,122 @@
+"""The command that transcribes a recording into a score."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from motionmind.cli import completion
+from motionmind.cli.files import check_outputs
+from motionmind.cli.options import HOME, Section, command, option, outputs, reading
+from motionmind.cli.pictures import CLIP, FIRST, LAST
+from motionmind.cli.printing import count, print_written
+from motionmind.cli.sources import parse_movement, read_movement, select_part
+from motionmind.cli.types import FILE, Number
+from motionmind.files import all_or_none, write_atomically
+from motionmind.tween.counts import TEMPO_RANGE_BPM
+
+if TYPE_CHECKING:
+    from motionmind.transcription import Transcription
+
+SCORE = ".score"
+COMPARISONS = (".gif", ".mp4", ".html", ".png", ".pdf")
+
+
+@command("motionmind transcribe ballet/adagio -o adagio.score --tolerance 12")
+@click.argument("source", shell_complete=completion.movement)
+@outputs(f"Score to write ({SCORE}), or the score and the recording on one stage ({', '.join(COMPARISONS)}).")
+@CLIP
+@FIRST
+@LAST
+@option(
+    "--tolerance",
+    section=Section.MOTION,
+    type=Number(1.0, 90.0),
+    default=6.0,
+    metavar="DEGREES",
+    help="Deviation of a bone's direction that the score may leave; half as many centimetres of the pelvis.",
+)
+@option(
+    "--tempo",
+    section=Section.MOTION,
+    type=Number(*TEMPO_RANGE_BPM),
+    metavar="BPM",
+    help="Counts per minute in which durations are written  [default: seconds]",
+)
+@option("--report", section=Section.OUTPUT, type=FILE, help="File of the deviations over time, as JSON.")
+@reading
+@HOME
+def transcribe(
+    source: str,
+    outputs: tuple[Path, ...],
+    report: Path | None,
+    name: str | None,
+    start: int,
+    end: int,
+    tolerance: float,
+    tempo: float | None,
+    home: Path | None,
+    **options: Any,
+) -> None:
+    """Transcribe a recording into a score, which a person can read, change and compose.
+
+    SOURCE is a motion file, a score, a corpus by name or folder, CORPUS/CLIP, or a clip of a glTF file such as
+    'hero.glb#Dance'. The score has the fewest postures between which every frame is followed within the tolerance.
+    docs/notation.md explains the language of scores.
+    """
+    from motionmind.transcription import transcribe as to_score
+
+    named = parse_movement(source, home)
+    files = [(path, (SCORE, *COMPARISONS)) for path in outputs]
+    check_outputs(files + ([(report, ())] if report else []), named.source.paths)
+    whole = read_movement(named.source, name, home, **options)
+    frames = select_part(named, whole, start, end)
+    found = to_score(whole.slice(frames.start, frames.stop), tolerance, tempo=tempo)
+    with all_or_none():
+        for path in outputs:
+            _write(path, found)
+        if report:
+            write_atomically(report, found.report())
+    for line in _lines(found):
+        click.echo(line)
+    print_written([*outputs, *([report] if report else [])])
+
+
+def _write(path: Path, found: Transcription) -> None:
+    """Write the score, or a picture, film or page of it beside the recording."""
+    suffix = path.suffix.lower()
+    if suffix == SCORE:
+        write_atomically(path, found.text.encode())
+    elif suffix == ".html":
+        from motionmind.render.group_page import write_group_page
+
+        write_group_page(path, found.compared())
+    elif suffix in (".png", ".pdf"):
+        from motionmind.render.group_sheet import write_group_sheet
+
+        write_group_sheet(path, found.compared())
+    else:
+        from motionmind.render.film import write_group_film
+
+        write_group_film(path, found.compared())
+
+
+def _lines(found: Transcription) -> Iterator[str]:
+    """Format what the score holds and what it leaves out."""
+    import numpy as np
+
+    seconds = float(found.recording.times[-1] - found.recording.times[0])
+    yield (
+        f"{count(len(found.keys), 'posture')} in {seconds:.1f} s, the fewest within {found.tolerance:g} degrees "
+        f"and {0.5 * found.tolerance:g} cm"
+    )
+    for part, values in found.deviation.degrees.items():
+        off, most = np.percentile(values, [95.0, 100.0])
+        line = f"{part:6} {off:3.0f} degrees off in 95 % of frames at most, {most:.0f} in all"
+        cannot = max(found.deviation.unwritten[part])
+        yield line + (f"; up to {cannot:.0f} cannot be written" if cannot > 0.5 * found.tolerance else "")
+    off, most = np.percentile(found.deviation.centimetres, [95.0, 100.0])
+    yield f"pelvis {off:3.0f} cm off in 95 % of frames at most, {most:.0f} in all"

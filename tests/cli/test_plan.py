@@ -1,0 +1,46 @@
+"""The plan command: what it prints and refuses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from command_line import Run
+
+
+def test_a_plan_says_how_much_floor_a_movement_needs(run: Run) -> None:
+    done = run("plan", "ballet/temps-lie", "-o", "plan.svg", "--tempo", "108")
+    assert done.out.startswith("plan.svg: path of ")
+    assert "on a floor of" in done.out
+    assert "counts at 108 a minute" in Path("plan.svg").read_text("utf-8")
+
+
+def test_a_movement_that_leaves_the_stage_is_noted(run: Run) -> None:
+    done = run("plan", "ballet/temps-lie", "-o", "plan.png", "--stage", "1x1")
+    assert "ballet/temps-lie leaves the stage" in done.err
+    assert "edge at" in done.err
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--stage", "8"], "'8' is not a width and a depth in metres such as 8x6"),
+        (["--stage", "8x"], "such as 8x6"),
+        (["--stage", "0x6"], "from 1 to 200 m"),
+        (["--stage", "8x999"], "from 1 to 200 m"),
+        (["--tempo", "0"], "0"),
+        (["--every", "0"], "0"),
+        (["--from", "9999"], "9999"),
+    ],
+)
+def test_bad_options_are_refused_and_nothing_is_written(run: Run, options: list[str], words: str) -> None:
+    done = run("plan", "ballet/adagio", "-o", "plan.svg", *options)
+    assert done.code == 2
+    assert words in done.err
+    assert not Path("plan.svg").exists()
+
+
+def test_a_plan_is_svg_or_png(run: Run) -> None:
+    done = run("plan", "ballet/adagio", "-o", "plan.gif")
+    assert done.code == 2
+    assert ".svg" in done.err
