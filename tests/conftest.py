@@ -60,6 +60,18 @@ TESTS = Path(__file__).parent
 SHARED_DATA = TESTS.parents[1] / "shared" / "data"
 
 
+def _runs_all(config: pytest.Config) -> bool:
+    """Return whether all tests were asked for, rather than some files or folders."""
+    asked = {(config.invocation_params.dir / argument).resolve() for argument in config.args}
+    return not asked.isdisjoint({TESTS, TESTS.parent})
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Leave the long tests out of `pytest` alone: they run by their mark, or if their file is named."""
+    if _runs_all(config) and not config.option.markexpr:
+        config.option.markexpr = "not long"
+
+
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile before all tests what each worker, or each process that a test starts, would else compile for itself.
 
@@ -68,10 +80,8 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     the time in which it collects them. A few tests compile what they need.
     """
     config = session.config
-    asked = {(config.invocation_params.dir / argument).resolve() for argument in config.args}
-    is_whole = not asked.isdisjoint({TESTS, TESTS.parent})
     is_worker, only_lists = hasattr(config, "workerinput"), config.option.collectonly
-    if not is_whole or only_lists:
+    if not _runs_all(config) or only_lists:
         return
     sys.dont_write_bytecode = False  # of tests that have changed, for the next time
     if is_worker:

@@ -18,13 +18,16 @@ from motionmind import (
     MotionMindError,
     WrongTypeError,
     chaos,
+    clean,
     discretize,
     formats,
     gaps,
     learned,
     metrics,
+    music,
     plots,
     retarget,
+    transcription,
 )
 from motionmind import credits as crediting
 from motionmind.corpus.gather import Gathering
@@ -32,8 +35,10 @@ from motionmind.corpus.gather import Gathering
 # Made by MotionMind and given to its users, who make none; errors and warnings take any message.
 ANSWERS = {
     "Bridge",
+    "Cleaning",
     "Corpus",
     "Credit",
+    "Deviation",
     "Explanation",
     "Figure",
     "FoundPosture",
@@ -45,6 +50,7 @@ ANSWERS = {
     "Sighting",
     "Source",
     "StateSpace",
+    "Transcription",
     "Tween",
     "TweenReport",
     "Wait",
@@ -87,7 +93,23 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
     gathering |= dict.fromkeys(("title", "author", "source", "licence", "citation", "performer"), "")
     assert gathering.keys() == Gathering.__annotations__.keys()
     path = folder / "out"
+    beats, sound = music.Beats([0.0, 0.5]), music.Sound(np.zeros((8, 1)), 8000)
+    path.with_suffix(".wav").write_bytes(sound.encode("WAV"))
+    (folder / "beats.txt").write_text("0.5 1")
     return {
+        "Beats": (music.Beats, {"times": [0.0, 0.5]}),
+        "Beats.grid": (beats.grid, {"every": 2, "seconds": 3.0}),
+        "Beats.seconds": (beats.seconds, {"count": 3}),
+        "Beats.starting_at": (beats.starting_at, {"seconds": 0.2}),
+        "Sound": (music.Sound, {"samples": sound.samples, "rate": 8000}),
+        "Sound.encode": (sound.encode, {"kind": "WAV"}),
+        "Sound.part": (sound.part, {"start": 0.0, "seconds": 1.0}),
+        "read_beats": (music.read_beats, {"path": folder / "beats.txt"}),
+        "read_sound": (music.read_sound, {"path": path.with_suffix(".wav")}),
+        "clean_motion": (clean.clean_motion, {"motion": known["tween"].motion, "without": ["feet"], "engine": engine}),
+        "draw_cleaning": (plots.draw_cleaning, {"cleaning": clean.clean_motion(known["tween"].motion)}),
+        "draw_floor_plan": (plots.draw_floor_plan, {"motion": known["tween"].motion}),
+        "find_overstep": (plots.find_overstep, {"motion": motion, "stage": (8.0, 6.0)}),
         "draw_angles": (plots.draw_angles, {"motion": known["tween"].motion}),
         "compose": (mm.compose, {"path": folder / "bends.score", "clip": "bends"}),
         "draw_sheet": (mm.draw_sheet, {"motion": motion, "frames": [0]}),
@@ -108,6 +130,7 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
         "read_report": (mm.read_report, {"path": folder / "report.json"}),
         "read_score": (mm.read_score, {"path": folder / "bends.score"}),
         "read_variation": (mm.read_variation, {"path": folder / "variation.json"}),
+        "transcribe": (transcription.transcribe, {"motion": motion.slice(0, 2), "tolerance": 6.0, "name": "c"}),
         "to_human23": (retarget.to_human23, {"movement": motion}),
         "vary": (mm.vary, {"piece": motion}),
         "draw_attractor": (plots.draw_attractor, {"path": path.with_suffix(".svg"), "variation": variation}),
@@ -190,7 +213,21 @@ INNER = {"Piece.around", "Piece.arrange", "Piece.chunks", "Piece.ends", "Piece.i
 def public() -> dict[str, Callable[..., Any]]:
     """Every public function, class and method that takes an argument, by name."""
     found: dict[str, Callable[..., Any]] = {}
-    rooms = (mm, chaos, crediting, discretize, formats, gaps, learned, metrics, plots, retarget)
+    rooms = (
+        mm,
+        chaos,
+        clean,
+        crediting,
+        discretize,
+        formats,
+        gaps,
+        learned,
+        metrics,
+        music,
+        plots,
+        retarget,
+        transcription,
+    )
     for name, thing in ((name, getattr(room, name)) for room in rooms for name in room.__all__):
         if (
             name in ANSWERS | PROTOCOLS

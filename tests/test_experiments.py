@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import kimodo_files
 import numpy as np
 import pytest
 
@@ -451,6 +452,145 @@ def test_in_betweening_is_measured_on_what_is_bundled(tmp_path: Path, monkeypatc
     assert "The worst: heian" in (tmp_path / "README.md").read_text()
 
 
+# --- beside Kimodo ---------------------------------------------------------------------------------------------------
+
+
+def test_ways_through_key_frames_meet_them_in_bundled_movement(tmp_path: Path) -> None:
+    from experiments.harness import Setting, answer
+    from experiments.kimodo.run import CALM, CUBIC, GAPS, KIMODO, VIAS
+
+    rows = answer("kimodo", Setting(quick=True, data=None), Here(), tmp_path)
+    assert {(row["given"], row["kind"]) for row in rows} == {
+        (given, kind) for given in ("asked", "1 s", "2 s") for kind in (KIMODO, CUBIC, GAPS, CALM, VIAS)
+    }
+    for row in rows:
+        assert row["keys"] == (2 if row["given"] == "1 s" else 1)
+        if row["kind"] != VIAS:  # which fix neither place nor time
+            assert row["worst_mm"] == row["worst_degrees"] == 0.0
+        if row["kind"] == KIMODO:
+            assert row["off"] == 0.0
+        else:
+            assert row["off"] > 10.0
+    assert "| Kimodo | 0 | 0 | 0 | 0 |" in (tmp_path / "README.md").read_text()
+
+
+@pytest.mark.filterwarnings("ignore:.*the floor")  # so little movement does not show it
+def test_key_frames_that_were_asked_are_read_beside_the_movement(tmp_path: Path) -> None:
+    from experiments.kimodo import material
+    from motionmind.formats._kimodo import from_kimodo
+    from motionmind.geometry import rotations as rot
+
+    arrays = kimodo_files.movement(30, frames=46)
+    body, local, root = from_kimodo(arrays, "a.npz")
+    folder = tmp_path / "kimodo" / "one"
+    folder.mkdir(parents=True)
+    np.savez(folder / "motion.npz", **arrays | {"foot_contacts": np.ones((46, 4), dtype=bool)})
+    turns = {frame: rot.log(local[frame]).tolist() for frame in (5, 10, 31)}
+    asked = [
+        {"type": "root2d", "frame_indices": [3], "smooth_root_2d": [[0.0, 0.0]]},
+        *(
+            {"type": kind, "frame_indices": frames}
+            | {"local_joints_rot": [turns[frame] for frame in frames]}
+            | {"root_positions": (root[frames] + [0.0, 0.0, 0.1]).tolist()}
+            for kind, frames in (("fullbody", [10, 31]), ("left-hand", [5]))
+        ),
+    ]
+    (folder / "constraints.json").write_text(json.dumps(asked))
+    found = material.demo(str(tmp_path), "one")
+    assert len(found.motion) == 46
+    assert list(found.keys("asked")) == [0, 10, 31, 45]
+    assert list(found.keys("1 s")) == [0, 30, 45]
+    for frame in (10, 31):
+        wanted = found.motion.posture(frame)
+        assert rot.angle(found.asked[frame].rotations, wanted.rotations).max() < 1e-6
+        np.testing.assert_allclose(found.asked[frame].root - wanted.root, [0.0, 0.0, 0.1], atol=1e-6)
+    steps = np.diff(body.positions(local, root)[..., [0, 2]], axis=0)
+    feet = [body.index(f"{side}{joint}") for side in ("Left", "Right") for joint in ("Foot", "ToeBase")]
+    wanted_mm = 1000.0 * np.linalg.norm(steps[:, feet], axis=-1).mean()
+    assert material.marked_slide(str(tmp_path), "one") == pytest.approx(wanted_mm)
+
+
+def test_a_question_without_its_movement_is_skipped_in_one_line(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "experiments", "kimodo", "--data", str(tmp_path), "--out", str(tmp_path / "out")],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == "kimodo: skipped, its recorded movement is not there (--data)\n"
+    assert not (tmp_path / "out").exists()
+
+
+# --- the clock --------------------------------------------------------------------------------------------------------
+
+
+def shown_signs(rng: np.random.Generator, person: str, count: int) -> list[dict[str, Any]]:
+    """Signs of recordings of a person, of whom each has an own strength, at three speeds; some show nothing."""
+    from experiments.clock.held_out import SIGNS
+
+    rows = []
+    strength = rng.uniform(0.7, 1.4)
+    for number in range(count):
+        shown = strength * rng.lognormal(sigma=0.2, size=len(SIGNS))
+        shown[rng.uniform(size=len(SIGNS)) < 0.2] = np.nan
+        for speed in (0.5, 1.0, 2.0):
+            usual = [speed**2, 12.0 * speed**2, 0.4 * speed, speed**2, 1.2 * speed**2, speed**2, 0.9]
+            signs = dict(zip(SIGNS, shown * usual, strict=True)) | {"leg": 0.9, "pull": speed**2}
+            rows.append(
+                {"group": person, "family": f"{person}{number // 2}", "recording": f"{person}{number}", "speed": speed}
+                | {"of": "whole"}
+                | signs
+            )
+    return rows
+
+
+def test_bounds_chosen_by_rule_question_none_of_those_they_were_chosen_on() -> None:
+    from experiments.clock.held_out import choose_bounds, questioned, signs_of
+    from motionmind.body.tempo import question_signs
+
+    rng = np.random.default_rng(0)
+    people = [f"p{number}" for number in range(6)]
+    rows = [row for person in people for row in shown_signs(rng, person, 10)]
+    for margin in (0.0, 0.2):
+        bounds = choose_bounds(rows, margin)
+        assert not any(question_signs(signs_of(row), bounds) for row in rows if row["speed"] == 1.0)
+    tight, wide = (
+        [row["hit"] for row in questioned(rows, [(people[:3], people[3:])], margin) if row["speed"] == 1.0]
+        for margin in (0.0, 0.2)
+    )
+    assert sum(tight) > sum(wide)
+    assert all(narrow or not broad for narrow, broad in zip(tight, wide, strict=True))
+    tried = questioned(rows, [(people[:3], people[3:]), (people[3:], people[:3])], 0.0)
+    assert [row["group"] for row in tried] == [row["group"] for row in (*rows[90:], *rows[:90])]
+    strange = [row | {"fall": 500.0} if row["group"] == "p5" else row for row in rows]
+    assert choose_bounds(strange[:150], 0.0) == choose_bounds(rows[:150], 0.0)
+    changed = [row["hit"] for row in questioned(strange, [(people[:5], people[5:])], 0.0) if row["speed"] == 1.0]
+    assert all(changed)
+
+
+def test_intervals_of_shares_are_over_families() -> None:
+    from experiments.clock.held_out import share
+
+    row = {"group": "a", "of": "whole", "speed": 1.0}
+    rows = [row | {"family": f"f{number}", "hit": number < 5} for number in range(10)]
+    assert share(rows, "whole", 1.0).startswith("50.0 (2")
+    assert share([one for one in rows for _ in range(50)], "whole", 1.0) == share(rows, "whole", 1.0)
+    assert share([one | {"hit": False} for one in rows], "whole", 1.0) == "0.0 (0.0 to 30.0)"
+    assert share([one | {"hit": True} for one in rows], "whole", 1.0) == "100.0 (70.0 to 100.0)"
+
+
+def test_the_clock_of_bundled_movement_is_tried(tmp_path: Path) -> None:
+    from experiments.clock.run import SPEEDS
+    from experiments.harness import Setting, answer
+
+    rows = answer("clock", Setting(quick=True, data=None), Here(), tmp_path)
+    assert {row["speed"] for row in rows} == {1.0, *SPEEDS}
+    assert not any(row["questioned"] for row in rows if row["speed"] == 1.0)
+    assert "Bounds chosen by rule" not in (tmp_path / "README.md").read_text()  # there is one person
+
+
 # --- variety ----------------------------------------------------------------------------------------------------------
 
 
@@ -649,13 +789,28 @@ def test_performances_are_read_on_bodies_of_their_own_whoever_reads_them() -> No
     assert min(spent.reading, spent.retargeting, spent.taking) > 0.0
 
 
+# A process of its own, in which nothing else frees memory. It holds the array until the watching thread has seen it.
+_HOLDING = """
+import time
+import numpy as np
+from experiments.scale.memory import Memory, own_memory
+
+before = own_memory()
+with Memory() as memory:
+    held = np.ones(8_000_000)
+    until = time.monotonic() + 60.0
+    while memory.most < before + 40.0 and time.monotonic() < until:
+        time.sleep(0.01)
+    del held
+if own_memory() < before + 20.0 and memory.most > before + 40.0:
+    print("the most is known after it is gone")
+"""
+
+
 def test_memory_is_watched_at_its_most() -> None:
-    from experiments.scale.memory import Memory, own_memory
+    from experiments.scale.memory import own_memory
 
     if not own_memory():
         pytest.skip("this system does not say how much memory is a process's own")
-    before = own_memory()
-    with Memory() as memory:
-        held = np.ones(8_000_000)
-    assert memory.most > before + 40.0
-    assert held[0] == 1.0
+    done = subprocess.run([sys.executable, "-c", _HOLDING], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "the most is known after it is gone\n"), done.stderr

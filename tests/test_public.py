@@ -53,6 +53,7 @@ def test_every_public_name_exists_and_is_documented(name: str) -> None:
         assert not undocumented
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
 def test_every_public_name_has_an_example_that_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

@@ -83,6 +83,7 @@ def shares(found: tuple[Credit, ...]) -> dict[str, float]:
 # --- sums -------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @given(st.lists(credited, max_size=8), st.randoms())
 def test_shares_add_up_to_one_in_any_order(parts: list[Credit], random: object) -> None:
     found, whole = add_up(parts), math.fsum(one.share for one in parts)
@@ -121,6 +122,7 @@ def test_a_tween_wholly_from_one_clip_credits_that_clip_alone() -> None:
     assert found.credits == (Credit(1.0, "plies", "Ada", "alone", "", "Grace", "", "CC-BY-4.0"),)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("end", [1, 3, 12])
 def test_nothing_else_is_credited_than_that_clip_and_the_engine(end: int) -> None:
     found = alone().tween(clip().posture(0), clip().posture(end))
@@ -273,6 +275,7 @@ def test_a_variation_of_a_corpuss_clip_names_its_performer_corpus_and_licence(tm
 # --- variations -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_variation_credits_the_piece_and_each_insertion_by_time(tmp_path: Path) -> None:
     variation = vary(clip("adagio"), ballet(), depart=0.3, length=30, alternatives=1)
     motion = variation.motion()
@@ -399,6 +402,7 @@ def test_a_ledger_as_text_names_all_licences() -> None:
 # --- the command line and the page ------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_the_command_says_the_same_of_movement_and_of_its_report(run: Run, tmp_path: Path) -> None:
     write_motion(tmp_path / "tween.glb", tween().motion)
     (tmp_path / "report.json").write_text(json.dumps(tween().report()))
@@ -450,6 +454,7 @@ def test_bad_input_is_one_line(run: Run, tmp_path: Path) -> None:
         assert ran.err.count("\n") == 1
 
 
+@pytest.mark.long
 def test_exports_of_what_forbids_derivatives_say_so(run: Run, tmp_path: Path) -> None:
     for number, name in enumerate(("plies", "tendus")):
         write_motion(tmp_path / f"clip{number}.json", clip(name))

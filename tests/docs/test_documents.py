@@ -22,6 +22,7 @@ import click
 import numpy as np
 import pytest
 from bundled_clips import ballet_clip
+from click_tracks import at_tempo, clicks
 from command_line import Run
 from ingredients import altered
 from PIL import Image, ImageChops
@@ -214,11 +215,12 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with two recordings, a character and a licence, as a user has them."""
+    """A folder with two recordings, a song, a character and a licence, as a user has them."""
     folder = tmp_path_factory.mktemp("recordings")
     for name, clip, frames in (("clip", "adagio", 600), ("plies", "plies", 300)):
         write_motion(folder / f"{name}.bvh", ballet_clip(clip).resample(30.0).slice(0, frames))
     write_motion(folder / "character.glb", ballet_clip("plies").slice(0, 1))
+    (folder / "song.wav").write_bytes(clicks(at_tempo(108.0, 0.4, 39.0), 40.0).encode("WAV"))
     (folder / "LICENCE.txt").write_text("Free for all uses.\n")
     return folder
 
@@ -228,6 +230,13 @@ def here(tmp_path: Path, home: Path, run: Run, monkeypatch: pytest.MonkeyPatch) 
     """An empty folder outside of any checkout, where commands run."""
     monkeypatch.setenv("MOTIONMIND_HOME", str(home))
     return tmp_path
+
+
+def write_files(document: Path, folder: Path) -> None:
+    """Write the files that a document's commands read: its blocks that begin with a comment and a name."""
+    for block in blocks(document.read_text("utf-8")):
+        if named := re.match(r"# (\S+\.toml)\n", block.text):
+            (folder / named[1]).write_text(block.text, "utf-8")
 
 
 def call(run: Run, line: str) -> None:
@@ -243,6 +252,7 @@ def test_readme_leads_with_the_two_commands() -> None:
     assert commands[1] == 'pip install -e ".[dev]" && pytest'
 
 
+@pytest.mark.long
 def test_the_first_command_runs(here: Path) -> None:
     text = README.read_text("utf-8")
     command = next(line for block in blocks(text) for line in commands_of(block))
@@ -263,6 +273,7 @@ def test_the_commands_and_the_python_of_a_guide_run(
     shutil.copytree(recordings, here, dirs_exist_ok=True)
     namespace: dict[str, object] = {"__name__": "__main__"}
     first = document == README  # whose first command runs in a test of its own
+    write_files(document, here)
     for block in blocks(document.read_text("utf-8")):
         for line in commands_of(block)[first:]:
             if not line.startswith("motionmind serve"):  # which does not end
@@ -278,6 +289,7 @@ def test_the_commands_and_the_python_of_a_guide_run(
             assert path.exists() or path.with_stem(f"{path.stem}-1").exists(), line
 
 
+@pytest.mark.long
 def test_the_proof_adds_up_and_would_not_if_an_ingredient_were_another(
     here: Path, run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -313,7 +325,8 @@ def test_the_gallery_shows_what_its_commands_make(here: Path, run: Run) -> None:
     text = GALLERY.read_text("utf-8")
     commands = [line for block in blocks(text) for line in commands_of(block)]
     shown = [GALLERY.parent / path for path in re.findall(r"^!\[.*\]\((.*)\)$", text, re.M)]
-    assert len(commands) == 10
+    assert len(commands) == 13
+    write_files(ROOT / "docs" / "how-to" / "ensembles.md", here)
     for command in commands:
         call(run, command)
     for path in shown:
@@ -389,6 +402,7 @@ def sources() -> list[Path]:
 CITES = r"\[(?:[A-Z][A-Za-z]*[0-9]{2}|MM)\]|references\.md#|(?:19|20)[0-9]{2}\b"
 
 
+@pytest.mark.long
 def test_every_citation_is_among_the_references() -> None:
     text = REFERENCES.read_text("utf-8")
     labels, listed = set(re.findall(r"^### (\S+)$", text, re.M)), simplified(text)
@@ -420,6 +434,7 @@ def test_readme_and_the_map_are_short() -> None:
     assert len((ROOT / "ARCHITECTURE.md").read_text("utf-8").split()) <= 1200
 
 
+@pytest.mark.long
 def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     pytest.importorskip("sphinx", reason="the extra docs is not installed")
     pytest.importorskip("myst_parser", reason="the extra docs is not installed")

@@ -85,16 +85,16 @@ def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
     script.write_text(
         "import multiprocessing, time\nfrom motionmind.executors.opening import open_team\n"
         "if __name__ == '__main__':\n    with open_team(2) as team:\n"
-        "        results = team.map(time.sleep, [0.3, 60, 60])\n        next(results)\n"  # the pool ends with its jobs
+        "        results = team.map(time.sleep, [0.3, 1000, 1000])\n        next(results)\n"  # the pool ends with jobs
         "        print(*(worker.pid for worker in multiprocessing.active_children()), flush=True)\n"
-        "        time.sleep(60)\n"
+        "        time.sleep(1000)\n"
     )
     with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE) as client:
         assert client.stdout is not None
         workers = [psutil.Process(int(number)) for number in client.stdout.readline().split()]
         assert len(workers) == 2
         client.send_signal(signal.SIGKILL)
-    assert psutil.wait_procs(workers, timeout=10)[1] == []
+    assert psutil.wait_procs(workers, timeout=60)[1] == []
 
 
 def test_a_cluster_that_goes_away_is_told() -> None:

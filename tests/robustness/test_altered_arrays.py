@@ -78,6 +78,7 @@ def use(engine: Engine, rng: random.Random) -> None:
         engine.check(pairs=10)
 
 
+@pytest.mark.long
 def test_a_thousand_alterations_are_each_an_error_in_a_line_or_work(
     built: Path, tmp_path: Path, empty_cache: Path
 ) -> None:

@@ -6,6 +6,7 @@ import errno
 import json
 import logging
 import os
+import pickle
 import random
 import resource
 import shutil
@@ -168,6 +169,117 @@ def test_damaged_code_is_thrown_away_compiled_again_and_said_once(
     assert (again.stdout.split()[-1], again.stderr) == ("0", "")
 
 
+OTHER = 12345  # another user's number
+
+
+def _of_another(path: Path) -> None:
+    os.chown(path, OTHER, OTHER)
+
+
+def _writable(path: Path) -> None:
+    path.chmod(0o777)
+
+
+def _moved_and_linked(path: Path) -> None:
+    path.rename(path.with_name("elsewhere"))
+    path.symlink_to("elsewhere")
+
+
+def _a_pipe(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
+POISONS: dict[str, tuple[str, Callable[[Path], None]]] = {
+    "others can write to the folder": ("cache/motionmind/compiled", _writable),
+    "all can write to the folder, and remove their own": (
+        "cache/motionmind/compiled",
+        lambda path: (path.chmod(0o1777), _of_another(path))[1],
+    ),
+    "the folder is another's": ("cache/motionmind/compiled", _of_another),
+    "others can exchange the folder": ("cache/motionmind", _writable),
+    "others can exchange a folder above": ("cache", _writable),
+    "another owns the folder above": ("cache/motionmind", _of_another),
+    "another owns the home": ("cache", _of_another),
+    "a link to a folder of another": (
+        "cache/motionmind/compiled",
+        lambda path: (_of_another(path), _moved_and_linked(path))[1],
+    ),
+    "files of another": ("**/*.nbc", _of_another),
+    "files that others can write": ("**/*.nbc", _writable),
+    "links to files": ("**/*.nbc", lambda path: (path.with_name("elsewhere").unlink(True), _moved_and_linked(path))[1]),
+    "pipes": ("**/*.nbc", _a_pipe),
+}
+
+
+class _Payload:
+    """Its pickle leaves a mark when it is loaded."""
+
+    def __init__(self, mark: Path) -> None:
+        self._mark = mark
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return os.mkdir, (str(self._mark),)
+
+
+def poison(home: Path) -> Path:
+    """Put a payload into all files, with the right hash; return the mark that it leaves."""
+    mark = home / "mark"
+    data = pickle.dumps(_Payload(mark))
+    for file in kept(home):
+        file.write_bytes(door.hashlib.sha256(data).digest() + data)
+    return mark
+
+
+def owners(folder: Path) -> dict[Path, int]:
+    """The owner of everything in a folder."""
+    return {path: path.lstat().st_uid for path in folder.rglob("*")}
+
+
+def test_a_payload_runs_where_only_the_user_could_have_put_it(compiled: Path, tmp_path: Path) -> None:
+    shutil.copytree(compiled, tmp_path / "home")
+    mark = poison(tmp_path / "home")
+    run(tmp_path / "home")
+    assert mark.exists()  # so the tests below can fail
+
+
+@pytest.mark.parametrize("place", ["cache", "tmp"])
+@pytest.mark.parametrize("kind", POISONS)
+def test_what_others_could_have_written_never_runs(compiled: Path, tmp_path: Path, kind: str, place: str) -> None:
+    where, change = POISONS[kind]
+    home = tmp_path / "home"
+    shutil.copytree(compiled, home)
+    if place == "tmp":  # where code is kept if the cache cannot hold it
+        where = where.replace("cache/motionmind", f"tmp/motionmind-{os.getuid()}")
+        if where == "cache":
+            pytest.skip("all users can write to a folder for temporary files")
+        (home / "tmp").mkdir(exist_ok=True)
+        (home / "cache/motionmind").rename(home / f"tmp/motionmind-{os.getuid()}")
+        (home / f"tmp/motionmind-{os.getuid()}").chmod(0o700)
+        (home / "cache").rmdir()
+        (home / "cache").write_text("not a folder")
+    mark = poison(home)
+    try:
+        for path in sorted(home.glob(where)):
+            change(path)
+    except PermissionError:
+        pytest.skip("only root can give files to others")
+    before = owners(home / "cache")
+    told, again = run(home), run(home)
+    assert not mark.exists()
+    if "another" in kind and "nbc" not in where:
+        assert owners(home / "cache") == before, "they stay, and nothing is put among them"
+    assert told.stdout.split() == ["8.0", "1.0", "2"]
+    if place == "cache":  # otherwise there may be nowhere else
+        assert told.stderr == again.stderr == ""
+        assert again.stdout.split()[-1] == "0", "it is kept where it is safe"
+
+
+def test_code_is_kept_where_all_that_users_write_is_their_groups_too(tmp_path: Path) -> None:
+    program = f"import os; os.umask(0o002)\n{PROGRAM}"
+    assert [run(tmp_path, program).stdout.split()[-1] for _ in range(2)] == ["2", "0"]
+
+
 def test_code_that_cannot_be_read_is_compiled_each_time(compiled: Path, tmp_path: Path) -> None:
     home = tmp_path / "home"
     shutil.copytree(compiled, home)
@@ -284,6 +396,7 @@ for _ in range(3):
         assert all(line[3] == "0" for line in lines) or not is_kept
 
 
+@pytest.mark.long
 def test_code_of_two_processes_is_not_mixed_up_in_a_third(tmp_path: Path) -> None:
     # numba's loops of sort and of argsort have one name and signature. If functions are counted, these have one number,
     # too: to sort takes three functions more before them.

@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 import os
+import pickle
 import re
 import shutil
 import subprocess
@@ -28,6 +29,16 @@ from motionmind.cli import main
 from motionmind.cli.application import app
 from motionmind.cli.types import Moves, Number, Numbers, Point, Size, Span, Whole
 from motionmind.display import displayed
+from motionmind.errors import (
+    CorpusError,
+    FormatError,
+    InfeasibleError,
+    MotionMindError,
+    MotionMindWarning,
+    NoPathError,
+    SkeletonError,
+    WrongTypeError,
+)
 from motionmind.formats import read_motion, write_motion
 from motionmind.geometry import rotations as rot
 
@@ -99,6 +110,7 @@ WORK: list[tuple[Words, list[str]]] = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("errors", ["2>&-", "2>/dev/full"])
 def test_standard_error_that_is_closed_or_full_changes_nothing(tmp_path: Path, usual: Path, errors: str) -> None:
     if "full" in errors and not Path("/dev/full").exists():
@@ -107,6 +119,23 @@ def test_standard_error_that_is_closed_or_full_changes_nothing(tmp_path: Path, u
     for name in (name for _, written in WORK for name in written):
         assert (tmp_path / name).read_bytes() == (usual / name).read_bytes() or name == "report.json"
     assert not (tmp_path / "other.bvh").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "written"),
+    [(["corpus", "list"], []), (["completion", "bash"], []), (["convert", "clip.json", "clip.bvh"], ["clip.bvh"])],
+)
+def test_standard_output_that_is_closed_is_an_error_in_a_line(tmp_path: Path, words: Words, written: list[str]) -> None:
+    write_motion(tmp_path / "clip.json", motion())
+    ran = [sys.executable, "-m", "motionmind", *words]
+    command = ["sh", "-c", 'exec "$@" >&-', "sh", *ran]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert [line for line in done.stderr.splitlines() if "error" in line] == [
+        "error: cannot write: standard output is closed"
+    ]
+    for name in written:  # what was asked for is complete, and holds nothing that was printed
+        assert len(read_motion(tmp_path / name)) == 12
 
 
 @pytest.fixture(scope="module")
@@ -139,6 +168,7 @@ STRANGE: list[tuple[bytes, bytes, list[bytes]]] = [
 ]
 
 
+@pytest.mark.long
 def test_files_whose_names_are_no_utf_8_are_read_and_written(tmp_path: Path) -> None:
     lines: list[Words] = []
     missing: list[Words] = []
@@ -162,6 +192,7 @@ def test_files_whose_names_are_no_utf_8_are_read_and_written(tmp_path: Path) -> 
         assert ascii(read_motion(tmp_path / os.fsdecode(stem + b".bvh")).name) == ascii(shown)
 
 
+@pytest.mark.long
 def test_words_that_are_no_utf_8_are_an_error_in_a_line(tmp_path: Path) -> None:
     write_motion(tmp_path / "clip.json", motion())
     strange = b"caf\xe9"
@@ -180,6 +211,7 @@ FOREIGN = "\x1b]0;owned\x07 \u202egnp.\x9b31m \x08\x7f"
 UNSAFE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 
 
+@pytest.mark.long
 def test_nothing_that_a_terminal_acts_on_is_printed(tmp_path: Path, run: Run) -> None:
     write_motion(tmp_path / "clip.json", replace(motion(), name=FOREIGN))
     joints = tuple(f"{FOREIGN}{number}" for number in range(len(BODY)))
@@ -213,9 +245,75 @@ def test_nothing_that_a_terminal_acts_on_is_printed(tmp_path: Path, run: Run) ->
     assert json.loads((tmp_path / "home/corpora/mine/manifest.json").read_bytes())["title"] == FOREIGN
 
 
+BROKEN = "a\nbroken\ttorn\x85split\u2028name"
+
+
+@pytest.mark.long
+def test_no_name_breaks_a_line(tmp_path: Path, run: Run, caplog: pytest.LogCaptureFixture) -> None:
+    joints = tuple(f"{BROKEN}{number}" for number in range(len(BODY)))
+    named = replace(motion(name=BROKEN), skeleton=Skeleton(BROKEN, joints, BODY.parents, BODY.offsets, BODY.tips))
+    for file in ("clip.json", f"{BROKEN}.json", f"{BROKEN}.bvh"):
+        write_motion(tmp_path / file, motion(name=BROKEN))
+    write_motion(tmp_path / "joints.json", named)
+    (tmp_path / f"{BROKEN} bad.bvh").write_text("HIERARCHY\n")
+    a, b = f"mine/{BROKEN}@0", f"mine/{BROKEN}@1"
+    calls: list[tuple[int, tuple[object, ...]]] = [
+        (0, ("corpus", "build", "mine", f"{BROKEN}.bvh", f"{BROKEN} bad.bvh", "--title", BROKEN, "--author", BROKEN)),
+        (0, ("corpus", "build", "joints", "joints.json", "--performer", BROKEN)),
+        (2, ("corpus", "add", "mine", "clip.json", f"{BROKEN}.json")),
+        (0, ("corpus", "add", "mine", "clip.json")),
+        (0, ("corpus", "list")),
+        (0, ("corpus", "info", "mine")),
+        (0, ("corpus", "check", "joints")),
+        (0, ("postures", "mine")),
+        (0, ("credits", "clip.json")),
+        (0, ("convert", "joints.json", f"{BROKEN}.glb")),
+        (0, ("tween", a, b, "--corpus", "mine", "--report", "report.json", "-o", f"{BROKEN} out.bvh", "--details")),
+        (0, ("explain", "report.json", "--all")),
+        (0, ("credits", "report.json")),
+        (0, ("vary", f"{BROKEN}.json", "--corpus", "mine", "-o", f"{BROKEN} varied.json")),
+        (2, ("convert", f"{BROKEN} none.bvh", "out.json")),
+        (2, ("convert", f"{BROKEN} bad.bvh", "out.json")),
+        (2, ("tween", a, f"mine/{BROKEN}@99", "--corpus", "mine")),
+        (2, ("tween", a, b, "--corpus", BROKEN)),
+        (2, ("tween", "joints.json@0", "joints.json@9", "--corpus", "mine")),
+        (2, ("corpus", "remove", "mine", f"{BROKEN} none")),
+        (2, ("corpus", "build", BROKEN, "clip.json")),
+        (2, ("graph", "--corpus", "mine", "--joint", BROKEN, "-o", "graph.svg")),
+        (2, (BROKEN,)),
+    ]
+    for code, words in calls:
+        ran = run(*words)
+        assert ran.code == code, (words, ran.err)
+        for line in (ran.out + ran.err).splitlines():
+            assert not re.match(r"broken|split|name\S", line), (words, line)
+    assert caplog.messages
+    assert [message for message in caplog.messages if len(message.splitlines()) > 1] == []
+
+
+ERRORS = [MotionMindError, WrongTypeError, SkeletonError, CorpusError, FormatError, InfeasibleError, MotionMindWarning]
+
+
+@given(st.text(max_size=400), st.sampled_from(ERRORS))
+def test_an_error_is_one_line_that_is_safe_to_log(text: str, kind: type[Exception]) -> None:
+    error = kind(f"{text}: has no joints")
+    assert len(str(error).splitlines()) == 1
+    assert UNSAFE.findall(str(error)) == []
+    again = pickle.loads(pickle.dumps(error))
+    assert (type(again), str(again)) == (kind, str(error))
+
+
+def test_a_diagnosis_keeps_its_lines_and_its_values() -> None:
+    error = NoPathError("no path\n  left_knee\x1b[2J: no move", {"joints": ["left_knee"]})
+    assert str(error) == "no path\n  left_knee\\u001b[2J: no move"
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.diagnosis) == (str(error), {"joints": ["left_knee"]})
+
+
 LONG = "a name that never ends " * 200
 
 
+@pytest.mark.long
 def test_long_names_are_shortened_wherever_they_are_displayed(tmp_path: Path, run: Run) -> None:
     joints = tuple(f"{number} {LONG}" for number in range(len(BODY)))
     body = Skeleton(LONG, joints, BODY.parents, BODY.offsets, BODY.tips)
@@ -249,6 +347,7 @@ def test_long_names_are_shortened_wherever_they_are_displayed(tmp_path: Path, ru
     assert json.loads((tmp_path / "report.json").read_bytes())["joints"] == [*joints, "facing"]
 
 
+@pytest.mark.long
 @given(st.text(max_size=400), st.integers(20, 300))
 def test_a_displayed_name_is_one_short_line_and_short_plain_names_stay(name: str, most: int) -> None:
     shown = displayed(name, most)
@@ -342,6 +441,7 @@ def test_the_line_says_what_is_wrong(run: Run, words: list[str], message: str) -
     assert DIGITS[:300] not in ran.err
 
 
+@pytest.mark.long
 def test_the_greatest_price_is_no_reason_for_no_path(run: Run) -> None:
     for option in ("--lambda", "--beta", "--tau", "--bridge-price", "--guide"):
         assert run("tween", A, B, "--corpus", "ballet", "--moves", 4, option, 1e6).code == 0
