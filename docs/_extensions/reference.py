@@ -47,6 +47,7 @@ SUBJECTS = {
         "human23",
         "human44",
     ),
+    "Cleaning": ("clean.clean_motion", "clean.Cleaning"),
     "Files": (
         "read_motion",
         "read_posture",
@@ -56,7 +57,14 @@ SUBJECTS = {
         "formats.MotionReader",
         "formats.MotionWriter",
     ),
-    "Scores": ("compose", "read_score", "Score"),
+    "Scores": (
+        "compose",
+        "read_score",
+        "Score",
+        "transcription.transcribe",
+        "transcription.Transcription",
+        "transcription.Deviation",
+    ),
     "Skeletons of your own": ("own_skeleton", "retarget.to_human23", "retarget.read_joint_mapping"),
     "States": (
         "discretize.make_discretization",
@@ -77,12 +85,16 @@ SUBJECTS = {
         "chaos.find_flow",
         "chaos.Flow",
     ),
+    "Music": ("music.read_beats", "music.Beats", "music.read_sound", "music.Sound"),
     "Pictures": (
         "draw_picture",
         "draw_sheet",
         "plots.draw_angles",
         "plots.draw_joint_graph",
         "plots.draw_attractor",
+        "plots.draw_cleaning",
+        "plots.draw_floor_plan",
+        "plots.find_overstep",
         "plots.Plate",
     ),
     "Errors": (

@@ -66,7 +66,8 @@ def studio(folder: Path) -> Iterator[str]:
 def browser() -> Iterator[Any]:
     """Chromium, which draws without a screen."""
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
+        path = shutil.which("chromium") or shutil.which("chromium-headless-shell")  # or else Playwright's own
+        chromium = playwright.chromium.launch(executable_path=path, args=FLAGS)
         yield chromium
         chromium.close()
 
@@ -136,6 +137,14 @@ def insert(page: Any, name: str, last: int = 0) -> None:
     )
 
 
+def settle(page: Any) -> None:
+    """Wait until all seams are smooth."""
+    for _ in range(LONG // 200):
+        if page.evaluate("studio.store.state.piece.seams.every(({ state }) => ['inserted', 'smooth'].includes(state))"):
+            return
+        page.wait_for_timeout(200)
+
+
 def a_to_b(page: Any, film: Film) -> None:
     """Find movement from one posture to another, and accept one of four."""
     page.get_by_test_id("posture-arabesque").wait_for()
@@ -147,7 +156,13 @@ def a_to_b(page: Any, film: Film) -> None:
     film.look(2)
     page.wait_for_selector("[data-testid=alternatives][data-state=found]", timeout=LONG)
     film.look(16)
+    page.evaluate("Promise.all([...document.querySelectorAll('.film img')].map((picture) => picture.decode()))")
+    click(page, "play-alternatives")  # at rest, pictures are fine
+    page.set_viewport_size(TALL)
+    page.wait_for_timeout(2000)
     draw(page, "a-to-b")
+    page.set_viewport_size(SIZE)
+    page.wait_for_timeout(1000)
     click(page, "alternative-2")
     film.look(3)
     click(page, "accept")
@@ -160,12 +175,14 @@ def time_line(page: Any, film: Film) -> None:
         insert(page, posture)
     page.wait_for_timeout(500)
     page.get_by_test_id("insertion-3").wait_for(timeout=LONG)
-    page.wait_for_timeout(6000)
+    settle(page)
     click(page, "play")
     film.look(28)
     click(page, "insertion-2")
     page.wait_for_timeout(500)
     film.look(4)
+    click(page, "play")  # at rest, pictures are fine
+    page.wait_for_timeout(2000)
     draw(page, "time-line")
 
 
@@ -173,14 +190,14 @@ def variations(page: Any) -> None:
     """Vary the piece, with a clip at its end, and look at both."""
     insert(page, "adagio", 40)
     page.get_by_test_id("insertion-4").wait_for(timeout=LONG)
-    page.wait_for_timeout(3000)
+    settle(page)
     click(page, "open-vary")
     page.get_by_test_id("tile-3").wait_for(timeout=LONG)
     page.get_by_test_id("depart").fill("25")
     click(page, "beside")
     page.wait_for_timeout(3000)
     page.get_by_test_id("scrub").fill("0.7")
-    page.wait_for_timeout(1000)
+    page.wait_for_timeout(3000)
     draw(page, "variations")
 
 
