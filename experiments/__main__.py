@@ -66,6 +66,9 @@ def run(names: tuple[str, ...], setting: harness.Setting, executor: Executor, ou
     root = out or (trial if setting.quick else harness.HERE)
     for name in names:
         rows = harness.answer(name, setting, executor, root / name)
+        if not rows:
+            click.echo(f"{name}: skipped, its recorded movement is not there (--data)")
+            continue
         click.echo(f"{name}: {len(rows)} rows" + (f", {root / name}" if root != trial else ""))
 
 

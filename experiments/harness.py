@@ -55,10 +55,12 @@ def answer(name: str, setting: Setting, executor: Executor, folder: Path) -> lis
     """Do what is left of a question's jobs, and write the table, the plot and README's section into a folder.
 
     What each job found is kept in `unfinished.jsonl` there as soon as it is done; a run that was broken off goes on
-    from that, if it asks for the same.
+    from that, if it asks for the same. A question without jobs finds nothing, and writes nothing.
     """
     module = question(name)
     wanted = {json.dumps(job, sort_keys=True): job for job in module.jobs(setting)}
+    if not wanted:
+        return []
     folder.mkdir(parents=True, exist_ok=True)
     unfinished = folder / "unfinished.jsonl"
     done = {key: rows for key, rows in _kept(unfinished) if key in wanted}
