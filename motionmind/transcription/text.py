@@ -1,10 +1,9 @@
-"""Write a transcription as the text of a score: its vocabulary, and a clip with one posture a line."""
+"""Write a transcription as the text of a score: its vocabulary, phrases that recur, and a clip."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
-from fractions import Fraction
 
 import numpy as np
 
@@ -12,11 +11,14 @@ from motionmind._typing import Floats, Ints
 from motionmind.body.anatomy import SIDES
 from motionmind.geometry import rotations as rot
 from motionmind.transcription.angles import leads_left, mirror_trunk
+from motionmind.transcription.moves import Move
 from motionmind.transcription.recorded import Recorded
+from motionmind.transcription.repeats import Call, Repeat, Rows
 from motionmind.transcription.words import LINES, angle_terms, limb_word, trunk_word
 
 PLANTED = "on"  # the position of a leg that bears weight
-_Go = tuple[int, int]  # to the left and ahead, centimetres
+OPEN = "MOVE"  # the open words of phrases: MOVE-2 is the move to the second posture
+CALL_WIDTH = 100  # characters, after which the line of a call is continued
 
 
 @dataclass
@@ -94,16 +96,15 @@ class ScoreWriter:
         along = points[end] - points[self.body.named(first, side)]
         return np.asarray(along / max(float(rot.norm(along)), 1e-9))
 
-    def text(self, recorded: Recorded, keys: Ints, go: Sequence[_Go], tempo: float, name: str, title: str) -> str:
+    def text(self, moves: Sequence[Move], tempo: float, name: str, title: str, repeats: Sequence[Repeat] = ()) -> str:
         """Return the score.
 
         Args:
-            recorded: the recording.
-            keys: its key frames [K].
-            go: the travel of each key's move, centimetres to the left and ahead.
+            moves: the move to each key [K].
             tempo: counts per minute.
             name: name of the clip.
             title: title of the score.
+            repeats: phrases that the clip calls, found in `rows`.
         """
         lines = [f"title   {title}", f"body    {self.body.skeleton.name}", f"tempo   {tempo:g}", ""]
         for layer, vocabulary in self.vocabulary.items():
@@ -113,49 +114,96 @@ class ScoreWriter:
             if layer == "legs":
                 lines.append(f"  {PLANTED.ljust(width)} = planted")
             lines.append("")
-        lines.append(f"clip {name}: {title}")
-        lines += self._rows(recorded, keys, go, tempo)
-        return "\n".join(lines) + "\n"
+        calls: dict[int, tuple[int, list[str]]] = {}  # by their first rows: the row after them, and their lines
+        for number, repeat in enumerate(repeats, start=1):
+            called = f"phrase-{number}" + "-" * (name == f"phrase-{number}")
+            lines += [f"phrase {called}{_in_brackets(map(_open_word, repeat.open))}"]
+            lines += [*_in_columns(self._phrase(repeat, moves)), ""]
+            for call in repeat.calls:
+                given = [moves[call.start + row] for row in repeat.open]
+                stop = call.start + call.times * repeat.length
+                calls[call.start] = stop, _call_lines(called, call, given)
+        table, row = list[list[str]](), 0
+        while row < len(moves):
+            if row in calls:
+                row, call_lines = calls[row]
+                table += [[line] for line in call_lines]
+            else:
+                table.append([str(moves[row]), *self._changed(row)])
+                row += 1
+        return "\n".join([*lines, f"clip {name}: {title}", *_in_columns(table)]) + "\n"
 
-    def _rows(self, recorded: Recorded, keys: Ints, go: Sequence[_Go], tempo: float) -> list[str]:
-        """Return the clip's lines, in columns; unchanged cells stay empty."""
-        facing = recorded.written.facing
-        per_frame = tempo / (60.0 * recorded.motion.fps) if len(recorded.motion) > 1 else 0.0
-        table = []
-        before: list[str] = [""] * len(self.body.layers)
-        for row, key in enumerate(keys):
-            how = f"start face {facing[key]}"
-            if row:
-                how = _counts(int(key - keys[row - 1]), per_frame)
-                turn = int((facing[key] - facing[keys[row - 1]] + 180) % 360) - 180
-                if abs(turn) == 180:  # a turn is less, and has a side
-                    how += f" face {facing[key]}"
-                elif turn:
-                    how += f" turn {abs(turn)} {'left' if turn > 0 else 'right'}"
-            how += f" up {recorded.up[key]}" if recorded.up[key] else ""
-            how += _go(go[row])
-            cells = self.cells[row]
-            table.append([how, *(new if new != old else "" for new, old in zip(cells, before, strict=True))])
-            before = cells
-        widths = [max(len(line[column]) for line in table) for column in range(len(table[0]))]
-        return [
-            ("  " + " | ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True))).rstrip(" |")
-            if any(line[1:])
-            else f"  {line[0]} |"
-            for line in table
-        ]
+    def rows(self, moves: Sequence[Move]) -> Rows:
+        """Return the keys and the moves to them by number, in which phrases can be found."""
+        paired = [self.body.paired(joints[0]) for joints in self.body.layers.values()]
+        images = [tuple(map(_other_side, row, paired)) for row in self.cells]
+        cells, cell_images = _numbers([tuple(row) for row in self.cells], images)
+        cells[0] = -1  # a start posture is not part of a phrase
+        return Rows(cells, cell_images, *_numbers(moves, [move.mirrored() for move in moves]))
+
+    def _phrase(self, repeat: Repeat, moves: Sequence[Move]) -> list[list[str]]:
+        """Return the lines of a phrase; its first posture is written in full, for it follows any other."""
+        rows = range(repeat.start, repeat.start + repeat.length)
+        table = [[str(moves[row]), *self._changed(row)] for row in rows]
+        table[0][1:] = self.cells[repeat.start]
+        for row in repeat.open:
+            table[row][0] = _open_word(row)
+        return table
+
+    def _changed(self, row: int) -> list[str]:
+        """Return the cells of a key that differ from those before, and "" for the others."""
+        before = self.cells[row - 1] if row else [""] * len(self.cells[row])
+        return [new if new != old else "" for new, old in zip(self.cells[row], before, strict=True)]
 
 
-def _counts(frames: int, per_frame: float) -> str:
-    """Write a duration in counts, as a fraction if that is exact."""
-    exact = Fraction(frames * per_frame).limit_denominator(240)
-    return str(exact) if abs(float(exact) - frames * per_frame) < 1e-9 else f"{frames * per_frame:.5f}"
+def _in_columns(table: list[list[str]]) -> list[str]:
+    """Return lines with their cells in columns; a line of one cell is the call of a phrase."""
+    postures = [line for line in table if len(line) > 1]
+    widths = [max(len(line[column]) for line in postures) for column in range(len(postures[0]) if postures else 0)]
+    return [
+        f"  {line[0]}"
+        if len(line) == 1
+        else ("  " + " | ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True))).rstrip(" |")
+        if any(line[1:])
+        else f"  {line[0]} |"
+        for line in table
+    ]
 
 
-def _go(go: _Go) -> str:
-    """Write a move's travel."""
-    left, ahead = go
-    out = f" go {'ahead' if ahead > 0 else 'back'} {abs(ahead)}" if ahead else ""
-    if left:
-        out += f"{' ' if out else ' go '}{'left' if left > 0 else 'right'} {abs(left)}"
-    return out
+def _call_lines(name: str, call: Call, given: list[Move]) -> list[str]:
+    """Return the lines of a phrase's call; one that ends in a comma is continued."""
+    inside = [str(move.mirrored() if call.mirrored else move) for move in given]  # a call is mirrored with its moves
+    text = name + _in_brackets(inside) + ", other side" * call.mirrored
+    text += f", {call.times} times" if call.times > 1 else ""
+    lines = [""]
+    for part in text.split(", "):
+        if lines[-1] and len(lines[-1]) + len(part) > CALL_WIDTH:
+            lines.append("  ")
+        lines[-1] += part + ", "
+    return [line.rstrip() for line in [*lines[:-1], lines[-1].removesuffix(", ")]]
+
+
+def _in_brackets(words: Iterable[str]) -> str:
+    """Return the words of a phrase's heading or call in brackets; "" if there are none."""
+    inside = ", ".join(words)
+    return f" ({inside})" if inside else ""
+
+
+def _open_word(row: int) -> str:
+    """Return the word that stands for the move to a phrase's row, counted from 0."""
+    return f"{OPEN}-{row + 1}"
+
+
+def _other_side(cell: str, paired: bool) -> str:
+    """Return the mirror image of a cell that `ScoreWriter` wrote."""
+    if paired:
+        return " / ".join(reversed(cell.split(" / ")))
+    name, _, side = cell.partition(" ")
+    return f"{name} {'right' if side == 'left' else 'left'}" if side else name
+
+
+def _numbers(items: Iterable[Hashable], images: Iterable[Hashable]) -> tuple[Ints, Ints]:
+    """Number items and their mirror images, equal ones alike."""
+    known: dict[Hashable, int] = {}
+    own, other = (np.array([known.setdefault(item, len(known)) for item in each]) for each in (items, images))
+    return own, other

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import tempfile
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
 from motionmind._typing import Bools, Ints
-from motionmind.arguments import check_real, check_text, check_type
+from motionmind.arguments import check_flag, check_real, check_text, check_type
 from motionmind.body.motion import Motion
 from motionmind.ensemble.dancers import Dancer, Ensemble
 from motionmind.errors import MotionMindError
@@ -18,7 +19,9 @@ from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import compose
 from motionmind.transcription.bones import CM_PER_DEG, deviations
 from motionmind.transcription.keys import fewest_keys
+from motionmind.transcription.moves import Move, counts_of
 from motionmind.transcription.recorded import Recorded, prepare
+from motionmind.transcription.repeats import Repeat, find_repeats
 from motionmind.transcription.text import ScoreWriter
 
 LONGEST_MOVE_S = 3.0  # between two postures; a longer hold takes several lines
@@ -51,6 +54,7 @@ class Transcription:
         tolerance: the deviation between its postures that was allowed, degrees.
         keys: its postures' frames in `recording` [K].
         recording: the recording with the score's proportions, on a level floor; at most 30 frames a second.
+        repeats: its phrases, with the rows that call them; row k is the posture of `keys[k]`.
         motion: the movement of the score.
         deviation: how far that deviates from the recording.
     """
@@ -59,6 +63,7 @@ class Transcription:
     tolerance: float
     keys: Ints
     recording: Motion
+    repeats: list[Repeat]
     motion: Motion
     deviation: Deviation
 
@@ -82,7 +87,9 @@ class Transcription:
         )
 
 
-def transcribe(motion: Motion, tolerance: float = 6.0, *, tempo: float | None = None, name: str = "") -> Transcription:
+def transcribe(
+    motion: Motion, tolerance: float = 6.0, *, tempo: float | None = None, name: str = "", repeats: bool = True
+) -> Transcription:
     """Transcribe a recording into a score.
 
     The score has the fewest postures such that its movement, each bone turning evenly from posture to posture, follows
@@ -96,6 +103,7 @@ def transcribe(motion: Motion, tolerance: float = 6.0, *, tempo: float | None = 
             on top (`Deviation.unwritten`).
         tempo: counts per minute; None for counts of one second.
         name: name of the score's clip; "" for the motion's.
+        repeats: whether phrases that recur become phrases of the score.
 
     Raises:
         MotionMindError: the tolerance or the tempo is out of range, or the recording lasts more than 10 minutes.
@@ -113,6 +121,7 @@ def transcribe(motion: Motion, tolerance: float = 6.0, *, tempo: float | None = 
     check_real("tolerance", tolerance)
     check_real("tempo", tempo, or_none=True)
     check_text("name", name)
+    check_flag("repeats", repeats)
     least, most = TOLERANCE_RANGE_DEG
     if not least <= tolerance <= most:
         raise MotionMindError(f"a tolerance must be from {least:g} to {most:g} degrees, not {tolerance:g}")
@@ -123,11 +132,13 @@ def transcribe(motion: Motion, tolerance: float = 6.0, *, tempo: float | None = 
     keys = _choose_keys(recorded, tolerance)
     writer = ScoreWriter(recorded, keys)
     clip, title = _clip_name(name or motion.name), _title(motion.name)
-    still = [(0, 0)] * len(keys)
-    composed = _compose(writer.text(recorded, keys, still, counts, clip, title))
-    text = writer.text(recorded, keys, _travel(recorded, keys, composed, tolerance), counts, clip, title)
+    moves = _moves(recorded, keys, counts)
+    travel = _travel(recorded, keys, _compose(writer.text(moves, counts, clip, title)), tolerance)
+    moves = [move._replace(left=left, ahead=ahead) for move, (left, ahead) in zip(moves, travel, strict=True)]
+    found = find_repeats(writer.rows(moves)) if repeats else []
+    text = writer.text(moves, counts, clip, title, found)
     composed = _compose(text)
-    return Transcription(text, tolerance, keys, recorded.motion, composed, _deviation(recorded, composed))
+    return Transcription(text, tolerance, keys, recorded.motion, found, composed, _deviation(recorded, composed))
 
 
 def _clip_name(name: str) -> str:
@@ -166,6 +177,25 @@ def _choose_keys(recorded: Recorded, tolerance: float) -> Ints:
         speed = rot.norm(np.gradient(directions, axis=0)).mean(axis=1)
     longest = max(1, round(LONGEST_MOVE_S * recorded.motion.fps)) if len(turned) > 1 else 1
     return fewest_keys(len(turned), longest, follows, speed)
+
+
+def _moves(recorded: Recorded, keys: Ints, tempo: float) -> list[Move]:
+    """Return the moves to the keys at `tempo` counts per minute, without travel."""
+    facing, up = recorded.written.facing, recorded.up
+    per_frame = tempo / (60.0 * recorded.motion.fps) if len(recorded.motion) > 1 else 0.0
+    moves = [Move("start", face=int(facing[keys[0]]), up=int(up[keys[0]]))]
+    for before, key in pairwise(keys.tolist()):
+        turn = int((facing[key] - facing[before] + 180) % 360) - 180
+        half = turn == -180  # a turn is less, and has a side
+        moves.append(
+            Move(
+                counts_of(key - before, per_frame),
+                turn=0 if half else turn,
+                face=int(facing[key]) if half else None,
+                up=int(up[key]),
+            )
+        )
+    return moves
 
 
 def _travel(recorded: Recorded, keys: Ints, composed: Motion, tolerance: float) -> list[tuple[int, int]]:
