@@ -46,6 +46,12 @@ COMPARISONS = (".gif", ".mp4", ".html", ".png", ".pdf")
     metavar="BPM",
     help="Counts per minute in which durations are written  [default: seconds]",
 )
+@option(
+    "--no-repeats",
+    section=Section.MOTION,
+    is_flag=True,
+    help="Write all postures in one list, without phrases for those that recur.",
+)
 @option("--report", section=Section.OUTPUT, type=FILE, help="File of the deviations over time, as JSON.")
 @reading
 @HOME
@@ -58,11 +64,13 @@ def transcribe(
     end: int,
     tolerance: float,
     tempo: float | None,
+    no_repeats: bool,
     home: Path | None,
     **options: Any,
 ) -> None:
     """Transcribe a recording into a score, which a person can read, change and compose.
 
+    Postures that recur, mirrored or not, become phrases.
     SOURCE is a motion file, a score, a corpus by name or folder, CORPUS/CLIP, or a clip of a glTF file such as
     'hero.glb#Dance'. The score has the fewest postures between which every frame is followed within the tolerance.
     docs/notation.md explains the language of scores.
@@ -74,7 +82,7 @@ def transcribe(
     check_outputs(files + ([(report, ())] if report else []), named.source.paths)
     whole = read_movement(named.source, name, home, **options)
     frames = select_part(named, whole, start, end)
-    found = to_score(whole.slice(frames.start, frames.stop), tolerance, tempo=tempo)
+    found = to_score(whole.slice(frames.start, frames.stop), tolerance, tempo=tempo, repeats=not no_repeats)
     with all_or_none():
         for path in outputs:
             _write(path, found)
@@ -109,10 +117,15 @@ def _lines(found: Transcription) -> Iterator[str]:
     import numpy as np
 
     seconds = float(found.recording.times[-1] - found.recording.times[0])
+    fewest = "the fewest" if len(found.keys) == found.fewest else f"{found.fewest} are the fewest"
     yield (
-        f"{count(len(found.keys), 'posture')} in {seconds:.1f} s, the fewest within {found.tolerance:g} degrees "
+        f"{count(len(found.keys), 'posture')} in {seconds:.1f} s, {fewest} within {found.tolerance:g} degrees "
         f"and {0.5 * found.tolerance:g} cm"
     )
+    if found.repeats:
+        lines = len(found.keys) - sum(each.saved for each in found.repeats)
+        calls = sum(call.times for each in found.repeats for call in each.calls)
+        yield f"{count(len(found.repeats), 'phrase')} danced {calls} times: {lines} lines"
     for part, values in found.deviation.degrees.items():
         off, most = np.percentile(values, [95.0, 100.0])
         line = f"{part:6} {off:3.0f} degrees off in 95 % of frames at most, {most:.0f} in all"

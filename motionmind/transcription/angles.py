@@ -66,16 +66,21 @@ def write_angles(bones: Bones, rotations: Floats, tolerance: float) -> Written:
             wanted = body.degrees_of(np.array([joint]), fitted)[:, 0]
             limits = body.limits[0][joint], body.limits[1][joint]
             degrees[:, joint] = np.where(has[joint], np.round(wanted).clip(*limits), 0.0) + 0.0  # no -0.0
-            fitted[:, joint] = _rotations(body, degrees)[:, joint]
+            fitted[:, joint] = rotations_of(body, degrees)[:, joint]
         if tolerance:
             _merge(bones, layer, degrees, 0.5 * tolerance)
-            fitted[:, joints] = _rotations(body, degrees)[:, joints]
+            fitted[:, joints] = rotations_of(body, degrees)[:, joints]
     return Written(facing, degrees, fitted)
 
 
 def mirror_trunk(degrees: Floats) -> Floats:
     """Return the angles [..., 3] of a trunk's joints in the mirror image."""
     return np.asarray(degrees * [1.0, -1.0, -1.0] + 0.0)  # no -0.0
+
+
+def rotations_of(body: Anatomy, degrees: Floats) -> Floats:
+    """Return the local rotations [T, J, 4] of angles [T, J, 3], degrees."""
+    return body.rotations(dict(zip(body.skeleton.names, degrees.swapaxes(0, 1), strict=True)))
 
 
 def leads_left(degrees: Floats) -> Bools:
@@ -98,11 +103,6 @@ def _in_layer(body: Anatomy, name: str, layer: str) -> bool:
     return body.anatomy(name)[0] in body.layers[layer]
 
 
-def _rotations(body: Anatomy, degrees: Floats) -> Floats:
-    """Return the local rotations [T, J, 4] of angles [T, J, 3], degrees."""
-    return body.rotations(dict(zip(body.skeleton.names, degrees.swapaxes(0, 1), strict=True)))
-
-
 def _merge(bones: Bones, layer: str, degrees: Floats, tolerance: float) -> None:
     """Replace the angles of a layer in `degrees` [T, J, 3] by those of few positions, at most `tolerance` off.
 
@@ -119,7 +119,7 @@ def _merge(bones: Bones, layer: str, degrees: Floats, tolerance: float) -> None:
     alone = np.zeros((len(samples), len(body.skeleton), 3))
     alone[:, own[0]] = samples
     wide = np.isin(bones.joints, own[0])
-    directions = bones.directions(_rotations(body, alone))[:, wide]
+    directions = bones.directions(rotations_of(body, alone))[:, wide]
     allowed = 2.0 * np.sin(0.5 * np.radians(bones.allowed(tolerance)[wide]))
     speed = np.concatenate([_speed(part) for part in np.split(directions, len(sides))])
     leaders = np.full(len(samples), -1)

@@ -1,12 +1,13 @@
 """Find phrases that recur in a sequence of rows, and choose those whose names save the most rows.
 
 A row is a *cell*, its posture, and a *move*, the way there. Both are numbers here, with the number of their mirror
-image; nothing here knows about bodies. A phrase recurs where its cells do, or their mirror images. Its moves may differ:
-a call of the phrase gives those that do.
+image; nothing here knows about bodies. A phrase recurs where its cells do, or their mirror images. Its moves may
+differ: a call of the phrase gives those that do.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -78,6 +79,18 @@ def find_repeats(rows: Rows) -> list[Repeat]:
         for call in best.calls:
             cells[call.start : call.start + call.times * best.length] = -1
     return sorted(found, key=lambda repeat: repeat.calls[0].start)
+
+
+def models_of(repeats: Sequence[Repeat]) -> dict[int, tuple[int, bool]]:
+    """Return the row that each row of a later call repeats, and whether on the other side."""
+    out = {}
+    for repeat in repeats:
+        for call in repeat.calls:
+            for row in range(call.start, call.start + call.times * repeat.length):
+                model = repeat.start + (row - call.start) % repeat.length
+                if model != row:
+                    out[row] = model, call.mirrored
+    return out
 
 
 def best_repeat(rows: Rows) -> Repeat | None:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
-from motionmind._typing import Bools, Ints
+from motionmind._typing import Ints
 from motionmind.arguments import check_flag, check_real, check_text, check_type
 from motionmind.body.motion import Motion
 from motionmind.ensemble.dancers import Dancer, Ensemble
@@ -18,15 +20,13 @@ from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import compose
 from motionmind.transcription.bones import CM_PER_DEG, deviations
-from motionmind.transcription.keys import fewest_keys
+from motionmind.transcription.following import SLIDE_SHARE, Following
 from motionmind.transcription.moves import Move, counts_of
 from motionmind.transcription.recorded import Recorded, prepare
-from motionmind.transcription.repeats import Repeat, find_repeats
+from motionmind.transcription.repeats import Repeat, find_repeats, models_of
+from motionmind.transcription.takes import choose_phrases, find_takes, match_takes
 from motionmind.transcription.text import ScoreWriter
 
-LONGEST_MOVE_S = 3.0  # between two postures; a longer hold takes several lines
-SLIDE_SHARE = 0.5  # of the tolerance, beyond which a standing foot's slip is written
-N_CHUNK = 8192  # moves that are tested together
 TOLERANCE_RANGE_DEG = (1.0, 90.0)
 
 
@@ -53,8 +53,9 @@ class Transcription:
         text: the score.
         tolerance: the deviation between its postures that was allowed, degrees.
         keys: its postures' frames in `recording` [K].
-        recording: the recording with the score's proportions, on a level floor; at most 30 frames a second.
+        fewest: the fewest postures that follow the recording; `keys` can be more, to write takes of a phrase alike.
         repeats: its phrases, with the rows that call them; row k is the posture of `keys[k]`.
+        recording: the recording with the score's proportions, on a level floor; at most 30 frames a second.
         motion: the movement of the score.
         deviation: how far that deviates from the recording.
     """
@@ -62,8 +63,9 @@ class Transcription:
     text: str
     tolerance: float
     keys: Ints
-    recording: Motion
+    fewest: int
     repeats: list[Repeat]
+    recording: Motion
     motion: Motion
     deviation: Deviation
 
@@ -94,7 +96,8 @@ def transcribe(
 
     The score has the fewest postures such that its movement, each bone turning evenly from posture to posture, follows
     every frame within the tolerance; this is proven, as a shortest path over all frames. Of equally few postures, those
-    where the body moves least are chosen.
+    where the body moves least are chosen. Phrases that recur may add postures if they save lines: later takes, mirrored
+    or not, are written in the postures of the first, within the same tolerance.
 
     Args:
         motion: the recording of a person.
@@ -129,16 +132,36 @@ def transcribe(
     if not 1.0 <= counts <= 6000.0:
         raise MotionMindError(f"a tempo must be from 1 to 6000 counts per minute, not {counts:g}")
     recorded = prepare(motion, tolerance)
-    keys = _choose_keys(recorded, tolerance)
-    writer = ScoreWriter(recorded, keys)
+    following = Following(recorded, tolerance)
+    fewest = following.fewest_keys(0, len(recorded.root))
+    choices = [(recorded, fewest)]
+    if repeats and (phrases := choose_phrases(find_takes(following, fewest), fewest, len(recorded.root))):
+        choices.append(match_takes(following, fewest, phrases, tolerance))
     clip, title = _clip_name(name or motion.name), _title(motion.name)
-    moves = _moves(recorded, keys, counts)
-    travel = _travel(recorded, keys, _compose(writer.text(moves, counts, clip, title)), tolerance)
+    drafts = [_draft(*choice, tolerance, counts, clip, title, repeats) for choice in choices]
+    keys, found, text = min(drafts, key=lambda draft: len(draft.keys) - sum(each.saved for each in draft.repeats))
+    composed = _compose(text)
+    deviation = _deviation(recorded, composed)
+    return Transcription(text, tolerance, keys, len(fewest), found, recorded.motion, composed, deviation)
+
+
+class _Draft(NamedTuple):
+    keys: Ints
+    repeats: list[Repeat]
+    text: str
+
+
+def _draft(
+    recorded: Recorded, keys: Ints, tolerance: float, tempo: float, clip: str, title: str, repeats: bool
+) -> _Draft:
+    """Write a score with given keys."""
+    writer, moves = ScoreWriter(recorded, keys), _moves(recorded, keys, tempo)
+    still = _compose(writer.text(moves, tempo, clip, title))
+    models = models_of(find_repeats(writer.rows(moves)) if repeats else [])
+    travel = _travel(recorded, keys, still, tolerance, models)
     moves = [move._replace(left=left, ahead=ahead) for move, (left, ahead) in zip(moves, travel, strict=True)]
     found = find_repeats(writer.rows(moves)) if repeats else []
-    text = writer.text(moves, counts, clip, title, found)
-    composed = _compose(text)
-    return Transcription(text, tolerance, keys, recorded.motion, found, composed, _deviation(recorded, composed))
+    return _Draft(keys, found, writer.text(moves, tempo, clip, title, found))
 
 
 def _clip_name(name: str) -> str:
@@ -150,33 +173,6 @@ def _clip_name(name: str) -> str:
 def _title(name: str) -> str:
     """Return a motion's name as a score's title: on one line, without a comment or a continuation."""
     return " ".join(name.replace("#", " ").split()).rstrip(",") or "A recording"
-
-
-def _choose_keys(recorded: Recorded, tolerance: float) -> Ints:
-    """Return the frames of the score's postures."""
-    bones = recorded.bones
-    turned, root = recorded.written.turned(), recorded.root
-    directions = bones.directions(recorded.writable)
-    # In radians along the chord, for the inner loop.
-    allowed = 2.0 * np.sin(0.5 * np.radians(bones.allowed(tolerance)))
-    metres = 0.01 * (1.0 - SLIDE_SHARE) * CM_PER_DEG * tolerance
-
-    def follows(start: Ints, end: Ints, at: Ints) -> Bools:
-        share = ((at - start) / (end - start))[:, None]
-        out = rot.norm(root[start] + share * (root[end] - root[start]) - root[at]) <= metres
-        near = np.flatnonzero(out)
-        for first in range(0, len(near), N_CHUNK):
-            part = near[first : first + N_CHUNK]
-            between = rot.slerp(turned[start[part]], turned[end[part]], share[part])
-            off = rot.norm(bones.directions(between) - directions[at[part]])
-            out[part] = (off <= allowed).all(axis=1)
-        return np.asarray(out)
-
-    speed = np.zeros(len(turned))
-    if len(turned) > 1:
-        speed = rot.norm(np.gradient(directions, axis=0)).mean(axis=1)
-    longest = max(1, round(LONGEST_MOVE_S * recorded.motion.fps)) if len(turned) > 1 else 1
-    return fewest_keys(len(turned), longest, follows, speed)
 
 
 def _moves(recorded: Recorded, keys: Ints, tempo: float) -> list[Move]:
@@ -198,30 +194,40 @@ def _moves(recorded: Recorded, keys: Ints, tempo: float) -> list[Move]:
     return moves
 
 
-def _travel(recorded: Recorded, keys: Ints, composed: Motion, tolerance: float) -> list[tuple[int, int]]:
+def _travel(
+    recorded: Recorded, keys: Ints, composed: Motion, tolerance: float, models: Mapping[int, tuple[int, bool]]
+) -> list[tuple[int, int]]:
     """Return the travel to write for each key's move, centimetres to the left and ahead of the body.
 
-    A standing foot keeps its place, so its slip in the recording is written only where it adds up.
+    A standing foot keeps its place, so its slip in the recording is written only where it adds up. A row that repeats
+    another travels as that does, unless the slip adds up.
 
     Args:
         recorded: the recording.
         keys: its key frames [K].
         composed: the score's movement without any travel written.
         tolerance: of the score, degrees.
+        models: the rows that others repeat, and whether on the other side.
     """
     slip = SLIDE_SHARE * CM_PER_DEG * tolerance
     missing = 100.0 * ((recorded.root[keys] - recorded.root[keys[0]]) - (composed.root - composed.root[0]))[:, [0, 2]]
     facing = np.radians(recorded.written.facing[keys])
     stays = np.zeros(len(keys), dtype=np.bool_)
     stays[1:] = (recorded.stands[keys[1:]] & recorded.stands[keys[:-1]]).any(axis=1)
-    written, out = np.zeros(2), []
-    for row in range(len(keys)):
-        x, z = missing[row] - written
+    written, out = np.zeros(2), [(0, 0)]
+    for row in range(1, len(keys)):
         sine, cosine = np.sin(facing[row]), np.cos(facing[row])
-        left, ahead = round(float(x * cosine - z * sine)), round(float(x * sine + z * cosine))
-        if row == 0 or (stays[row] and np.hypot(x, z) <= slip):
-            left, ahead = 0, 0
-        written += np.array([left * cosine + ahead * sine, ahead * cosine - left * sine])
+        ways = np.array([[cosine, -sine], [sine, cosine]])  # to the left and ahead
+        x, z = missing[row] - written
+        own = ways @ (x, z)
+        choices = [(0, 0)] if stays[row] else []
+        if row in models:
+            model, mirrored = models[row]
+            left, ahead = out[model]
+            choices.insert(0, (-left if mirrored else left, ahead))
+        near = [choice for choice in choices if np.hypot(*(own - choice)) <= slip]
+        left, ahead = near[0] if near else (round(float(own[0])), round(float(own[1])))
+        written += (left, ahead) @ ways
         out.append((left, ahead))
     return out
 
