@@ -121,6 +121,7 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
         "lossy_fields": (formats.lossy_fields, {"motion": motion, "path": "rest.bvh"}),
         "make_discretization": (discretize.make_discretization, {"kind": "codebook"}),
         "measure": (metrics.measure, {"motion": motion, "learned": engine}),
+        "measure_effort": (metrics.measure_effort, {"motion": motion, "window": 0.2}),
         "name_states": (discretize.name_states, {"scores": [mm.read_score(folder / "bends.score")], "tolerance": 12.0}),
         "own_skeleton": (mm.own_skeleton, {"movement": motion}),
         "read_joint_mapping": (retarget.read_joint_mapping, {"path": folder / "rig.toml"}),

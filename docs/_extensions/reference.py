@@ -34,7 +34,15 @@ SUBJECTS = {
         "learned.Sighting",
         "credits.Credit",
     ),
-    "Reports": ("TweenReport", "read_report", "explain", "Explanation", "metrics.measure", "metrics.Figure"),
+    "Reports": (
+        "TweenReport",
+        "read_report",
+        "explain",
+        "Explanation",
+        "metrics.measure",
+        "metrics.Figure",
+        "metrics.measure_effort",
+    ),
     "Corpora": ("list_corpora", "Corpus", "gaps.find_gaps", "gaps.Gaps"),
     "Movement": (
         "Posture",

@@ -20,6 +20,7 @@ from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.grammar.grammar import Grammar
 from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.plausibility import MEASURES, UNITS_AND_MEANINGS, summarise_shown
+from motionmind.metrics.effort import EFFORT, effort_of
 from motionmind.metrics.paths import Habits, arrival_spread, attested_share, learn_habits
 from motionmind.metrics.smoothness import angular_jerk, angular_speed, sparc
 from motionmind.metrics.style import WINDOW_FRAMES, Styles, features, learn_styles
@@ -111,6 +112,7 @@ _ABOUT: Mapping[str, tuple[str, str]] = {
     "skating": ("", "share of frames in which a foot that is low moves far"),
     "slide": ("cm", "how far a foot near the floor slides, a frame"),
     **UNITS_AND_MEANINGS,
+    **EFFORT,
     "moves": ("", "number of moves"),
     "arrival_spread": ("moves", "how far apart joints arrive for good"),
     "attested": ("", "share of the joints' transitions that were seen in the corpus"),
@@ -234,7 +236,7 @@ def _measure_motion(motion: Motion, style: Styles | None, fastest: Floats) -> di
         floor = find_floor(body, rotations, root)
         out["skating"] = skating(body, rotations, root, floor)
         out["slide"] = foot_slide(body, rotations, root, floor)
-    return out
+    return out | effort_of(motion)
 
 
 def _measure_path(
