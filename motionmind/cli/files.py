@@ -13,7 +13,7 @@ from motionmind.cli.printing import note
 from motionmind.clip_names import split_clip
 from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError
 from motionmind.files import FilePath, all_or_none, as_text
-from motionmind.render import PICTURES, SOUNDING
+from motionmind.render import PICTURES, may_sound
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion, Posture
@@ -86,7 +86,7 @@ def write(path: Path, movement: Motion | Posture, source: Path | None = None, so
     motion = movement.as_motion() if isinstance(movement, Posture) else evened(path, movement)
     note_licences(path, motion)
     if path.suffix.lower() in PICTURES:
-        draw_picture(path, motion, sound=sound if path.suffix.lower() in SOUNDING else None)
+        draw_picture(path, motion, sound=sound if may_sound(path) else None)
         return
     if isinstance(movement, Posture):
         write_posture(path, movement)

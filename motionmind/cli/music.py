@@ -14,7 +14,7 @@ from motionmind.cli.printing import note
 from motionmind.cli.types import FILE, Number
 from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError
-from motionmind.render import SOUNDING
+from motionmind.render import SOUNDING, may_sound
 from motionmind.tween.counts import parse_time
 
 if TYPE_CHECKING:
@@ -100,11 +100,6 @@ def sound_of_counts(music: Path | None, beats: Beats | None, outputs: Sequence[P
     if not (music and beats and music.suffix.lower() in SOUND_SUFFIXES and any(map(may_sound, outputs))):
         return None
     return read_part_of_sound(music, beats.start)
-
-
-def may_sound(path: Path) -> bool:
-    """Return whether an output may have sound."""
-    return path.suffix.lower() in SOUNDING
 
 
 def track_beside(files: Sequence[Path], outputs: Sequence[Path]) -> Path | None:

@@ -14,7 +14,7 @@ from motionmind.cli import completion
 from motionmind.cli.delivery import for_program
 from motionmind.cli.ensembles import describe_ensemble, is_ensemble, open_ensemble
 from motionmind.cli.files import check_outputs, note_licences
-from motionmind.cli.music import check_sounding, may_sound, read_part_of_sound, track_beside, with_music
+from motionmind.cli.music import check_sounding, read_part_of_sound, track_beside, with_music
 from motionmind.cli.options import HOME, Section, command, option, output, outputs, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_movement, read_movements, select_part
@@ -23,7 +23,7 @@ from motionmind.clip_names import GLTF_SUFFIXES, distinct_names
 from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError, enumerated
 from motionmind.files import all_or_none
-from motionmind.render import PICTURES
+from motionmind.render import PICTURES, may_sound
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion

@@ -16,6 +16,7 @@ from motionmind.cli.printing import count, print_written
 from motionmind.cli.sources import parse_movement, read_movement, select_part
 from motionmind.cli.types import FILE, Number
 from motionmind.files import all_or_none, write_atomically
+from motionmind.transcription import TOLERANCE_RANGE_DEG
 from motionmind.tween.counts import TEMPO_RANGE_BPM
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ COMPARISONS = (".gif", ".mp4", ".html", ".png", ".pdf")
 @option(
     "--tolerance",
     section=Section.MOTION,
-    type=Number(1.0, 90.0),
+    type=Number(*TOLERANCE_RANGE_DEG),
     default=6.0,
     metavar="DEGREES",
     help="Deviation of a bone's direction that the score may leave; half as many centimetres of the pelvis.",

@@ -4,4 +4,6 @@ from __future__ import annotations
 
 import lazy_loader
 
+TOLERANCE_RANGE_DEG = (1.0, 90.0)
+
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -19,6 +19,7 @@ from motionmind.ensemble.dancers import Dancer, Ensemble
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import compose
+from motionmind.transcription import TOLERANCE_RANGE_DEG
 from motionmind.transcription.bones import CM_PER_DEG, deviations
 from motionmind.transcription.following import SLIDE_SHARE, Following
 from motionmind.transcription.moves import Move, counts_of
@@ -27,7 +28,6 @@ from motionmind.transcription.repeats import Repeat, find_repeats, models_of
 from motionmind.transcription.takes import choose_phrases, find_takes, match_takes
 from motionmind.transcription.text import ScoreWriter
 
-TOLERANCE_RANGE_DEG = (1.0, 90.0)
 
 
 class Deviation(msgspec.Struct, frozen=True):
