@@ -10,6 +10,7 @@ import click
 from motionmind.cli import completion
 from motionmind.cli.ensembles import describe_ensemble, is_ensemble, open_ensemble
 from motionmind.cli.files import check_outputs
+from motionmind.cli.music import read_counts, with_music
 from motionmind.cli.options import HOME, Section, command, option, output, reading
 from motionmind.cli.pictures import CLIP, FIRST, LAST
 from motionmind.cli.sources import parse_movement, read_movement, select_part
@@ -44,12 +45,17 @@ PLANS = (".svg", ".png")
     metavar="BPM",
     help="Counts per minute, to write counts instead of seconds.",
 )
+@with_music(
+    Section.DRAW,
+    "Music whose beats are the counts (sound, .txt, .mid), in place of --tempo.",
+    "Seconds of the music before count 1, the next beat  [default: to the first downbeat]",
+)
 @option(
     "--every",
     section=Section.DRAW,
     type=Number(min=0, min_open=True, max=1e6),
     metavar="N",
-    help="Interval between facings, in counts with --tempo, else in seconds  [default: at most 40 facings]",
+    help="Interval between facings, in counts with --tempo or --music, else in seconds  [default: at most 40 facings]",
 )
 @reading
 @HOME
@@ -62,6 +68,8 @@ def plan(
     stage: tuple[float, float] | None,
     tempo: float | None,
     every: float | None,
+    music: Path | None,
+    offset: float | None,
     home: Path | None,
     **options: Any,
 ) -> None:
@@ -73,12 +81,14 @@ def plan(
     """
     from motionmind.plots.floor_plan import draw_floor_plan
 
+    beats = read_counts(music, offset, tempo)
+    tempo = tempo if beats is None else None
     if is_ensemble(source, [output], PLANS):
         ensemble = open_ensemble(source, [output], PLANS, home, ["name", "start", "end"], **options)
-        tempo = ensemble.tempo if tempo is None else tempo
+        tempo = ensemble.tempo if tempo is None and beats is None else tempo
         stage = ensemble.stage if stage is None else stage
         motions = ensemble.motions()
-        draw_floor_plan(motions, stage=stage, tempo=tempo, every=every, name=ensemble.name).save(output)
+        draw_floor_plan(motions, stage=stage, tempo=tempo, beats=beats, every=every, name=ensemble.name).save(output)
         click.echo(f"{displayed_path(output)}: " + "\n".join(describe_ensemble(ensemble)))
         for one in motions:
             note_overstep(one.name, one, stage)
@@ -88,7 +98,7 @@ def plan(
     whole = read_movement(named.source, name, home, **options)
     frames = select_part(named, whole, start, end)
     motion = whole.slice(frames.start, frames.stop)
-    picture = draw_floor_plan(motion, stage=stage, tempo=tempo, every=every)
+    picture = draw_floor_plan(motion, stage=stage, tempo=tempo, beats=beats, every=every)
     picture.save(output)
     click.echo(f"{displayed_path(output)}: {_about(motion)}")
     note_overstep(source, motion, stage)

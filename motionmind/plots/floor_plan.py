@@ -13,7 +13,7 @@ from math import ceil
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.arguments import check_items, check_real, check_text
+from motionmind.arguments import check_items, check_real, check_text, check_type
 from motionmind.body.mirror import sides_of
 from motionmind.body.motion import Motion
 from motionmind.body.palette import SIDE_COLOURS, Colour
@@ -24,6 +24,7 @@ from motionmind.clean.stances import find_foot_stances
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
+from motionmind.music.beats import Beats, beats_of_tempo
 from motionmind.plots.brush import mixed
 from motionmind.plots.canvas import Plate
 from motionmind.plots.marks import LETTER_WIDTH_RATIO, Dot, Line, Mark, Words
@@ -62,6 +63,7 @@ def draw_floor_plan(
     *,
     stage: tuple[float, float] | None = None,
     tempo: float | None = None,
+    beats: Beats | None = None,
     every: float | None = None,
     name: str = "",
 ) -> Plate:
@@ -74,6 +76,7 @@ def draw_floor_plan(
         motion: the motion, on any skeleton, y up; or those of several dancers on one clock.
         stage: width and depth of the stage around the origin, metres; None to draw none.
         tempo: counts a minute, to write counts from 1 instead of seconds; None for seconds.
+        beats: the beats of music, to write their counts; count 1 comes at the first frame. In place of `tempo`.
         every: interval between facings, in counts or seconds; None for one that suits the length.
         name: the name in the title; by default that of the motion.
 
@@ -95,7 +98,10 @@ def draw_floor_plan(
         raise MotionMindError("a floor plan needs one motion or more")
     check_text("name", name)
     check_real("tempo", tempo, or_none=True)
+    check_type("beats", beats, Beats, or_none=True)
     check_real("every", every, or_none=True)
+    if tempo is not None and beats is not None:
+        raise MotionMindError("tempo and beats both set the counts; give one of them")
     if tempo is not None and not TEMPO_RANGE_BPM[0] <= tempo <= TEMPO_RANGE_BPM[1]:
         raise MotionMindError(f"tempo must be a number of counts a minute from 1 to 6000, not {tempo:g}")
     if every is not None and not 0.0 < every < np.inf:
@@ -104,7 +110,7 @@ def draw_floor_plan(
     dense = [one if len(one) < 2 or one.fps >= _RATE_HZ else one.resample(_RATE_HZ) for one in motions]
     path = np.concatenate([one.root[:, [0, 2]] for one in dense])
     floor = _Floor.around(path, stage, 0.35 * max(size_of(one.skeleton) for one in motions))
-    beat = 1.0 if tempo is None else 60.0 / tempo
+    counts = beats if tempo is None else beats_of_tempo(tempo)
     marks = [*_grid(floor), *_stage(floor, stage)]
     dancers = [(one.name, dancer_ink(number)) for number, one in enumerate(motions)] if len(motions) > 1 else []
     for number, one in enumerate(dense):
@@ -112,10 +118,10 @@ def draw_floor_plan(
         marks += [
             *_footprints(floor, one, ink),
             *_path(floor, one, ink or INK),
-            *_facings(floor, one, beat, every, ink or SHEET.plumb, is_counted=tempo is not None),
+            *_facings(floor, one, counts, every, ink or SHEET.plumb),
         ]
     title = f"{displayed(name or motions[0].name) or 'Movement'}: floor plan"
-    heading = _heading(title, any(one.insertions for one in motions), tempo, dancers)
+    heading = _heading(title, any(one.insertions for one in motions), tempo, beats, dancers)
     return Plate(floor.width, floor.height, title, tuple(marks), tuple(heading))
 
 
@@ -233,27 +239,25 @@ def _path(floor: _Floor, motion: Motion, ink: Colour) -> Iterator[Mark]:
     yield Dot((end_x, end_y), 4.5, ink, ink, 0.0, "end")
 
 
-def _facings(
-    floor: _Floor, motion: Motion, beat: float, every: float | None, ink: Colour, *, is_counted: bool
-) -> Iterator[Mark]:
-    """Yield an arrow for the facing at every so many beats, with the counts or the seconds where there is room.
+def _facings(floor: _Floor, motion: Motion, counts: Beats | None, every: float | None, ink: Colour) -> Iterator[Mark]:
+    """Yield an arrow for the facing at every so many counts, with the counts or the seconds where there is room.
 
     A body that stays where it is and faces the same way has one arrow, for instance with "3-8".
 
     Args:
         floor: the floor.
         motion: the motion.
-        beat: seconds of a count, or 1.
-        every: interval in beats; None to choose it.
+        counts: when counts, which begin with 1, come; None for seconds.
+        every: interval in counts or seconds; None to choose it.
         ink: colour of the arrows.
-        is_counted: whether beats are counts, which begin with 1.
     """
     times = motion.times - motion.times[0]
-    beats = times[-1] / beat
+    length = float(times[-1]) if counts is None else _counts_in(counts, float(times[-1]))
     if every is None:
-        every = next(step for step in (2.0**k for k in range(40)) if beats <= MAX_ARROWS * step)
-    numbers = every * np.arange(int(beats / every + 1e-6) + 1)
-    frames = np.minimum(np.searchsorted(times, numbers * beat - 1e-6), len(times) - 1)
+        every = next(step for step in (2.0**k for k in range(40)) if length <= MAX_ARROWS * step)
+    numbers = every * np.arange(int(length / every + 1e-6) + 1)
+    at = numbers if counts is None else np.array([counts.seconds(1.0 + number) for number in numbers.tolist()])
+    frames = np.minimum(np.searchsorted(times, at - 1e-6), len(times) - 1)
     places = motion.root[frames][:, [0, 2]]
     headings = rot.heading(motion.skeleton.global_rotations(motion.rotations[frames])[:, 0])
     towards = np.stack([np.sin(headings), np.cos(headings)], axis=-1)  # a body at rest faces +z
@@ -261,9 +265,9 @@ def _facings(
     tips, starts = floor.at(places + _ARROW_M * size * towards), floor.at(places)
     labels = Labels(tips, 4.0)
     for first, last in _stays(places / (_SAME_PLACE_M * size), towards / np.radians(_SAME_FACING_DEG)):
-        ends = [f"{number + is_counted:g}" for number in numbers[[first, last]].tolist()]
+        ends = [f"{number + (counts is not None):g}" for number in numbers[[first, last]].tolist()]
         text = "-".join(dict.fromkeys(ends))
-        title = f"counts {text}" if is_counted else f"{text} s"
+        title = f"{text} s" if counts is None else f"counts {text}"
         yield Line(np.stack([starts[first], tips[first]]), ink, 1.2, title=title)
         yield Line(_barbs(starts[first], tips[first]), ink, 1.8, title=title)
         width = LETTER_WIDTH_RATIO * TICK_PX * len(text)
@@ -272,6 +276,12 @@ def _facings(
         free = labels.place(around, width, 0.5 * TICK_PX)
         if free is not None:
             yield Words(free, text, TICK_PX, INK)
+
+
+def _counts_in(counts: Beats, seconds: float) -> float:
+    """Return how many counts pass in some seconds from count 1 on."""
+    grid = counts.grid(1, seconds)
+    return float(np.interp(seconds, grid, np.arange(len(grid))))
 
 
 def _stays(*features: Floats) -> Iterator[tuple[int, int]]:
@@ -291,11 +301,16 @@ def _barbs(start: Floats, tip: Floats) -> Floats:
 
 
 def _heading(
-    title: str, has_insertions: bool, tempo: float | None, dancers: Sequence[tuple[str, Colour]]
+    title: str,
+    has_insertions: bool,
+    tempo: float | None,
+    beats: Beats | None,
+    dancers: Sequence[tuple[str, Colour]],
 ) -> Iterator[Mark]:
     """Yield the title and what the marks mean."""
     yield Words((_PX.left, 30.0), title, 18, INK)
     units = "seconds" if tempo is None else f"counts at {tempo:g} a minute"
+    units = units if beats is None else f"counts of music, {beats.tempo:.1f} a minute"
     seen = f"arrows: facing, with {units}; ring: start; dot: end"
     yield Words((_PX.left, 54.0), seen, TEXT_PX, PLOT.pale)
     x = _PX.left

@@ -21,6 +21,16 @@ def test_a_movement_that_leaves_the_stage_is_noted(run: Run) -> None:
     assert "edge at" in done.err
 
 
+def test_a_plan_counts_by_music(run: Run) -> None:
+    Path("beats.txt").write_text("0.4 4\n1.0 1\n1.7 2\n2.2 3\n2.7 4\n", "utf-8")
+    done = run("plan", "ballet/temps-lie", "-o", "plan.svg", "--music", "beats.txt")
+    assert done.code == 0
+    assert "count 1 comes at 1.000 s" in done.err
+    drawn = Path("plan.svg").read_text("utf-8")
+    assert "counts of music, 109.1 a minute" in drawn
+    assert ">counts 1" in drawn
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -30,6 +40,8 @@ def test_a_movement_that_leaves_the_stage_is_noted(run: Run) -> None:
         (["--stage", "8x999"], "from 1 to 200 m"),
         (["--tempo", "0"], "0"),
         (["--every", "0"], "0"),
+        (["--music", "none.txt"], "none.txt"),
+        (["--offset", "1"], "--offset needs --music"),
         (["--from", "9999"], "9999"),
     ],
 )

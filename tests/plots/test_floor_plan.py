@@ -14,6 +14,7 @@ from motionmind._typing import Floats
 from motionmind.body.motion import Motion
 from motionmind.clean.stances import find_foot_stances
 from motionmind.geometry import rotations as rot
+from motionmind.music import Beats
 from motionmind.plots import Plate, draw_floor_plan, find_overstep
 from motionmind.plots.marks import Dot, Line, Words
 
@@ -82,6 +83,21 @@ def test_facings_are_written_in_counts_or_seconds() -> None:
     assert numbers[0] == 1
     last = int(arrows[-1].title.split()[1].split("-")[-1])
     assert last == int(2.0 * seconds + 1e-6) + 1
+
+
+def test_counts_of_even_beats_are_those_of_a_tempo_and_of_uneven_ones_where_the_body_is_at_them() -> None:
+    far = replace(WALK, root=WALK.root + WALK.times[:, None] * [1.0, 0.0, 0.0])
+    even = draw_floor_plan(far, beats=Beats(np.arange(4) * 0.5 + 0.3), every=1.0)
+    titles = [line.title for line in lines(draw_floor_plan(far, tempo=120.0, every=1.0), "count")]
+    assert [line.title for line in lines(even, "count")] == titles
+    uneven = Beats([0.2, 0.5, 1.4, 2.0])
+    late = lines(draw_floor_plan(far, beats=uneven, every=1.0), "count")
+    there = next(line for line in late if line.title == "counts 3").points[0]
+    (path,) = lines(even, "path of the pelvis")
+    at = np.searchsorted(far.times - far.times[0], 1.2 - 1e-6)
+    np.testing.assert_allclose(there, path.points[at], atol=1e-6)
+    with pytest.raises(MotionMindError, match="tempo and beats both set the counts"):
+        draw_floor_plan(WALK, tempo=60.0, beats=uneven)
 
 
 def test_a_body_that_stays_has_one_arrow() -> None:
