@@ -71,9 +71,7 @@ def in_seconds(request: dict[str, Any], beats: Beats | None) -> dict[str, Any]:
     """Return the options of a tween with counts as seconds, by the beats of music, if any, in place of a tempo."""
     if beats is None:
         return request
-    if request.get("accent"):
-        raise MotionMindError("--accent takes its counts from --tempo, not from --music")
-    counts, vias = request["counts"], []
+    counts, vias, accents = request["counts"], [], []
     if counts is not None and request["duration"] is not None:
         raise MotionMindError("--counts takes the place of --duration; give one of them")
     for via in request["via"]:
@@ -81,8 +79,12 @@ def in_seconds(request: dict[str, Any], beats: Beats | None) -> dict[str, Any]:
         if isinstance(place, str) and place.startswith("count"):
             place = f"{beats.seconds(1.0 + parse_time('--via', place, 60.0)):.6f}s"
         vias.append(via if place is None else (posture, place))
+    for accent in request.get("accent") or ():
+        if accent < 1.0:
+            raise MotionMindError(f"--accent: counts begin with 1, which is A, not with {accent:g}")
+        accents.append(f"{beats.seconds(accent):.6f}s")
     duration = request["duration"] if counts is None else beats.seconds(1.0 + counts)
-    return request | {"tempo": None, "counts": None, "duration": duration, "via": vias}
+    return request | {"tempo": None, "counts": None, "duration": duration, "via": vias, "accent": accents}
 
 
 def read_part_of_sound(path: Path, start: float) -> Sound:

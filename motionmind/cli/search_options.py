@@ -142,7 +142,7 @@ SEARCH_OPTIONS = (
         "accent",
         "--accent",
         Section.SEARCH,
-        "Counts of the accents, such as 3,5, with --tempo and a length: the movement peaks, or rests, there.",
+        "Counts of the accents, such as 3,5, with --tempo or --music, and a length: movement peaks, or rests, there.",
         Counts(),
         "COUNTS",
     ),

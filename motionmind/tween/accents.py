@@ -15,13 +15,13 @@ class Accented(msgspec.Struct, frozen=True):
     """An accent, and how far the nearest peak of speed, or moment of rest, is from it.
 
     Attributes:
-        count: its count.
+        count: its count; null if it was given in seconds.
         seconds: its time, from the start.
         kind: "fast" or "still".
         frames: distance of the nearest peak or rest, frames; null if there is none.
     """
 
-    count: float
+    count: float | None
     seconds: float
     kind: AccentKind
     frames: float | None
@@ -34,9 +34,10 @@ class Accented(msgspec.Struct, frozen=True):
     def __str__(self) -> str:
         """Return the distance in words."""
         what = "peak of speed" if self.kind == "fast" else "moment of rest"
+        where = f"{self.seconds:.2f} s" if self.count is None else f"count {self.count:g}"
         if self.frames is None:
-            return f"there is no {what} near count {self.count:g}"
-        return f"the {what} is {self.frames:.1f} frames from count {self.count:g}"
+            return f"there is no {what} near {where}"
+        return f"the {what} is {self.frames:.1f} frames from {where}"
 
 
 def find_accented(motion: Motion, request: TweenRequest) -> tuple[Accented, ...]:
@@ -46,6 +47,11 @@ def find_accented(motion: Motion, request: TweenRequest) -> tuple[Accented, ...]
         return ()
     off = frames_off(speeds_of(motion), motion.fps, accents)
     return tuple(
-        Accented(float(count), seconds, accents.kind, float(frames) if np.isfinite(frames) else None)
-        for count, seconds, frames in zip(request.accent, accents.seconds, off, strict=True)
+        Accented(
+            None if isinstance(given, str) else float(given),
+            seconds,
+            accents.kind,
+            float(frames) if np.isfinite(frames) else None,
+        )
+        for given, seconds, frames in zip(request.accent, accents.seconds, off, strict=True)
     )

@@ -121,6 +121,11 @@ def _take_pins(name: str, value: Any) -> Any:
     return MappingProxyType(dict(value))
 
 
+def _take_accent(name: str, value: Any) -> Any:
+    """Check the count of an accent; a time is checked with the length."""
+    return value if isinstance(value, str) else _number(*COUNTS_RANGE)(name, value)
+
+
 def _take_vias(name: str, value: Any) -> Any:
     """Check the moves or times of the postures to pass through."""
     check_items(name, value, "postures, or pairs of a posture and a move or a time")
@@ -217,7 +222,7 @@ OPTIONS: Mapping[str, _Rule] = {
     "tempo": _or_none(_number(*TEMPO_RANGE_BPM, " of counts a minute")),
     "counts": _or_none(_number(*COUNTS_RANGE)),
     "pace": _number(*PACE_RANGE),
-    "accent": _items("counts", int, float, each=_number(*COUNTS_RANGE)),
+    "accent": _items("counts or times", int, float, str, each=_take_accent),
     "accent_kind": _choice(("fast", "still")),
     "pin": _take_pins,
     "hold": _items("joints' names", str),

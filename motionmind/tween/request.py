@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
 
 from motionmind.arguments import check_options, check_type
+from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.footing.corrections import Correction
 from motionmind.grammar.schemes import Scheme, Weights
@@ -36,7 +37,7 @@ class SeamOptions(TypedDict, total=False):
     tempo: float | None
     counts: float | None
     pace: float
-    accent: Sequence[float]
+    accent: Sequence[float | str]
     accent_kind: AccentKind
     pin: Mapping[str, str]
     hold: Sequence[str]
@@ -95,7 +96,8 @@ class TweenRequest:
         pace: factor on the motion's natural speed, where `duration` is open: 1.2 takes 1/1.2 of the time for the same
             moves.
         accent: counts, with a tempo and a length, on which the movement has its accents: peaks of speed or moments of
-            rest. The path's movement is retimed for it, within the corpus's pace; the report says how far each is off.
+            rest; or times such as "1.5s", with a length. The path's movement is retimed for it, within the corpus's
+            pace; the report says how far each is off.
         accent_kind: "fast" for the greatest speed, "still" for the least.
         pin: joints pinned to an end: "A" keeps A's state until the last move, "B" has B's from the first move on.
         hold: joints that keep their state from A to B, such as a standing leg; A and B must agree there.
@@ -144,7 +146,7 @@ class TweenRequest:
     tempo: float | None = None
     counts: float | None = None
     pace: float = 1.0
-    accent: Sequence[float] = ()
+    accent: Sequence[float | str] = ()
     accent_kind: AccentKind = "fast"
     pin: Mapping[str, str] = field(default_factory=dict)
     hold: Sequence[str] = ()
@@ -199,21 +201,33 @@ class TweenRequest:
     @property
     def accents(self) -> Accents | None:
         """The accents, with their times; None for none."""
-        if not self.accent or self.tempo is None:
+        if not self.accent:
             return None
-        return Accents(tuple(counts_to_seconds(one - 1.0, self.tempo) for one in self.accent), self.accent_kind)
+        return Accents(tuple(map(self._seconds_of_accent, self.accent)), self.accent_kind)
+
+    def _seconds_of_accent(self, accent: float | str) -> float:
+        if isinstance(accent, str):
+            return parse_time("accent", accent, self.tempo)
+        assert self.tempo is not None
+        return counts_to_seconds(accent - 1.0, self.tempo)
 
     def _check_accents(self) -> None:
         if not self.accent:
             return
-        if self.tempo is None or self.length is None or self.moves is not None:
+        lacks_tempo = self.tempo is None and not all(isinstance(one, str) for one in self.accent)
+        if lacks_tempo or self.length is None or self.moves is not None:
             raise MotionMindError("accents on counts need a tempo, a duration or counts, and no number of moves")
-        last = seconds_to_count(self.length, self.tempo)
-        for one in self.accent:
-            if not 1.0 <= one <= last + 1e-9:
+        times = [self._seconds_of_accent(one) for one in self.accent]
+        for one, seconds in zip(self.accent, times, strict=True):
+            if not -1e-9 <= seconds <= self.length + 1e-9:
+                if isinstance(one, str):
+                    raise MotionMindError(f"accent: {displayed(one)} is not between A, 0 s, and B, {self.length:g} s")
+                assert self.tempo is not None
+                last = seconds_to_count(self.length, self.tempo)
                 raise MotionMindError(f"accent: count {one:g} is not between A, count 1, and B, count {last:g}")
-        if sorted(set(self.accent)) != list(self.accent):
-            raise MotionMindError(f"accent: the counts {', '.join(f'{one:g}' for one in self.accent)} must increase")
+        if sorted(set(times)) != times:
+            words = ", ".join(one if isinstance(one, str) else f"{one:g}" for one in self.accent)
+            raise MotionMindError(f"accent: the counts {displayed(words)} must increase")
 
     def _check_unlike(self) -> None:
         if self.what_if:
@@ -307,7 +321,7 @@ class TweenRequest:
             "moves": list(self.moves) if isinstance(self.moves, tuple) else self.moves,
             "pin": dict(self.pin),
             "hold": list(self.hold),
-            "accent": list(map(float, self.accent)),
+            "accent": [one if isinstance(one, str) else float(one) for one in self.accent],
             "without": list(self.without),
             "avoid": [list(pair) for pair in self.avoid],
             "via": [move if seconds is None else f"{seconds:g}s" for _, move, seconds in self.vias],

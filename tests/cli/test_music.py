@@ -47,6 +47,18 @@ def test_counts_of_music_set_the_length_and_the_time_of_a_via(run: Run, tmp_path
     assert json.loads(later.out)["asked"]["duration"] == pytest.approx(4.6 - 2.2)
 
 
+def test_accents_come_at_the_counts_of_music(run: Run, tmp_path: Path) -> None:
+    words = ["tween", "ballet/arabesque", "ballet/fifth", "--music", text_of_beats(tmp_path), "--counts", 6]
+    done = run(*words, "--accent", "2,4", "--report", "-")
+    report = json.loads(done.out)
+    assert report["asked"]["accent"] == ["0.700000s", "1.700000s"]
+    assert [(one["count"], one["seconds"]) for one in report["accented"]] == [(None, 0.7), (None, 1.7)]
+    assert all(one["frames"] is not None for one in report["accented"])
+    early = run(*words, "--accent", "0.5")
+    assert (early.code, early.out) == (2, "")
+    assert "--accent: counts begin with 1, which is A, not with 0.5" in early.err
+
+
 @pytest.mark.long
 def test_a_part_of_a_clip_is_shown_with_its_part_of_the_music(run: Run, tmp_path: Path) -> None:
     at = at_tempo(93.7, 0.4, 39.0)
