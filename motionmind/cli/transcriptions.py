@@ -51,7 +51,7 @@ COMPARISONS = (".gif", ".mp4", ".html", ".png", ".pdf")
     "--no-repeats",
     section=Section.MOTION,
     is_flag=True,
-    help="Write all postures in one list, without phrases for those that recur.",
+    help="Write all postures in one list, without phrases.",
 )
 @option("--report", section=Section.OUTPUT, type=FILE, help="File of the deviations over time, as JSON.")
 @reading

@@ -2,7 +2,7 @@
 
 A row is a *cell*, its posture, and a *move*, the way there. Both are numbers here, with the number of their mirror
 image; nothing here knows about bodies. A phrase recurs where its cells do, or their mirror images. Its moves may
-differ: a call of the phrase gives those that do.
+differ, and the calls of the phrase give them.
 """
 
 from __future__ import annotations
@@ -70,8 +70,8 @@ def find_repeats(rows: Rows) -> list[Repeat]:
     """Return phrases that shorten a score, in the order of their first calls; no two calls overlap.
 
     Each phrase saves the most rows of all phrases in the rows that no earlier one calls; this is exact. Phrases are
-    chosen one after another, since the best set of phrases is NP-hard to find (Charikar et al., "The Smallest Grammar
-    Problem", 2005).
+    chosen one after another, since the best set of phrases is NP-hard to find (Charikar et al., "The smallest grammar
+    problem", 2005).
     """
     cells, found = rows.cells.copy(), list[Repeat]()
     while best := best_repeat(rows._replace(cells=cells)):

@@ -26,7 +26,7 @@ from motionmind.transcription.recorded import Recorded
 STRETCH_RATIO = 2.0  # by which a move may take longer or shorter than in the first take
 N_BESIDE = 3  # frames on either side of the nearest one that may be a key
 MAX_VISITS = 20  # of the recording to a posture, the nearest ones
-_CHANGED = 1e-5  # price of another duration, in rows
+_CHANGED_RATIO = 1e-5  # price of another duration to that of a row
 
 
 class Take(NamedTuple):
@@ -118,7 +118,7 @@ def find_takes(following: Following, keys: Ints) -> list[list[Take]]:
             if later is not None and len(frames) and len(later[0].frames):
                 span = int(keys[k + 1] - keys[k])
                 first, last = _moves(following, poses, later[0], span)
-                total = 1.0 + later[1][last] - _CHANGED * (later[0].frames[last] - frames[first] != span)
+                total = 1.0 + later[1][last] - _CHANGED_RATIO * (later[0].frames[last] - frames[first] != span)
                 for i in np.argsort(total, kind="stable").tolist():  # the best last
                     rows[first[i]] = total[i]
                     paths[first[i]] = np.append(frames[first[i]], later[2][last[i]])
@@ -178,7 +178,7 @@ def _visits(off: Floats, key: int) -> list[Ints]:
 
 
 def choose_phrases(takes: list[list[Take]], keys: Ints, count: int) -> list[Phrase]:
-    """Choose phrases and takes of them that do not overlap, those first that save the most rows.
+    """Choose phrases and takes of them that do not overlap, the one first that saves the most rows.
 
     Args:
         takes: those that begin with each key's posture.

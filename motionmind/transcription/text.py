@@ -18,7 +18,7 @@ from motionmind.transcription.words import LINES, angle_terms, limb_word, trunk_
 
 PLANTED = "on"  # the position of a leg that bears weight
 OPEN = "MOVE"  # the open words of phrases: MOVE-2 is the move to the second posture
-CALL_WIDTH = 100  # characters, after which the line of a call is continued
+MAX_CALL_CHARS = 100  # of a line, after which the line of a call is continued
 
 
 @dataclass
@@ -177,7 +177,7 @@ def _call_lines(name: str, call: Call, given: list[Move]) -> list[str]:
     text += f", {call.times} times" if call.times > 1 else ""
     lines = [""]
     for part in text.split(", "):
-        if lines[-1] and len(lines[-1]) + len(part) > CALL_WIDTH:
+        if lines[-1] and len(lines[-1]) + len(part) > MAX_CALL_CHARS:
             lines.append("  ")
         lines[-1] += part + ", "
     return [line.rstrip() for line in [*lines[:-1], lines[-1].removesuffix(", ")]]
