@@ -181,7 +181,7 @@ def choose_phrases(takes: list[list[Take]], keys: Ints, count: int) -> list[Phra
     """Choose phrases and takes of them that do not overlap, the one first that saves the most rows.
 
     Args:
-        takes: those that begin with each key's posture.
+        takes: the takes that begin with each key's posture.
         keys: the key frames [K].
         count: number of frames.
     """
