@@ -144,7 +144,8 @@ def account(tween: Tween, corpus: Corpus, own: Floats, first: Motion | None = No
     if tween.moves == 0:
         return Account("no movement: both postures are the same", "", "", "proven the best", "", [], {})
     seconds = float(tween.motion.times[-1] - tween.motion.times[0])
-    words = "; ".join([f"{seconds:.1f} s", *_describe_reaches(tween), *feet_staying(tween.motion)])
+    asked = [*_describe_reaches(tween), *_describe_travel(tween)]
+    words = "; ".join([f"{seconds:.1f} s", *asked, *feet_staying(tween.motion)])
     differs, details = "", ""
     if first is not None:
         details = describe_joints(tween.motion, first)
@@ -203,6 +204,15 @@ def _describe_reaches(tween: Tween) -> list[str]:
         return []
     which = "the place" if count == 1 else f"{len(met)} of {count} places"
     return [f"reaches {which} to {max(*met, 0.1):.1f} cm"]
+
+
+def _describe_travel(tween: Tween) -> list[str]:
+    """Describe how far it travels, and how far off the drawn path, if within the tolerance; `beyond` has the others."""
+    travelled = tween.travelled
+    if travelled is None or not travelled.is_met:
+        return []
+    off = "" if travelled.off is None else f", up to {100.0 * travelled.off:.0f} cm off the path"
+    return [f"travels {travelled.length:.1f} m{off}"]
 
 
 def _describe_optimality(tween: Tween, is_other: bool) -> str:

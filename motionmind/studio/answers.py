@@ -192,6 +192,7 @@ class ProjectView(Answer):
     tempo: float
     counts: int
     reference: ReferenceView
+    stage: tuple[float, float] | None
     words: list[Text]
     missing: list[Text]
     postures: list[Saved]

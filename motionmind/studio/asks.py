@@ -1,4 +1,4 @@
-"""A choreographer's requests for an insertion: postures to pass, hands and feet to hold, and places to reach."""
+"""A choreographer's requests for an insertion: postures to pass, hands and feet to hold, places, and a path."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import msgspec
 
 MAX_INSERTION_S = 600.0
+MAX_FLOOR_POINTS = 64  # of a path, each of which can be dragged
 
 Key = Annotated[str, msgspec.Meta(min_length=1, max_length=400)]  # of a movement
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
@@ -14,6 +15,7 @@ Frame = Annotated[int, msgspec.Meta(ge=0, lt=2**31)]
 Hold = Literal["start", "end", "throughout", "place"]
 Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
 Metres = Annotated[float, msgspec.Meta(ge=-100.0, le=100.0)]
+Degrees = Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)]
 
 
 class _Struct(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -64,6 +66,20 @@ class Reach(_Struct, frozen=True):
     at: Annotated[float, msgspec.Meta(gt=0.0, le=MAX_INSERTION_S)]
 
 
+class Travel(_Struct, frozen=True):
+    """A path over the floor for an insertion, or the place where it ends.
+
+    Attributes:
+        points: x and z of each point, metres: to the left and ahead of the insertion's first posture. The insertion ends
+            on the last; with several, it follows the straight lines from its first posture through all of them.
+        facing: where the body faces at the end, degrees to the left of its first posture (of the audience, if the
+            corpus's dancers face it); None for where it does anyway.
+    """
+
+    points: Annotated[tuple[tuple[Metres, Metres], ...], msgspec.Meta(min_length=1, max_length=MAX_FLOOR_POINTS)]
+    facing: Degrees | None = None
+
+
 class Ask(_Struct, frozen=True):
     """A request for a seam's insertion.
 
@@ -72,9 +88,11 @@ class Ask(_Struct, frozen=True):
         passing: postures to pass through, in this order.
         pins: hands and feet that stay.
         reaches: places for hands and feet at given times.
+        travel: a path over the floor; None for any.
     """
 
     seconds: Annotated[float, msgspec.Meta(gt=0.0, le=MAX_INSERTION_S)] | None = None
     passing: Annotated[tuple[Passing, ...], msgspec.Meta(max_length=20)] = ()
     pins: Annotated[tuple[Pin, ...], msgspec.Meta(max_length=20)] = ()
     reaches: Annotated[tuple[Reach, ...], msgspec.Meta(max_length=20)] = ()
+    travel: Travel | None = None

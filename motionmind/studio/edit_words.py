@@ -22,6 +22,7 @@ from motionmind.studio.edits import (
     SaveVersion,
     SetCorpus,
     SetReference,
+    SetStage,
     SetTempo,
     SetTitle,
     Several,
@@ -44,6 +45,7 @@ _DESCRIPTIONS: Mapping[type, str] = {
     Erase: "delete a note",
     SetCorpus: "change the corpus",
     SetReference: "change the reference video",
+    SetStage: "change the stage",
     SetTempo: "change the tempo",
     SetTitle: "rename the piece",
 }

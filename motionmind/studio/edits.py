@@ -10,7 +10,8 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 
-from motionmind.studio.asks import MAX_INSERTION_S, Ask, Frame, Key, Name, Passing, Pin, Reach
+from motionmind.body.stage import STAGE_RANGE_M
+from motionmind.studio.asks import MAX_INSERTION_S, Ask, Frame, Key, Name, Passing, Pin, Reach, Travel
 
 MAX_BLOCKS = 10_000  # in a piece
 MAX_HOLD_S = 3600.0
@@ -24,6 +25,7 @@ Pace = Annotated[float, msgspec.Meta(ge=0.5, le=2.0)]  # of a stretch: 2 is twic
 Repeats = Annotated[int, msgspec.Meta(ge=1, le=100)]  # of a stretch
 Tempo = Annotated[float, msgspec.Meta(ge=20.0, le=300.0)]  # counts a minute
 Counts = Annotated[int, msgspec.Meta(ge=2, le=16)]  # of a phrase: dancers count eights
+Side = Annotated[float, msgspec.Meta(ge=STAGE_RANGE_M[0], le=STAGE_RANGE_M[1])]  # of a stage, metres
 Place = str | tuple[str, str]  # touched by an edit: a block's id, or the ids on both sides of a seam
 
 
@@ -185,11 +187,12 @@ class Wish(_Edit, frozen=True, tag="ask"):
     passing: Annotated[tuple[Passing, ...], msgspec.Meta(max_length=20)] = ()
     pins: Annotated[tuple[Pin, ...], msgspec.Meta(max_length=20)] = ()
     reaches: Annotated[tuple[Reach, ...], msgspec.Meta(max_length=20)] = ()
+    travel: Travel | None = None
 
     @property
     def ask(self) -> Ask:
         """The request without its seam."""
-        return Ask(self.seconds, self.passing, self.pins, self.reaches)
+        return Ask(self.seconds, self.passing, self.pins, self.reaches, self.travel)
 
 
 class Arrange(_Edit, frozen=True):
@@ -266,6 +269,12 @@ class SetReference(_Edit, frozen=True, tag="reference"):
     begins: Annotated[float, msgspec.Meta(ge=-36_000.0, le=36_000.0)] = 0.0
 
 
+class SetStage(_Edit, frozen=True, tag="stage"):
+    """Draw the edge of the stage, around the origin: its width and depth, metres; None for no stage."""
+
+    size: tuple[Side, Side] | None = None
+
+
 class SetTitle(_Edit, frozen=True, tag="title"):
     """Rename the piece."""
 
@@ -292,6 +301,7 @@ Single: TypeAlias = (
     | SavePosture
     | SetCorpus
     | SetReference
+    | SetStage
     | SetTempo
     | SetTitle
 )
@@ -348,6 +358,8 @@ def touched(edit: Edit) -> frozenset[Place]:
                 places.add("/corpus")
             case SetReference():
                 places.add("/reference")
+            case SetStage():
+                places.add("/stage")
             case SetTempo():
                 places.add("/tempo")
             case SetTitle():

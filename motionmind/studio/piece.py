@@ -33,6 +33,7 @@ from motionmind.studio.edits import (
     SavePosture,
     SetCorpus,
     SetReference,
+    SetStage,
     SetTempo,
     SetTitle,
     Single,
@@ -62,6 +63,7 @@ class State:
         tempo: counts a minute.
         counts: counts of a phrase.
         reference: the video beside it.
+        stage: width and depth of the stage around the origin, metres; None for none.
     """
 
     title: str = ""
@@ -76,6 +78,7 @@ class State:
     tempo: float = 120.0
     counts: int = 8
     reference: SetReference = field(default_factory=SetReference)
+    stage: tuple[float, float] | None = None
 
     @cached_property
     def seams(self) -> tuple[Seam, ...]:
@@ -214,6 +217,8 @@ def _apply(state: State, edit: Single) -> State:  # noqa: PLR0911 (one case an e
             return replace(state, corpus=name)
         case SetReference():
             return replace(state, reference=edit)
+        case SetStage(size):
+            return replace(state, stage=size)
         case SetTempo(tempo, counts):
             return replace(state, tempo=tempo, counts=counts)
         case SetTitle(title):

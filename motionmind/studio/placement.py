@@ -2,8 +2,8 @@
 
 A part is a stretch of a movement: a block, or the insertion at a seam. Each part begins at the floor position and
 heading where the previous one ends; a block that continues a recording keeps the recording's placement. If the
-corpus's dancers face the audience (facing "stage"), no part is turned. The page plays the parts with this placement,
-and `performance` joins them into one movement.
+corpus's dancers face the audience (facing "stage"), a part is turned only as far as an insertion's request turned those
+before it. The page plays the parts with this placement, and `performance` joins them into one movement.
 """
 
 from __future__ import annotations
@@ -210,6 +210,8 @@ def _joined(marks: Marks, before: Part, seam: Seam, key: str | None, turns: bool
     frames = 0, marks.length(key) - 1
     length = marks.at(key, frames[1]).time - marks.at(key, 0).time
     found = msgspec.structs.replace(_following(marks, before, key, frames, end, length, turns), inserted=True)
+    travel = seam.verdict.ask.travel
+    turns = turns or (travel is not None and travel.facing is not None)
     after = _following(marks, found, key_of(block), (block.first, block.last), end + length, seconds, turns)
     return [found, after]
 
@@ -217,9 +219,9 @@ def _joined(marks: Marks, before: Part, seam: Seam, key: str | None, turns: bool
 def _following(
     marks: Marks, before: Part, key: str, frames: tuple[int, int], at: float, seconds: float, turns: bool
 ) -> Part:
-    """Place a part where another one ends, turned to its heading if `turns`."""
+    """Place a part where another one ends, turned to its heading if `turns`, or else as far as that one is turned."""
     end, begin = marks.at(before.key, before.last), marks.at(key, frames[0])
-    turn = before.turn + end.heading - begin.heading if turns else 0.0
+    turn = before.turn + (end.heading - begin.heading if turns else 0.0)
     x, z = _turned(end.x, end.z, before.turn)
     own_x, own_z = _turned(begin.x, begin.z, turn)
     place = before.place[0] + x - own_x, before.place[1] + z - own_z

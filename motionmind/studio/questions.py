@@ -23,8 +23,9 @@ def question_of(ends: tuple[End, End], ask: Ask, corpus: str, versions: Mapping[
     names = {key.lstrip(MIRRORED).partition("/")[0] for key in _keys(ends, ask)} | {corpus}
     used = sorted((name, versions[name]) for name in names if name in versions)
     asked = msgspec.to_builtins(ask)
-    if not ask.reaches:
-        del asked["reaches"]  # so that answers from before there were reaches stay valid
+    for name in ("reaches", "travel"):
+        if not asked[name]:
+            del asked[name]  # so that answers from before there was such a request stay valid
     return hashlib.sha256(msgspec.json.encode([ends, asked, corpus, used])).hexdigest()[:32]
 
 

@@ -127,6 +127,11 @@ def options_of(ask: Ask, skeleton: Skeleton, movement: Movements) -> dict[str, A
         for reach in ask.reaches:
             skeleton.index(reach.joint)  # raises if there is none
         options["reach"] = [(reach.joint, reach.place, reach.at) for reach in ask.reaches]
+    if ask.travel is not None:
+        *_, last = points = ask.travel.points
+        options["to"] = last if ask.travel.facing is None else (*last, ask.travel.facing)
+        if len(points) > 1:
+            options["along"] = points
     return options
 
 

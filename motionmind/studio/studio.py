@@ -142,6 +142,7 @@ class Studio:
             "tempo": state.tempo,
             "counts": state.counts,
             "reference": {"path": state.reference.path, "begins": state.reference.begins},
+            "stage": state.stage,
             "words": project.words,
             "missing": project.missing,
             "postures": [{"name": name, "key": key} for name, key in state.postures.items()],
@@ -157,7 +158,7 @@ class Studio:
         self._shown |= {one["key"] for one in (*piece["parts"], *piece["blocks"])}
         nothing = {"file": "", "corpus": "", "corpora": {}, "words": [], "missing": [], "postures": []}
         nothing["reference"] = {"path": "", "begins": 0.0}
-        known = {name: whole[name] for name in ("sequence", "title", "saved", "tempo", "counts")}
+        known = {name: whole[name] for name in ("sequence", "title", "saved", "tempo", "counts", "stage")}
         return known | nothing | {"access": "look", "piece": piece | {"seams": []}, "undo": None, "redo": None}
 
     def has_shown(self, key: str) -> bool:

@@ -268,6 +268,10 @@ def test_a_question_is_told_apart_by_all_that_its_answer_depends_on():
         question_of((one, other), e.Ask(pins=(e.Pin("left_wrist"),)), "ballet", versions),
         question_of((one, other), e.Ask(passing=(e.Passing("karate/kata", 3),)), "ballet", versions),
         question_of((one, other), e.Ask(reaches=(e.Reach("left_wrist", (0.0, 1.0, 0.0), 1.0),)), "ballet", versions),
+        *(
+            question_of((one, other), e.Ask(travel=e.Travel(points, facing)), "ballet", versions)
+            for points, facing in ((((1.0, 2.0),), None), (((1.0, 2.0),), 0.0), (((1.0, 2.0), (1.0, 2.0)), None))
+        ),
         question_of((other, one), e.Ask(), "ballet", versions),
         *(
             question_of((msgspec.structs.replace(one, **change), other), e.Ask(), "ballet", versions)

@@ -85,6 +85,33 @@ def test_each_part_is_set_down_where_the_one_before_ends(blocks, inserted):
         assert np.cos(turned) == pytest.approx(1.0)
 
 
+@given(stretches, st.sets(st.integers(0, 4)), st.sets(st.integers(0, 4)))
+@settings(max_examples=60, deadline=None)
+def test_a_requested_facing_turns_all_that_follows_where_dancers_face_the_audience(blocks, inserted, facing):
+    state = piece_of(*blocks)
+    asked = {seam.pair: n in facing for n, seam in enumerate(state.seams)}
+    places = {seam.pair: n for n, seam in enumerate(state.seams)}
+    for (left, right), faces in asked.items():
+        travel = e.Travel(((1.0, 2.0), (0.5, 2.5)), 40.0 if faces else None)
+        state = apply_all([e.Wish(left, right, travel=travel)], state)
+    marks = Marks(movement, lambda _: "stage")
+    layout = lay_out(state, lambda seam: "m-found" if places[seam.pair] in inserted else None, marks)
+    own = iter(state.seams)
+    seam = None
+    for before, after in pairwise(layout.parts):
+        seam = next(own) if not before.inserted else seam
+        end, begin = (
+            performance([msgspec.structs.replace(part, inserted=False)], movement) for part in (before, after)
+        )
+        if before.inserted and asked[seam.pair]:
+            turned = rot.heading(end.rotations[-1, 0]) - rot.heading(begin.rotations[0, 0])
+            assert np.cos(turned) == pytest.approx(1.0)
+        else:
+            assert after.turn == before.turn
+        if not seam.goes_on:
+            assert end.root[-1, [0, 2]] == pytest.approx(begin.root[0, [0, 2]])
+
+
 @given(stretches, st.sampled_from(["free", "stage"]))
 @settings(max_examples=40, deadline=None)
 def test_the_performance_is_the_variation_s_arrangement(blocks, facing):

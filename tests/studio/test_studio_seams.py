@@ -2,14 +2,16 @@
 
 import re
 import time
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from motionmind.geometry import rotations as rot
+from motionmind.geometry.polylines import offsets_to
 from motionmind.studio import worker_loop
 from motionmind.studio.alternatives import MAX_ALTERNATIVES
-from motionmind.studio.asks import Ask, Passing, Pin, Reach
+from motionmind.studio.asks import Ask, Passing, Pin, Reach, Travel
 from motionmind.studio.neighbours import End
 from motionmind.studio.seams import Question, judge, smooth
 from motionmind.studio.sides import options_of, sides_of
@@ -93,6 +95,33 @@ def test_places_are_reached_or_the_words_say_how_far_off_they_are(clips):
     found, failure = smooth(say_nothing, "ballet", question(clips, ends, Ask(2.0, reaches=(late,))))
     assert found == []
     assert failure == "no movement found: reach right_wrist: 2.5 s is not between A and B: the movement lasts 2.00 s"
+
+
+def test_a_drawn_path_is_followed_and_the_words_say_how_far_off_it_is(clips):
+    ends = End("ballet/plies", 20, False), End("ballet/adagio-barre", 9, False)
+    corner = Travel(((0.0, 1.0), (1.0, 1.0)), 60.0)
+    found, failure = smooth(say_nothing, "ballet", question(clips, ends, Ask(travel=corner)))
+    assert failure == ""
+    for motion, words in found:
+        off = 100.0 * max(_off(motion, np.array([[0.0, 0.0], *corner.points])))
+        reported = re.search(r"travels 2\.0 m, up to (\d+) cm off the path", words)
+        assert reported
+        assert float(reported[1]) == pytest.approx(off, abs=1.0)
+        assert motion.root[-1, [0, 2]] == pytest.approx([1.0, 1.0], abs=0.01)
+        assert np.degrees(rot.heading(motion.rotations[-1, 0])) == pytest.approx(60.0, abs=0.1)
+    far = Travel(((0.0, 4.0), (2.0, 4.0), (-2.0, 4.0), (0.0, 8.0)))
+    (motion, words), *_ = smooth(say_nothing, "ballet", question(clips, ends, Ask(0.5, travel=far)))[0]
+    assert re.search(r"travels \d+\.\d m to 0, 8 m, facing .* degrees; up to \d+ cm off the path", words)
+
+
+def _off(motion, path):
+    """The greatest distances of the body from a path [P, 2], and of the path from the body's own, metres."""
+    own = motion.root[:, [0, 2]]
+    return (np.linalg.norm(offsets_to(a, b), axis=1).max() for a, b in ((path, own), (own, _dense(path))))
+
+
+def _dense(path):
+    return np.concatenate([np.linspace(one, other, 200) for one, other in pairwise(path)])
 
 
 def test_what_cannot_be_is_said_in_a_line(clips):

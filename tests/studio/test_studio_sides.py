@@ -6,7 +6,7 @@ import pytest
 from motionmind.body.mirror import mirrored
 from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
-from motionmind.studio.asks import Ask, Passing, Pin, Reach
+from motionmind.studio.asks import Ask, Passing, Pin, Reach, Travel
 from motionmind.studio.neighbours import End
 from motionmind.studio.sides import options_of, sides_of
 from motionmind.tween.engine import Engine
@@ -84,6 +84,10 @@ def test_wishes_are_options_of_the_engine(engine, clip):
     assert options_of(Ask(reaches=(reach,)), clip.skeleton, {}.__getitem__) == {
         "reach": [("left_wrist", (0.3, 1.4, 0.5), 1.2)]
     }
+    for facing, to in ((None, (1.0, 2.0)), (90.0, (1.0, 2.0, 90.0))):
+        place, path = Travel(((1.0, 2.0),), facing), Travel(((0.5, 0.5), (1.0, 2.0)), facing)
+        assert options_of(Ask(travel=place), clip.skeleton, {}.__getitem__) == {"to": to}
+        assert options_of(Ask(travel=path), clip.skeleton, {}.__getitem__) == {"to": to, "along": path.points}
     stay = Pin("left_ankle", "place", 0.25, 0.5)
     assert options_of(Ask(pins=(stay,)), clip.skeleton, {}.__getitem__) == {"stay": [("left_ankle", 0.25, 0.5)]}
     for wrong in (
