@@ -29,7 +29,6 @@ from motionmind.transcription.takes import choose_phrases, find_takes, match_tak
 from motionmind.transcription.text import ScoreWriter
 
 
-
 class Deviation(msgspec.Struct, frozen=True):
     """The deviation of a score's movement from its recording, frame by frame.
 
