@@ -92,6 +92,23 @@ def test_what_cannot_be_reached_for_is_refused(ballet: Engine) -> None:
         ballet.tween(A, B, reach=[("left_wrist", (0.0, 1.0, 0.0), 60.0)])
 
 
+@pytest.mark.long
+def test_alternatives_before_one_that_ends_before_the_reach_are_kept(run: Run) -> None:
+    run(*TWEEN, "--alternatives", 4, "-o", "free.json")
+    lasts = [float(read_motion(f"free-{number}.json").times[-1]) for number in range(1, 5)]
+    seconds = lasts[0] - 0.05
+    n_long = next(number for number, one in enumerate(lasts) if one < seconds)  # alternatives have paces of their own
+    assert n_long > 0
+    ran = run(*TWEEN, "--alternatives", 4, "--reach", f"left_wrist=0.3,1.2,0.3@{seconds:.3f}s", "-o", "t.json")
+    assert ran.code == 0
+    assert f"{n_long} of 4 found: reach left_wrist: {seconds:.3f}"[:-1] in ran.err
+    assert [Path(f"t-{number}.json").exists() for number in range(1, 5)] == [True] * n_long + [False] * (4 - n_long)
+    late = run(*TWEEN, "--alternatives", 4, "--reach", "left_wrist=0.3,1.2,0.3@60s", "-o", "u.json")
+    assert (late.code, late.out) == (2, "")
+    assert "reach left_wrist: 60 s is not between A and B" in late.err
+    assert not list(Path().glob("u*.json"))
+
+
 def test_the_command_line_reaches_and_prints_how_near(run: Run) -> None:
     place = place_of(Engine.load("ballet").tween(A, B).motion, "right_wrist", 1.2) + 0.1
     word = f"right_wrist={','.join(map(str, place))}@1.2s"

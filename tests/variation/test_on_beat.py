@@ -155,6 +155,22 @@ def test_straight_sound_is_the_pieces_own() -> None:
 
 
 @pytest.mark.long
+def test_a_sound_track_never_replaces_music_or_the_sound_of_the_piece(run: Run, tmp_path: Path) -> None:
+    motion, at = sounding_piece()
+    write_motion(tmp_path / "clip.bvh", motion)
+    kept = clicks(at, 40.0).encode("WAV")
+    for name in ("clip.wav", "song.wav"):
+        (tmp_path / name).write_bytes(kept)
+    words = ["vary", tmp_path / "clip.bvh", "--depart", 0.2, "--sound", "own", "--music", tmp_path / "song.wav"]
+    for name, track in (("song.json", "song.wav"), ("clip.json", "clip.wav")):
+        ran = run(*words, "-o", tmp_path / name)
+        assert ran.code == 2
+        assert f"{track}: cannot be written: it is read from" in ran.err
+        assert (tmp_path / track).read_bytes() == kept
+        assert not (tmp_path / name).exists()
+
+
+@pytest.mark.long
 def test_a_variation_takes_its_sound_along(run: Run, tmp_path: Path) -> None:
     motion, at = sounding_piece()
     write_motion(tmp_path / "clip.bvh", motion)

@@ -4,13 +4,27 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from bundled_clips import ballet_clip
 from command_line import Run
 
-from motionmind import Engine, Insertion, Motion, Piece, Variation, read_variation, vary, write_motion, write_variation
+from motionmind import (
+    Engine,
+    Insertion,
+    Motion,
+    NoPathError,
+    Piece,
+    Posture,
+    Tween,
+    Variation,
+    read_variation,
+    vary,
+    write_motion,
+    write_variation,
+)
 from motionmind.body.stage import find_overstep
 from motionmind.geometry import rotations as rot
 
@@ -70,6 +84,35 @@ def test_insertions_travel_so_that_runs_fit(ballet: Engine, facing: str, tmp_pat
             assert np.abs(turned).max() < 0.5
     write_variation(tmp_path / "v.json", placed)
     np.testing.assert_allclose(read_variation(tmp_path / "v.json").motion().root, motion.root, atol=1e-9)
+
+
+@pytest.mark.long
+def test_insertions_that_travel_for_longer_than_inserted_allows_are_noted(run: Run) -> None:
+    write_motion("far.json", travelling(6.0))
+    words = ("vary", "far.json", "--corpus", "ballet", "--alternatives", "1", "-o", "v.json")
+    assert "insertions travel" not in run(*words).err
+    ran = run(*words, "--stage", "3.2x3.2")
+    (told,) = [line for line in ran.err.splitlines() if "insertions travel to stay on the stage" in line]
+    assert "more than --inserted 0.3, which a larger --stage keeps" in told
+    assert "no order of" not in ran.err
+
+
+def test_where_no_insertion_can_travel_the_variation_is_centred(
+    ballet: Engine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tween = Engine.tween
+
+    def stays(self: Engine, *ends: Posture, **options: Any) -> Tween:
+        if options.get("to") is not None:
+            raise NoPathError("no path leads there")
+        return tween(self, *ends, **options)
+
+    monkeypatch.setattr(Engine, "tween", stays)
+    placed = made(ballet, (3.2, 3.2))
+    assert not placed.edits
+    level = placed.motion().root[:, [0, 2]]
+    np.testing.assert_allclose(level.min(axis=0), -level.max(axis=0), atol=1e-9)
+    assert find_overstep(placed.motion(), (3.2, 3.2)) is not None
 
 
 def test_what_follows_a_travelling_insertion_is_carried_with_it() -> None:
