@@ -18,12 +18,13 @@ from motionmind.cli.music import check_sounding, read_part_of_sound, track_besid
 from motionmind.cli.options import HOME, Section, command, option, output, outputs, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_movement, read_movements, select_part
-from motionmind.cli.types import COUNT, FILE_OR_FOLDER, FRAME, RATE, Whole
+from motionmind.cli.types import COUNT, FILE_OR_FOLDER, FRAME, RATE, Number, Whole
 from motionmind.clip_names import GLTF_SUFFIXES, distinct_names
 from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError, enumerated
 from motionmind.files import all_or_none
 from motionmind.render import PICTURES, may_sound
+from motionmind.tween.counts import TEMPO_RANGE_BPM
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
@@ -71,13 +72,33 @@ LAST = option(
 )
 @FIRST
 @LAST
-@option("--every", section=Section.PART, type=COUNT, metavar="N", help="Interval between drawn frames  [default: 1]")
+@option(
+    "--every",
+    section=Section.PART,
+    type=COUNT,
+    metavar="N",
+    help="Interval between drawn frames or counts  [default: 1]",
+)
 @option(
     "--postures",
     section=Section.PART,
     type=COUNT,
     metavar="N",
     help="Number of evenly spaced frames to draw, from the first to the last.",
+)
+@option(
+    "--tempo",
+    section=Section.PART,
+    type=Number(*TEMPO_RANGE_BPM),
+    metavar="BPM",
+    help="Counts per minute, to draw counts from 1 on, --every so many, instead of frames.",
+)
+@option(
+    "--counts",
+    section=Section.PART,
+    type=COUNT,
+    metavar="N",
+    help="Number of counts of --tempo to draw: with 8, counts 1 to 8  [default: to the last frame]",
 )
 @option(
     "--columns",
@@ -101,6 +122,8 @@ def sheet(
     names: tuple[str, ...],
     every: int | None,
     postures: int | None,
+    tempo: float | None,
+    counts: int | None,
     start: int,
     end: int,
     columns: int | None,
@@ -114,12 +137,13 @@ def sheet(
     A clip of a glTF file is 'hero.glb#Dance'. --clip selects clips of a score, a corpus or a glTF file.
 
     The sheet draws each posture from the front and from the side, and its feet from above, with its time and frame
-    number: frame 23 is the posture SOURCE@23. Of an ensemble (.toml) it draws all dancers before one camera, at counts,
-    --every so many (seconds without a tempo), by default at most 24 times.
+    number: frame 23 is the posture SOURCE@23; or with its count, with --tempo. Of an ensemble (.toml) it draws all
+    dancers before one camera, at counts, --every so many (seconds without a tempo), by default at most 24 times.
     """
     from motionmind.files import write_atomically
     from motionmind.render.sheet import check_frames, draw_sheet, png
 
+    _check_counts(tempo, counts, postures)
     if is_ensemble(source, [output], PRINTS):
         _print_ensemble(source, output, home, every, postures, reading_options)
         return
@@ -133,16 +157,23 @@ def sheet(
     if not folder and len(motions) != 1:
         clips = f"{source} holds {len(motions)} clips, {enumerated(one.name for one in motions)}"
         raise MotionMindError(f"{output}: {clips}; choose one by --clip, or give a folder")
-    frames = [_select_drawn(select_part(named, motion, start, end), every, postures) for motion in motions]
+    parts, lengths = [select_part(named, motion, start, end) for motion in motions], list(map(len, motions))
+    captions: list[list[str] | None] = [None] * len(motions)
+    if tempo is None:
+        frames = [_select_drawn(part, every, postures) for part in parts]
+    else:
+        cut = [motion.slice(part.start, part.stop) for motion, part in zip(motions, parts, strict=True)]
+        motions, captions = map(list, zip(*(_at_counts(one, tempo, every or 1, counts) for one in cut), strict=True))
+        frames = [range(len(one)) for one in motions]
     for motion, drawn in zip(motions, frames, strict=True):
         check_frames(motion, drawn)
     paths = _make_files(folder, motions, named.source.paths) if folder else [output]
     with all_or_none():
-        for path, motion, drawn in zip(paths, motions, frames, strict=True):
-            picture = draw_sheet(motion, drawn, columns=columns, side=side)
+        for path, motion, drawn, words, length in zip(paths, motions, frames, captions, lengths, strict=True):
+            picture = draw_sheet(motion, drawn, columns=columns, side=side, captions=words)
             write_atomically(path, png(picture))
             number = count(len(drawn), "posture")
-            click.echo(f"{displayed_path(path)}: {number} of {len(motion)}, {picture.width} x {picture.height} pixels")
+            click.echo(f"{displayed_path(path)}: {number} of {length}, {picture.width} x {picture.height} pixels")
 
 
 @command("motionmind render clip.bvh -o clip.html")
@@ -259,13 +290,33 @@ def _select_drawn(frames: range, every: int | None, postures: int | None) -> Seq
     return evenly(frames, postures) if postures else frames[:: every or 1]
 
 
+def _check_counts(tempo: float | None, counts: int | None, postures: int | None) -> None:
+    """Check that --counts comes with --tempo, and --postures with neither."""
+    if counts is not None and tempo is None:
+        raise click.UsageError("--counts needs --tempo")
+    if tempo is not None and postures is not None:
+        raise click.UsageError("--tempo and --postures both choose the postures to draw; give one of them")
+
+
+def _at_counts(motion: Motion, tempo: float, every: int, counts: int | None) -> tuple[Motion, list[str]]:
+    """Return a motion's postures on every `every`th count of a tempo, and a caption for each, such as "count 3"."""
+    import numpy as np
+
+    from motionmind.tween.counts import counts_to_seconds, seconds_to_count
+
+    last = seconds_to_count(float(motion.times[-1] - motion.times[0]) + 1e-6, tempo)
+    numbers = np.arange(1, int(last if counts is None else min(last, counts)) + 1, every)
+    at = motion.at(motion.times[0] + counts_to_seconds(numbers - 1.0, tempo))
+    return at, [f"count {number}" for number in numbers.tolist()]
+
+
 def _print_ensemble(
     source: str, output: Path, home: Path | None, every: int | None, postures: int | None, options: dict[str, Any]
 ) -> None:
     """Draw the sheet of an ensemble."""
     if every and postures:
         raise MotionMindError("--every and --postures both choose the times to draw; give one of them")
-    without = ["names", "start", "end", "columns", "side"]
+    without = ["names", "start", "end", "columns", "side", "tempo", "counts"]
     ensemble = open_ensemble(source, [output], PRINTS, home, without, **options)
     from motionmind.render.group_sheet import write_group_sheet
 
