@@ -19,6 +19,7 @@ from motionmind.tween.counts import parse_time
 
 if TYPE_CHECKING:
     from motionmind.music import Beats, Sound
+    from motionmind.names.spelling import Source
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -104,11 +105,11 @@ def sound_of_counts(music: Path | None, beats: Beats | None, outputs: Sequence[P
     return read_part_of_sound(music, beats.start)
 
 
-def track_beside(files: Sequence[Path], outputs: Sequence[Path]) -> Path | None:
-    """Return the sound track beside the file of a clip, as clip.wav beside clip.bvh, if an output may have sound."""
-    from motionmind.music.sound import sound_beside
+def track_of(source: Source, clip: str | None, home: Path | None, outputs: Sequence[Path]) -> Path | None:
+    """Return the sound track of a clip, as clip.wav beside clip.bvh, if an output may have sound."""
+    from motionmind.names.tracks import find_sound
 
-    beside = sound_beside(files[0]) if len(files) == 1 and any(map(may_sound, outputs)) else None
+    beside = find_sound(source, clip, home) if any(map(may_sound, outputs)) else None
     if beside and find_spec("soundfile") is None:
         note(f'{displayed_path(beside)}: left out; sound needs the extra: pip install "motionmind[music]"')
         return None

@@ -14,7 +14,7 @@ from motionmind.cli import completion
 from motionmind.cli.delivery import for_program
 from motionmind.cli.ensembles import describe_ensemble, is_ensemble, open_ensemble
 from motionmind.cli.files import check_outputs, note_licences
-from motionmind.cli.music import check_sounding, read_part_of_sound, track_beside, with_music
+from motionmind.cli.music import check_sounding, read_part_of_sound, track_of, with_music
 from motionmind.cli.options import HOME, Section, command, option, output, outputs, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_movement, read_movements, select_part
@@ -251,7 +251,7 @@ def render(
             raise MotionMindError(f"--fps and --for {program} both set the frames per second; give one of them")
         motion = motion.stretch_to(PROGRAMS[program].fps)
         drawing["fps"] = motion.fps
-    track = music or track_beside(named.source.paths, outputs)
+    track = music or track_of(named.source, name, home, outputs)
     since = float(whole.times[frames.start] - whole.times[0])
     sound = read_part_of_sound(track, (offset or 0.0) + since) if track else None
     with all_or_none():

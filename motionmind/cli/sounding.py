@@ -15,6 +15,7 @@ from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
     from motionmind.music import Beats, Sound
+    from motionmind.names.spelling import Source
     from motionmind.variation.variation import Variation
 
 Sounds = Literal["own", "straight", "none"]
@@ -59,7 +60,9 @@ class Sounding:
 
 
 def find_sounding(
-    files: Sequence[Path],
+    source: Source,
+    clip: str | None,
+    home: Path | None,
     *,
     sound: Sounds | None,
     music: Path | None,
@@ -67,7 +70,7 @@ def find_sounding(
     tempo: float | None,
     on_beat: int | None,
 ) -> Sounding:
-    """Read the beats of a variation, and find the sound track of its piece, whose files are `files`.
+    """Read the beats of a variation, and find the sound track of its piece, a clip of a source.
 
     Raises:
         MotionMindError: the music cannot be read, or there is no sound track; a usage error if options lack others.
@@ -81,12 +84,14 @@ def find_sounding(
         beats = beats_of_tempo(tempo)
     track = None
     if sound in ("own", "straight"):
-        from motionmind.music.sound import SOUND_SUFFIXES, sound_beside
+        from motionmind.music.sound import SOUND_SUFFIXES
+        from motionmind.names.tracks import find_sound
 
-        track = sound_beside(files[0]) if len(files) == 1 else None
+        track = find_sound(source, clip, home)
         if track is None:
             kinds = ", ".join(SOUND_SUFFIXES)
             raise MotionMindError(
-                f"--sound {sound} needs a motion file with its sound beside it, of the same name: {kinds}"
+                f"--sound {sound} needs a motion file with its sound beside it, of the same name: {kinds}; or a clip "
+                "of a score that names its sound"
             )
     return Sounding(music, beats, track, sound)

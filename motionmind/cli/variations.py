@@ -269,7 +269,7 @@ def vary(
     files += [(report, ())] if report else []
     named = parse_movement(source, home)
     choices = {name: options.pop(name) for name in ("sound", "music", "offset", "on_beat")}
-    heard = find_sounding(named.source.paths, tempo=options["tempo"], **choices)
+    heard = find_sounding(named.source, options["clip"], home, tempo=options["tempo"], **choices)
     files += [(path, (".wav",)) for path in heard.tracks(outputs)]
     sources = (named.source, *via_sources(options, home))
     given = [path for source in sources for path in source.paths] + heard.files

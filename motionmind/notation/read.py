@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from unicodedata import normalize
 
 from motionmind.arguments import check_path
@@ -236,12 +236,29 @@ def _add_phrase(score: Score, word: str, rest: str, inner: list[Line], where: Wh
     name = name.strip()
     known = score.phrases.get(name)
     _check_name(name, (name,) if known and known.score is score else (), where)
-    if name in ("start", "tempo") or name[0].isdigit():
+    if name in ("start", "tempo", "sound") or name[0].isdigit():
         raise where.error(f"{quoted(name)} cannot be a phrase's name: such lines have another meaning")
-    if not inner:
+    lines, sound = _split_sound(inner) if word == "clip" else (inner, "")
+    if not lines:
         raise where.error(f"{word} {name} has no lines")
-    make = Clip if word == "clip" else Phrase
-    score.phrases[name] = make(name, score, tuple(inner), where, words, about)
+    if word == "clip":
+        score.phrases[name] = Clip(name, score, tuple(lines), where, words, about, sound)
+    else:
+        score.phrases[name] = Phrase(name, score, tuple(lines), where, words, about)
+
+
+def _split_sound(inner: list[Line]) -> tuple[list[Line], str]:
+    """Return the lines of a clip without `sound FILE`, and the file; "" for none."""
+    named = [line for line in inner if _word(line) == "sound"]
+    if not named:
+        return inner, ""
+    if len(named) > 1:
+        raise named[1].where.error("a second sound; a clip has one")
+    file = named[0].text.removeprefix("sound").strip()
+    place = PurePosixPath(file)
+    if not file or place.is_absolute() or ".." in place.parts or "\\" in file or "\0" in file:
+        raise named[0].where.error(f"{quoted(file, 60)} is not a file beside the score; write sound FILE, as song.wav")
+    return [line for line in inner if line is not named[0]], file
 
 
 def _include(score: Score, where: Where, name: str, other: Score) -> None:

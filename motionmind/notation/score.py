@@ -86,8 +86,15 @@ class Phrase:
     about: str = ""
 
 
+@dataclass(frozen=True, eq=False)
 class Clip(Phrase):
-    """A phrase that is a movement in its own right."""
+    """A phrase that is a movement in its own right.
+
+    Attributes:
+        sound: its sound file, from the score's folder; "" for none.
+    """
+
+    sound: str = ""
 
 
 @dataclass(eq=False)
