@@ -16,6 +16,7 @@ from motionmind.cli.options import given_option
 from motionmind.cli.sources import parse_movement, read_bodies, read_movement
 from motionmind.clip_names import split_clip
 from motionmind.display import displayed
+from motionmind.ensemble import NEAR_M
 from motionmind.errors import MotionMindError
 from motionmind.files import name_of
 
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     from motionmind.body.motion import Motion
     from motionmind.ensemble.dancers import Ensemble
     from motionmind.ensemble.keeping import Shift
-
-NEAR_M = 0.7  # an arm's length: dancers who come nearer are worth a look
 
 
 def is_ensemble(source: str, outputs: Sequence[Path], suffixes: tuple[str, ...]) -> bool:

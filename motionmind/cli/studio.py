@@ -85,9 +85,9 @@ def studio(
 ) -> None:
     """Open the studio, a page in the browser to compose, vary and pose movement, until Ctrl-C.
 
-    FILE is a project (.motionmind), created if missing, or movement or a variation to start from, whose project is
-    created beside it. Without FILE, the command creates a project in the user's data folder. Requires an extra: pip
-    install "motionmind[studio]".
+    FILE is a project (.motionmind), created if missing, or movement, an ensemble or a variation to start from, whose
+    project is created beside it. Without FILE, the command creates a project in the user's data folder. Requires an
+    extra: pip install "motionmind[studio]".
     """
     import webbrowser  # here, since other commands do not need it
 
@@ -206,6 +206,16 @@ def _project(file: Path | None, corpus: str, home: Path | None) -> Project:
         judge = corpus_of(variation)
         project = Project.create(place, judge if judge and _is_here(judge, home) else corpus, home)
         take_in(project, variation, _TERMINAL_WINDOW)
+        return project
+    if file.suffix.lower() == ".toml":
+        from motionmind.cli.ensembles import open_ensemble
+        from motionmind.studio.casting import check_tempo, take_in_ensemble
+
+        options = dict.fromkeys(("joints", "unit", "asf", "source_fps", "up"))
+        ensemble = open_ensemble(str(file), [], (), home, [], **options)
+        check_tempo(ensemble)
+        project = Project.create(place, corpus, home)
+        take_in_ensemble(project, ensemble, _TERMINAL_WINDOW)
         return project
     source = parse_movement(str(file), home).source
     motions = read_movements(source, (), home, whole=True, joints=None, unit=None, asf=None, source_fps=None, up=None)

@@ -158,7 +158,7 @@ def _sent(path: Path, file: _File, dancers: Sequence[Dancer]) -> tuple[Dancer, .
         else:
             targets = places_in(change.formation or file.formation, len(dancers), change.spacing or file.spacing)
             targets = assigned(whereabouts(dancers, start), targets)
-        _check_spots(where, "end", [one.name for one in dancers], targets)
+        check_spots(where, "end", [one.name for one in dancers], targets)
         dancers = send(dancers, targets, start, end)
     return tuple(dancers)
 
@@ -169,11 +169,11 @@ def _places(path: Path, file: _File, names: list[str]) -> Floats:
     for i, one in enumerate(file.dancer):
         if one.place is not None:
             places[i] = one.place
-    _check_spots(str(path), "begin", names, places)
+    check_spots(str(path), "begin", names, places)
     return places
 
 
-def _check_spots(where: str, verb: str, names: Sequence[str], places: Floats) -> None:
+def check_spots(where: str, verb: str, names: Sequence[str], places: Floats) -> None:
     """Raise a FormatError if two dancers begin, or end, on one spot; places are [N, 2], metres."""
     apart = np.linalg.norm(places[:, None] - places[None], axis=-1) + np.where(np.eye(len(names)), np.inf, 0.0)
     i, k = (int(index) for index in np.unravel_index(int(apart.argmin()), apart.shape))

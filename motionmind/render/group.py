@@ -14,7 +14,7 @@ from motionmind.render.ground import darken
 from motionmind.render.lettering import font
 from motionmind.render.palette import STAGE, dancer_ink
 from motionmind.render.stage import Stage, look
-from motionmind.render.view import VIEWS
+from motionmind.render.view import VIEWS, View
 
 
 class GroupStage:
@@ -26,12 +26,13 @@ class GroupStage:
         camera: the camera.
     """
 
-    def __init__(self, motions: Sequence[Motion], *, view: str = "quarter", size: int = 480) -> None:
+    def __init__(self, motions: Sequence[Motion], *, view: str | View = "quarter", size: int = 480) -> None:
         """Set the stage for motions of one clock; arguments and errors as of `Stage`."""
         self.stages = [Stage(motion, view=view, size=size) for motion in motions]
         first = self.stages[0]
         self.motion = first.motion
-        self.camera, ground = look([stage.extent for stage in self.stages], VIEWS[view], size, first.strip)
+        direction = VIEWS[view] if isinstance(view, str) else view
+        self.camera, ground = look([stage.extent for stage in self.stages], direction, size, first.strip)
         for number, stage in enumerate(self.stages):
             stage.camera, stage.ground = self.camera, ground
             stage.dress(dancer_ink(number))

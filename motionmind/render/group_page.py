@@ -9,7 +9,7 @@ from motionmind.body.mirror import MIDDLE, mirrored
 from motionmind.credits.credit import add_up
 from motionmind.credits.ledger import ledger_of, sections_of
 from motionmind.display import displayed
-from motionmind.ensemble.dancers import Ensemble
+from motionmind.ensemble.dancers import Dancer, Ensemble
 from motionmind.files import FilePath, write_atomically
 from motionmind.music.sound import Sound
 from motionmind.render.page import fill_page, player_data, sound_data
@@ -31,6 +31,23 @@ def write_group_page(path: FilePath, ensemble: Ensemble, sound: Sound | None = N
     write_atomically(path, fill_page(ensemble.name, data, "main").encode())
 
 
+def dancer_data(number: int, dancer: Dancer) -> dict[str, Any]:
+    """Return the data of a dancer, without its piece, for the player; `number` counts from 0."""
+    return {
+        "name": displayed(dancer.name),
+        "colour": dancer_ink(number),
+        "place": dancer.place,
+        "facing": dancer.facing,
+        "entry": dancer.entry,
+        "ways": [(way.start, way.end, *way.shift) for way in dancer.ways],
+    }
+
+
+def paints(dancers: int) -> list[dict[str, Any]]:
+    """Return the paints of each of so many dancers' bodies."""
+    return [COLOURS | {MIDDLE: dancer_ink(number)} for number in range(dancers)]
+
+
 def _group_data(ensemble: Ensemble) -> dict[str, Any]:
     """Build the data that the player reads, as documented in player/README.md."""
     pieces: dict[tuple[int, bool], dict[str, Any]] = {}
@@ -40,17 +57,7 @@ def _group_data(ensemble: Ensemble) -> dict[str, Any]:
         if key not in pieces:
             pieces[key] = player_data(mirrored(dancer.piece) if dancer.is_mirrored else dancer.piece)
             colours = pieces[key].pop("colours")
-        dancers.append(
-            {
-                "name": displayed(dancer.name),
-                "colour": dancer_ink(number),
-                "piece": [*pieces].index(key),
-                "place": dancer.place,
-                "facing": dancer.facing,
-                "entry": dancer.entry,
-                "ways": [(way.start, way.end, *way.shift) for way in dancer.ways],
-            }
-        )
+        dancers.append(dancer_data(number, dancer) | {"piece": [*pieces].index(key)})
     times = ensemble.times()
     motions = [dancer.piece for dancer in ensemble.dancers]
     parts = add_up(replace(one, share=one.share / len(motions)) for motion in motions for one in motion.credits)
@@ -58,7 +65,7 @@ def _group_data(ensemble: Ensemble) -> dict[str, Any]:
         "name": displayed(ensemble.name),
         "dancers": dancers,
         "pieces": [*pieces.values()],
-        "colours": {**colours, "dancers": [COLOURS | {MIDDLE: one["colour"]} for one in dancers]},
+        "colours": {**colours, "dancers": paints(len(dancers))},
         "frames": len(times),
         "rate": 1.0 / (times[1] - times[0]),
         "credits": sections_of(ledger_of(parts)) if any(one.insertions or one.recorded for one in motions) else {},

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from motionmind.studio.asks import Ask
+from motionmind.studio.dancers import Change, Dancer
 from motionmind.studio.edits import Decision, NoteKind
 from motionmind.studio.findings import Found
 from motionmind.studio.view import SeamState
@@ -179,6 +180,48 @@ class ReferenceView(Answer):
     begins: float
 
 
+class CastView(Answer):
+    """The dancers of the piece, their changes of formation, and the size of their stage."""
+
+    dancers: list[Dancer]
+    changes: list[Change]
+    stage: tuple[float, float] | None
+
+
+class DancerView(Answer):
+    """A dancer for the player: facing in radians, times in seconds; `ways` as in player/README.md."""
+
+    id: str
+    name: str
+    colour: tuple[int, int, int]
+    place: tuple[float, float]
+    facing: float
+    entry: float
+    end: float
+    mirrored: bool
+    source: str
+    ways: list[tuple[float, float, float, float]]
+
+
+class EnsembleView(Answer):
+    """The dancers as they play together, and their bodies' paints."""
+
+    dancers: list[DancerView]
+    paints: list[dict[str, Any]]
+    frames: int
+    rate: float
+    seconds: float
+
+
+class Approaching(Answer):
+    """Two dancers who come nearer than an arm's length: how near, and when."""
+
+    names: tuple[str, str]
+    metres: float
+    seconds: float
+    count: float
+
+
 class ProjectView(Answer):
     """The project as a window sees it; with `access` "look" little else than its piece."""
 
@@ -196,6 +239,7 @@ class ProjectView(Answer):
     words: list[Text]
     missing: list[Text]
     postures: list[Saved]
+    cast: CastView
     piece: PieceView
     undo: str | None
     redo: str | None

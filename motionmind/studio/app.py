@@ -14,6 +14,7 @@ from starlette.routing import BaseRoute, Route, Router
 from motionmind.studio import (
     api,
     between,
+    casting,
     comments,
     export,
     filming,
@@ -46,6 +47,7 @@ from motionmind.studio.token import Keys
 # Each has a function `routes`.
 _PARTS = (
     api,
+    casting,
     seams,
     between,
     comments,

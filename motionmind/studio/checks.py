@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
+from motionmind.studio.dancers import Dancer, PutDancer
 from motionmind.studio.edits import Arrange, Block, Edit, Insert, SavePosture, Trim, Wish, each
 from motionmind.studio.neighbours import OWN, key_of
 from motionmind.studio.piece import State
@@ -31,6 +32,8 @@ def check_movements(state: State, edit: Edit, frames: Callable[[str], int]) -> N
                 pass
             case Wish(passing=passing):
                 blocks = [Block("passing", state.stable(at.posture), at.frame, at.frame) for at in passing]
+            case PutDancer(Dancer(source=source)) if source:
+                blocks = [Block("dancer", source, 0, 0)]
             case SavePosture(posture=str(posture)):
                 blocks = [Block("posture", posture, 0, 0)]
             case _:

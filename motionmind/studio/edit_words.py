@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from motionmind.studio.dancers import PutDancer, RemoveDancer, SetFormations, described
 from motionmind.studio.edits import (
     Annotate,
     Arrange,
@@ -75,5 +76,7 @@ def words_of(edit: Edit) -> str:  # noqa: PLR0911 (one case an edit)
             return f"go back to {edit.name}"
         case SavePosture():
             return f"{'delete' if edit.posture is None else 'save'} the posture {edit.name}"
+        case PutDancer() | RemoveDancer() | SetFormations():
+            return described(edit)
         case _:
             return _DESCRIPTIONS[edit.__class__]

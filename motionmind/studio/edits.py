@@ -12,6 +12,7 @@ import msgspec
 
 from motionmind.body.stage import STAGE_RANGE_M
 from motionmind.studio.asks import MAX_INSERTION_S, Ask, Frame, Key, Name, Passing, Pin, Reach, Travel
+from motionmind.studio.dancers import PutDancer, RemoveDancer, SetFormations, cast_places
 
 MAX_BLOCKS = 10_000  # in a piece
 MAX_HOLD_S = 3600.0
@@ -304,6 +305,9 @@ Single: TypeAlias = (
     | SetStage
     | SetTempo
     | SetTitle
+    | PutDancer
+    | RemoveDancer
+    | SetFormations
 )
 
 
@@ -364,4 +368,6 @@ def touched(edit: Edit) -> frozenset[Place]:
                 places.add("/tempo")
             case SetTitle():
                 places.add("/title")
+            case PutDancer() | RemoveDancer() | SetFormations():
+                places.add(cast_places(one))
     return frozenset(places)

@@ -37,6 +37,7 @@ _MEDIA_TYPES = {
     "motionmind": "application/jsonl",
     "pdf": "application/pdf",
     "png": "image/png",
+    "zip": "application/zip",
 }
 
 
@@ -76,9 +77,9 @@ def routes(studio: Studio) -> list[BaseRoute]:
     """Return the routes for exports and credits."""
     makers: dict[str, Callable[[Motion], bytes]] = {
         "html": lambda motion: page(motion).encode(),
-        "glb": lambda motion: _written(motion, ".glb"),
-        "bvh": lambda motion: _written(motion if motion.is_even else motion.resample(30.0), ".bvh"),
-        "json": lambda motion: _written(motion, ".json"),
+        "glb": lambda motion: written(".glb", lambda path: write_motion(path, motion)),
+        "bvh": lambda motion: bvh(motion if motion.is_even else motion.resample(30.0)),
+        "json": lambda motion: written(".json", lambda path: write_motion(path, motion)),
     }
 
     async def export(request: Request) -> Response:
@@ -98,14 +99,16 @@ def routes(studio: Studio) -> list[BaseRoute]:
     return [Route("/api/export/{format}", export), Route("/api/credits", credit)]
 
 
-def _written(motion: Motion, suffix: str) -> bytes:
-    """Return a motion file's content."""
+def bvh(motion: Motion) -> bytes:
+    """Return the content of a BVH file of an evenly sampled motion, in metres: Blender's unit; the panel says so."""
+    return written(".bvh", lambda path: write_bvh(path, motion, "m"))
+
+
+def written(suffix: str, write: Callable[[Path], None]) -> bytes:
+    """Return the content of a file that a function writes to a path with this suffix."""
     with tempfile.TemporaryDirectory(prefix="motionmind-") as folder:
         path = Path(folder) / f"piece{suffix}"
-        if suffix == ".bvh":
-            write_bvh(path, motion, "m")  # Blender's unit; the panel says so
-        else:
-            write_motion(path, motion)
+        write(path)
         return path.read_bytes()
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import asyncio
 import shutil
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import msgspec
+from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.routing import BaseRoute, Route
@@ -18,6 +19,7 @@ from motionmind._typing import Pixels
 from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 from motionmind.studio import api
+from motionmind.studio.casting import ensemble_of
 from motionmind.studio.export import composed, file_name, saving_headers
 from motionmind.studio.room import Room
 from motionmind.studio.workers import Job, Report
@@ -47,22 +49,27 @@ class _Film(NamedTuple):
     job: Job
 
 
-def draw_film(report: Report, motion: Motion, direction: Direction, path: Path) -> None:
+def draw_film(report: Report, motions: Sequence[Motion], direction: Direction, path: Path) -> None:
     """Draw and encode a film, in a worker.
 
     Args:
         report: receives the number of frames drawn.
-        motion: the motion.
+        motions: the motion, or those of several dancers on one clock, at the film's rate.
         direction: where the camera stands.
         path: the file.
     """
     from motionmind.render.film import encode_mp4
+    from motionmind.render.group import GroupStage
     from motionmind.render.stage import Stage
     from motionmind.render.timing import frame_times
     from motionmind.render.view import view_from
 
     view = view_from("as in the studio", direction.azimuth, max(direction.elevation, MIN_ELEVATION_DEG))
-    stage = Stage(motion, frame_times(motion, FILM_RATE_FPS), view=view, size=FILM_HEIGHT_PX)
+    stage: Stage | GroupStage
+    if len(motions) > 1:
+        stage = GroupStage(motions, view=view, size=FILM_HEIGHT_PX)
+    else:
+        stage = Stage(motions[0], frame_times(motions[0], FILM_RATE_FPS), view=view, size=FILM_HEIGHT_PX)
 
     def reported() -> Iterator[Pixels]:
         for number, picture in enumerate(stage.frames()):
@@ -92,8 +99,11 @@ def routes(studio: Studio) -> list[BaseRoute]:
         direction = await api.body_of(request, Direction)
         if encoder_program() is None:
             return api.json({"job": None})  # the page then films by itself
-        motion = composed(studio)
-        if len(motion) < 2:
+        motions = [composed(studio)]
+        if studio.project.state.cast.dancers:
+            ensemble = await ensemble_of(studio)
+            motions = await run_in_threadpool(ensemble.motions, ensemble.times(FILM_RATE_FPS))
+        if len(motions[0]) < 2:
             raise MotionMindError("the piece is a single posture: nothing to film")
         for old in [one for one in films.values() if one.job.state == "done"][: 1 - _MAX_KEPT_FILMS]:
             _remove(films.pop(old.job.id))
@@ -101,7 +111,7 @@ def routes(studio: Studio) -> list[BaseRoute]:
         folder = room.folder / str(number)
         folder.mkdir()
         path = folder / "film.mp4"
-        job = studio.workers.submit("film", draw_film, motion, direction, path)
+        job = studio.workers.submit("film", draw_film, motions, direction, path)
         films[job.id] = _Film(path, file_name(studio.project.state.title, "mp4"), job)
         tidying.add(task := asyncio.create_task(tidy(job)))
         task.add_done_callback(tidying.discard)

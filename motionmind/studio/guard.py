@@ -36,6 +36,7 @@ LOOKING = (
     ("GET", "/api/movements/{key:path}"),
     ("GET", "/api/thumbnails/{key:path}/{frame}.png"),
     ("GET", "/api/credits"),
+    ("GET", "/api/ensemble"),
     ("POST", "/api/comments"),
 )
 _LOOKING_PATTERNS = [(method, compile_path(path)[0]) for method, path in LOOKING]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 def routes(studio: Studio) -> list[BaseRoute]:
     """Return the routes for uploads and corpora."""
-    uploads = Uploads()
+    uploads = studio.uploads = Uploads()
     return [*_upload_routes(studio, uploads), *_corpus_routes(studio, uploads)]
 
 

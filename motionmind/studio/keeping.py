@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def versions_of(studio: Studio, state: State) -> list[VersionView]:
     """Return the versions in a state of the project, the latest first, compared with its piece."""
     project = studio.project
-    now = Version(state.blocks, state.verdicts, state.notes, state.about)
+    now = Version(state.blocks, state.verdicts, state.notes, state.about, state.cast)
 
     def seconds(version: Version) -> float:
         whole = replace(state, **version._asdict())

@@ -17,6 +17,7 @@ import msgspec
 
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
+from motionmind.studio.dancers import Cast, PutDancer, RemoveDancer, SetFormations, recast
 from motionmind.studio.edits import (
     MAX_BLOCKS,
     Arrange,
@@ -64,6 +65,7 @@ class State:
         counts: counts of a phrase.
         reference: the video beside it.
         stage: width and depth of the stage around the origin, metres; None for none.
+        cast: the dancers.
     """
 
     title: str = ""
@@ -79,6 +81,7 @@ class State:
     counts: int = 8
     reference: SetReference = field(default_factory=SetReference)
     stage: tuple[float, float] | None = None
+    cast: Cast = field(default_factory=Cast)
 
     @cached_property
     def seams(self) -> tuple[Seam, ...]:
@@ -223,6 +226,8 @@ def _apply(state: State, edit: Single) -> State:  # noqa: PLR0911 (one case an e
             return replace(state, tempo=tempo, counts=counts)
         case SetTitle(title):
             return replace(state, title=title)
+        case PutDancer() | RemoveDancer() | SetFormations():
+            return replace(state, cast=recast(state.cast, edit))
         case _:
             return replace(state, **changed(state, edit))
 

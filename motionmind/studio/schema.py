@@ -10,8 +10,10 @@ from typing import Any, NamedTuple
 import msgspec
 
 from motionmind.studio.answers import (
+    Approaching,
     Asking,
     Begun,
+    EnsembleView,
     Entered,
     Entering,
     Failure,
@@ -119,6 +121,10 @@ CALLS = (
     Call("POST", "/api/pose/score", Keeping, Lines),
     Call("GET", "/api/reference", None, "application/octet-stream"),
     Call("POST", "/api/reference", Referring, ProjectView),
+    Call("GET", "/api/ensemble", None, EnsembleView),
+    Call("POST", "/api/ensemble", None, ProjectView),
+    Call("GET", "/api/ensemble/near", None, list[Approaching]),
+    Call("GET", "/api/ensemble/{format}", None, "application/octet-stream"),
     Call("GET", "/api/recent", None, list[RecentProject]),
     Call("POST", "/api/recent", RecentOpening, Nothing),
     Call("GET", "/api/versions", None, list[VersionView]),

@@ -14,9 +14,11 @@ from motionmind.jit import interpreted
 from motionmind.render.page import player_data
 from motionmind.studio.events import Events
 from motionmind.studio.movements import Movements
+from motionmind.studio.neighbours import MIRRORED
 from motionmind.studio.preparation import Steps, Told, told
 from motionmind.studio.project import Project
 from motionmind.studio.thumbnails import THUMBNAIL_HEIGHT_PX, Thumbnails, thumbnail
+from motionmind.studio.uploads import Uploads
 from motionmind.studio.view import view_of
 from motionmind.studio.worker_loop import MAX_ENGINES
 from motionmind.studio.workers import Job, Workers
@@ -34,11 +36,13 @@ class Studio:
         events: events sent to the open windows.
         thumbnails: cache of small pictures.
         workers: the worker processes, set once the server runs.
+        uploads: uploaded files, set by their routes.
         has_stopped: whether smoothing of seams is paused.
         is_shared: whether other computers can reach it.
     """
 
     workers: Workers
+    uploads: Uploads
 
     def __init__(
         self,
@@ -146,6 +150,7 @@ class Studio:
             "words": project.words,
             "missing": project.missing,
             "postures": [{"name": name, "key": key} for name, key in state.postures.items()],
+            "cast": state.cast._asdict(),
             "piece": view_of(state, project.finding, project.marks, project.movements.title, project.standing),
             "undo": project.undoable(window),
             "redo": project.redoable(window),
@@ -155,10 +160,15 @@ class Studio:
         """Return the project as the look-only link shows it: the piece and its notes."""
         whole = self.view("-")
         piece = whole["piece"]
-        self._shown |= {one["key"] for one in (*piece["parts"], *piece["blocks"])}
+        dancers = self.project.state.cast.dancers
+        shown = {one["key"] for one in (*piece["parts"], *piece["blocks"])} | {one.source for one in dancers} - {""}
+        if any(one.mirrored for one in dancers):
+            shown |= {key.removeprefix(MIRRORED) if key.startswith(MIRRORED) else MIRRORED + key for key in shown}
+        self._shown |= shown
         nothing = {"file": "", "corpus": "", "corpora": {}, "words": [], "missing": [], "postures": []}
         nothing["reference"] = {"path": "", "begins": 0.0}
-        known = {name: whole[name] for name in ("sequence", "title", "saved", "tempo", "counts", "stage")}
+        shared = ("sequence", "title", "saved", "tempo", "counts", "stage", "cast")
+        known = {name: whole[name] for name in shared}
         return known | nothing | {"access": "look", "piece": piece | {"seams": []}, "undo": None, "redo": None}
 
     def has_shown(self, key: str) -> bool:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, Protocol
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.studio import notes
+from motionmind.studio.dancers import Cast, cast_differences
 from motionmind.studio.edits import Annotate, Block, Erase, GoBack, Note, SaveVersion
 from motionmind.studio.notes import Notes
 
@@ -25,12 +26,14 @@ class Version(NamedTuple):
         verdicts: the requests and decisions at its seams.
         notes: its notes.
         about: origin of its order.
+        cast: its dancers.
     """
 
     blocks: tuple[Block, ...]
     verdicts: Mapping[tuple[str, str], Any]
     notes: Notes
     about: Mapping[str, Any]
+    cast: Cast = Cast()
 
 
 class _Piece(Protocol):
@@ -44,6 +47,8 @@ class _Piece(Protocol):
     def notes(self) -> Notes: ...
     @property
     def about(self) -> Mapping[str, Any]: ...
+    @property
+    def cast(self) -> Cast: ...
     @property
     def versions(self) -> Mapping[str, Version]: ...
 
@@ -59,7 +64,7 @@ def changed(state: _Piece, edit: Annotate | Erase | SaveVersion | GoBack) -> dic
     if isinstance(edit, SaveVersion) and edit.keep:
         if len(state.versions) >= _MAX_VERSIONS and edit.name not in state.versions:
             raise MotionMindError(f"a project has at most {_MAX_VERSIONS} versions: delete some")
-        version = Version(state.blocks, state.verdicts, state.notes, state.about)
+        version = Version(state.blocks, state.verdicts, state.notes, state.about, state.cast)
         return {"versions": {**state.versions, edit.name: version}}
     if edit.name not in state.versions:
         raise MotionMindError(f"there is no version “{displayed(edit.name)}”")
@@ -92,6 +97,7 @@ def differences(before: Version, now: Version, seconds: tuple[float, float]) -> 
     words += [f"{_counted(others, 'insertion', 'insertions')} changed"] * bool(others)
     texts = sum(_is_other(before.notes.get(name), now.notes.get(name), new) for name in {*before.notes, *now.notes})
     words += [f"{_counted(texts, 'note', 'notes')} changed"] * bool(texts)
+    words += cast_differences(before.cast, now.cast)
     longer = seconds[1] - seconds[0]
     if abs(longer) > _SAME_LENGTH_S:
         words.append(f"{abs(longer):.2f} s {'longer' if longer > 0.0 else 'shorter'}")

@@ -81,6 +81,7 @@ def test_every_open_route_of_the_link_is_one_of_the_studio(served: Served) -> No
         "/api/movements/{key:path}",
         "/api/thumbnails/{key:path}/{frame}.png",
         "/api/credits",
+        "/api/ensemble",
         "/api/comments",
     }
 

@@ -70,14 +70,8 @@ class Dancer {
 
 /** The dancers on one clock, with what the player and the line of time ask of a motion. */
 export class Ensemble {
-  constructor(data) {
-    const pieces = data.pieces.map((piece) => new Motion(piece));
-    const known = new Map(); // dancers whose bodies are alike share one
-    const bodies = data.pieces.map(({ skeleton, body }) => {
-      const key = JSON.stringify([skeleton, body]);
-      if (!known.has(key)) known.set(key, new Body(skeleton, body));
-      return known.get(key);
-    });
+  /** @param {object} data what README.md describes  @param {Motion[]} pieces  @param {Body[]} bodies of the pieces */
+  constructor(data, pieces = data.pieces.map((piece) => new Motion(piece)), bodies = bodiesOf(data.pieces)) {
     this.name = data.name;
     this.sound = data.sound && decoded(data.sound); // a sound file, or undefined
     this.dancers = data.dancers.map((dancer) => new Dancer(dancer, pieces, bodies));
@@ -140,6 +134,7 @@ export class GroupStage extends Stage {
     this.layers = [new Scene(), new Scene()];
     this.layers[1].add(this.figure.group, ...[...this.bridges.values()].map(({ group }) => group));
     this.heads = dancers.map(() => new Vector3());
+    for (const old of this.labels ?? []) old.remove();
     this.labels = dancers.map((dancer) => label(dancer, this.canvas.parentElement));
   }
 
@@ -235,6 +230,16 @@ export function writeDancers(group, ensemble, refresh) {
     group.append(button);
   }
   group.hidden = false;
+}
+
+/** The bodies of pieces: those that are alike are one. */
+function bodiesOf(pieces) {
+  const known = new Map();
+  return pieces.map(({ skeleton, body }) => {
+    const key = JSON.stringify([skeleton, body]);
+    if (!known.has(key)) known.set(key, new Body(skeleton, body));
+    return known.get(key);
+  });
 }
 
 /** Whether a joint of the dancer's moves as no corpus attests. */

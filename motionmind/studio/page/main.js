@@ -3,6 +3,7 @@
 import { html, render, useLayoutEffect, useRef } from "./vendor/htm-preact-standalone.js";
 import { api, pictured } from "./begin.js";
 import * as between from "./between/panel.js";
+import * as dancers from "./dancers/panel.js";
 import * as take from "./export/panel.js";
 import * as movement from "./imports/panel.js";
 import { Looking } from "./look/page.js";
@@ -25,6 +26,7 @@ const PANELS = [
   { name: "between", words: "A to B", about: "From one posture to another", views: between },
   { name: "vary", words: "Variations", about: "The piece in another order", views: vary },
   { name: "pose", words: "Pose", about: "Pose a body by hand", views: pose },
+  { name: "dancers", words: "Dancers", about: "Several dancers of the piece", views: dancers },
   { name: "movement", words: "Movement", about: "Your own movement, and corpora", views: movement },
   { name: "take", words: "Export", about: "Export the piece: film, Blender, web page", views: take },
 ];
@@ -61,7 +63,7 @@ function Studio({ studio, open }) {
     <${Shown} toasts=${studio.toasts} />`;
 }
 
-/** Tabs of the five panels: one Tab stop, and arrow keys move between them. @param {{name: string, open: Open}} props */
+/** Tabs of the panels: one Tab stop, and arrow keys move between them. @param {{name: string, open: Open}} props */
 function Rail({ name, open }) {
   const move = (/** @type {KeyboardEvent} */ event) => {
     const by = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 }[event.key];

@@ -1,5 +1,6 @@
 /** The viewer: one movement, or two side by side, seen from one camera. It knows no edits. */
 
+import { GroupStage } from "motionmind/group";
 import { Pictures } from "motionmind/pictures";
 import { Player } from "motionmind/player";
 import { Stage } from "motionmind/stage";
@@ -16,7 +17,12 @@ function stageIn(half, motion, changed) {
   canvas.setAttribute("role", "img");
   canvas.setAttribute("aria-label", "The body in 3D: drag to rotate, scroll to zoom");
   half.append(canvas);
-  return new Stage(canvas, motion, motion.body, motion.colours, changed);
+  return stageOf(canvas, motion, changed);
+}
+
+/** A stage for a movement, or for all dancers of one. @param {HTMLCanvasElement} canvas @param {any} motion @param {() => void} changed */
+export function stageOf(canvas, motion, changed) {
+  return new (motion.dancers ? GroupStage : Stage)(canvas, motion, motion.body, motion.colours, changed);
 }
 
 /** Fires "show" when another movement is shown, and "draw" after each picture. */
@@ -31,8 +37,9 @@ export class Viewer extends EventTarget {
     this.player = new Player(/** @type {any} */ (STILL));
     this.element = made("stage");
     this.halves = [made("half"), made("half")];
+    this.crowd = Object.assign(made("crowd"), { hidden: true }); // in place of the first half, for several dancers
     this.overlay = made("overlay");
-    this.element.append(this.halves[0], this.overlay);
+    this.element.append(this.crowd, this.halves[0], this.overlay);
     this.title = "";
     /** What is drawn besides the body, as `Stage.show` takes it. */
     this.ghosts = { ends: true, onion: 0, trails: /** @type {string[]} */ ([]), waypoints: /** @type {number[]} */ ([]) };
@@ -43,8 +50,10 @@ export class Viewer extends EventTarget {
     this.beside = undefined;
     /** @type {any} */
     this.piece = undefined;
-    /** @type {any} */
+    /** @type {any} the one in view */
     this.stage = undefined;
+    /** @type {Map<HTMLElement, any>} the stages of the first half and of the crowd */
+    this.kept = new Map();
     /** @type {any} */
     this.other = undefined;
     /** @type {{middle: any, reach: number} | undefined} the region of movement that the camera was set up for */
@@ -80,7 +89,7 @@ export class Viewer extends EventTarget {
     this.piece = undefined;
     if (!this.isHome || !this.motion) return;
     Object.assign(this, { motion: undefined, beside: undefined, title: "" });
-    for (const half of this.halves) half.hidden = true;
+    for (const half of [...this.halves, this.crowd]) half.hidden = true;
     this.player.pause();
     this.player.motion = /** @type {any} */ (STILL);
     this.player.seek(0);
@@ -151,10 +160,15 @@ export class Viewer extends EventTarget {
     const { motion, beside } = this;
     this.element.classList.toggle("two", Boolean(beside));
     if (beside && !this.halves[1].isConnected) this.halves[0].after(this.halves[1]);
-    this.halves[0].hidden = false;
+    const [half, unused] = motion.dancers ? [this.crowd, this.halves[0]] : [this.halves[0], this.crowd];
+    half.hidden = false;
+    unused.hidden = true;
     this.halves[1].hidden = !beside;
-    if (!this.stage) this.stage = this.#stage(this.halves[0], motion);
-    else this.stage.take(motion, motion.body, motion.colours);
+    const kept = this.kept.get(half);
+    kept?.take(motion, motion.body, motion.colours);
+    if (this.stage !== kept) this.framed = undefined; // another camera
+    this.stage = kept ?? this.#stage(half, motion);
+    this.kept.set(half, this.stage);
     if (beside && !this.other) this.other = this.#stage(this.halves[1], beside);
     else if (beside) this.other.take(beside, beside.body, beside.colours);
     if (look || this.#strays()) this.look(this.stage.view ?? "quarter");
@@ -201,7 +215,7 @@ export class Viewer extends EventTarget {
 
   #colour() {
     document.documentElement.classList.toggle("dark", this.theme.dark);
-    for (const stage of [this.stage, this.other]) if (stage) stage.dark = this.theme.dark;
+    for (const stage of [...this.kept.values(), this.other]) if (stage) stage.dark = this.theme.dark;
     this.stale();
   }
 

@@ -1,10 +1,10 @@
 /** Film the piece, so that the page stays usable: on the server, or else here, with a stage of its own. */
 
 import { film, obstacle } from "motionmind/film";
-import { Stage } from "motionmind/stage";
 import { movement } from "../movements.js";
 import { perStudio } from "../shell/hooks.js";
-import { Composed, Movements } from "../timeline/composed.js";
+import { Movements } from "../timeline/composed.js";
+import { stageOf } from "../viewer.js";
 
 const UNSAFE = /[\\/:*?"<>|\u0000-\u001f\u007f]+/g; // in file names, on some system
 /** The films of a studio. */
@@ -80,7 +80,7 @@ async function drawn({ api, store, viewer }, progress, signal) {
   return { blob: await answer.blob(), name: nameOf(answer) ?? "piece.mp4" };
 }
 
-/** Where a stage's camera stands, in degrees. @param {Stage} stage */
+/** Where a stage's camera stands, in degrees. @param {any} stage */
 function direction({ camera, controls }) {
   const [x, y, z] = camera.position.clone().sub(controls.target).normalize().toArray();
   const degrees = 180 / Math.PI;
@@ -106,15 +106,14 @@ async function recorded({ api, store, viewer }, progress, signal) {
   Object.assign(place.style, { width: `${clientWidth}px`, height: `${clientHeight}px` });
   place.append(canvas);
   document.body.append(place);
-  /** @type {Stage | undefined} */
+  /** @type {any} */
   let stage;
   try {
     const movements = new Movements((/** @type {string} */ key) => movement(api, key));
-    await movements.load(piece.parts[0].key);
-    const motion = /** @type {any} */ (new Composed(piece.parts, movements, piece.name));
+    const motion = await piece.copy(movements);
     await motion.load();
     signal.throwIfAborted();
-    stage = new Stage(canvas, motion, motion.body, motion.colours, () => {});
+    stage = stageOf(canvas, motion, () => {});
     stage.dark = viewer.theme.dark;
     stage.filming = false; // takes up the size
     stage.camera.position.copy(position);

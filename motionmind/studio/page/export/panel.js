@@ -6,6 +6,12 @@ import { filmingOf, nameOf, offer } from "./filming.js";
 import { Sheet } from "./sheet.js";
 import { Versions } from "./versions.js";
 
+const GROUP_FILES = [
+  { format: "html", testid: "export-html", name: "Web page", words: "All dancers in one file to send: it plays in any browser, without the studio." },
+  { format: "glb", testid: "export-glb", name: "GLB", words: "All dancers in one file, for Blender and the web." },
+  { format: "bvh", testid: "export-bvh", name: "BVH", words: "A file for each dancer, in metres, in an archive (ZIP)." },
+  { format: "toml", testid: "export-toml", name: "Ensemble", words: "The ensemble's TOML file and its movement (ZIP), for the command line." },
+];
 const FILES = [
   { format: "html", testid: "export-html", name: "Web page", words: "One file to send: it plays in any browser, without the studio." },
   { format: "glb", testid: "export-glb", name: "GLB", words: "Body and movement, for Blender and the web." },
@@ -18,16 +24,19 @@ export function Panel({ studio }) {
   const { store } = studio;
   const empty = useChange(store, () => !store.state?.piece?.blocks.length);
   const file = useChange(store, () => store.state?.file ?? "");
+  const several = useChange(store, () => Boolean(store.state?.cast.dancers.length));
+  const [files, from] = several ? [GROUP_FILES, "/api/ensemble"] : [FILES, "/api/export"];
   return html`<div class="stack" data-testid="export">
     <h2>Export</h2>
     ${
       empty
         ? html`<p class="empty">The piece is empty. Go from A to B or add a clip to the time line, then export here.</p>`
-        : html`${FILES.map(
+        : html`${files.map(
             ({ format, testid, name, words }) => html`<${Format} key=${format} name=${name} words=${words}>
-              <${Save} studio=${studio} path=${() => `/api/export/${format}`} testid=${testid} />
+              <${Save} studio=${studio} path=${() => `${from}/${format}`} testid=${testid} />
             <//>`,
           )}
+          ${several && html`<${Format} name="Motion" words=${FILES[3].words}><${Save} studio=${studio} path=${() => "/api/export/json"} testid="export-json" /><//>`}
           <${Film} studio=${studio} />
           <${Sheet} studio=${studio} Save=${Save} />
           <${Credits} studio=${studio} />`

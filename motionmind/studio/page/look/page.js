@@ -72,7 +72,8 @@ function Form({ studio, piece, movements }) {
   const send = (/** @type {Event} */ event) => {
     event.preventDefault();
     studio.once("comment", async () => {
-      const place = anchorOf(piece, player.time, (block) => movements.at(block.key)?.times);
+      const { motion } = studio.viewer;
+      const place = anchorOf(piece, motion?.own?.(player.time) ?? player.time, (block) => movements.at(block.key)?.times);
       studio.store.take(await studio.api.post("/api/comments", { author, text, ...place }));
       localStorage.setItem(NAME, author);
       setText("");
@@ -100,7 +101,7 @@ function Notes({ studio, piece }) {
   const go = (/** @type {any} */ note) => {
     if (!note) return;
     if (player.playing) player.pause();
-    player.seek(note.at);
+    player.seek(studio.viewer.motion?.clock?.(note.at) ?? note.at);
     list.current?.querySelector(`[data-note="${note.id}"]`)?.scrollIntoView({ block: "nearest" });
   };
   useKeys(studio, [

@@ -1,5 +1,6 @@
 /** The time line's actions, which buttons, keys and gestures share. */
 
+import { castOf } from "../dancers/cast.js";
 import { copyGroup, groupOf, moveGroup, reaching, together } from "./groups.js";
 import { noteFrom } from "./notes.js";
 import { countFrom, fitting, middleOf, nearestCount, revealing, zoomed } from "./scale.js";
@@ -54,7 +55,7 @@ export class Actions {
     this.listeners = new Set();
     const follow = () => {
       const { viewer } = studio;
-      if (viewer.isHome && viewer.player) this.#pass(viewer.player.time, viewer.player.playing);
+      if (viewer.isHome && viewer.player) this.#pass(viewer.motion?.own?.(viewer.player.time) ?? viewer.player.time, viewer.player.playing);
     };
     studio.viewer.addEventListener("show", follow);
     studio.viewer.player.addEventListener("change", follow);
@@ -219,7 +220,7 @@ export class Actions {
     this.look();
     const { player } = this.studio.viewer;
     player.pause();
-    player.seek(time);
+    player.seek(this.studio.viewer.motion?.clock?.(time) ?? time); // when the first of several dancers is there
   }
 
   moveBy(by) {
@@ -387,7 +388,7 @@ export class Actions {
 
   fit() {
     const { seconds, blocks } = this.piece;
-    this.show({ scale: fitting(seconds, this.sight.width, blocks.length), left: 0, fits: true });
+    this.show({ scale: fitting(Math.max(seconds, castOf(this.studio).seconds), this.sight.width, blocks.length), left: 0, fits: true });
   }
 
   /** Scroll a stretch of time into view. */

@@ -78,6 +78,29 @@ export class Composed {
     return this.times[this.length - 1];
   }
 
+  /** The keys of its movements. */
+  get keys() {
+    return this.parts.map(({ key }) => key);
+  }
+
+  /** The same, of movements of which the first has then loaded. @param {Movements} movements */
+  async copy(movements) {
+    await movements.load(this.parts[0].key);
+    return new Composed(this.parts, movements, this.name);
+  }
+
+  /** The mirrored piece, of which the first movement has then loaded. */
+  async mirrored() {
+    const parts = this.parts.map((part) => ({
+      ...part,
+      key: part.key.startsWith("~") ? part.key.slice(1) : `~${part.key}`,
+      place: /** @type {[number, number]} */ ([-part.place[0], part.place[1]]),
+      turn: -part.turn,
+    }));
+    await this.movements.load(parts[0].key);
+    return new Composed(parts, this.movements, this.name);
+  }
+
   /** Load the movements of all parts in order. */
   async load() {
     const keys = [...new Set(this.parts.map(({ key }) => key))];

@@ -1,13 +1,14 @@
 /** The time line below the viewer: stretches, seams, and wishes. */
 
 import { html, useEffect, useMemo, useReducer, useState } from "../vendor/htm-preact-standalone.js";
+import { castOf, NOBODY } from "../dancers/cast.js";
 import { movement } from "../movements.js";
 import { thumbnail } from "../places.js";
 import { useStore } from "../store.js";
 import { Actions } from "./actions.js";
 import { Composed, Movements } from "./composed.js";
 import { EMPTY, selected } from "./items.js";
-import { useKeys } from "../shell/hooks.js";
+import { useChange, useKeys } from "../shell/hooks.js";
 import { act, KEYS } from "./keys.js";
 import { NoteSheet } from "./notes.js";
 import { fitting } from "./scale.js";
@@ -38,9 +39,10 @@ export function Panel({ studio }) {
   const does = useMemo(() => new Actions(studio, new Movements((key) => movement(studio.api, key)), show), [studio]);
   does.sight = sight;
   const joints = usePlayed(studio, does.movements, piece).filter((name) => LIMBS.test(name));
+  const whole = useChange(castOf(studio), () => Math.max(piece.seconds, castOf(studio).seconds));
   useEffect(() => {
-    if (sight.fits) show({ scale: fitting(piece.seconds, sight.width, piece.blocks.length), left: 0 });
-  }, [piece.seconds, piece.blocks.length, sight.width, sight.fits]);
+    if (sight.fits) show({ scale: fitting(whole, sight.width, piece.blocks.length), left: 0 });
+  }, [whole, piece.blocks.length, sight.width, sight.fits]);
   const stopped = useStore(studio, (store) => store.stopped);
   useEffect(() => studio.keys.add(ROWS), [studio]);
   useKeys(studio, [
@@ -68,7 +70,7 @@ export function Panel({ studio }) {
       onStop=${(stop) => does.smooth(!stop)}
       sheet=${sight.sheet}
     />
-    <${Tracks} does=${does} piece=${piece} sight=${sight} selection=${selection} meter=${meter} thumbnail=${picture} />
+    <${Tracks} does=${does} piece=${piece} whole=${whole} sight=${sight} selection=${selection} meter=${meter} thumbnail=${picture} />
     ${sight.sheet &&
     seam &&
     html`<${WishSheet}
@@ -113,7 +115,9 @@ function same(old, change) {
  * Return the names of its joints; none until they are known.
  */
 export function usePlayed(studio, movements, { parts }) {
-  const told = JSON.stringify(parts);
+  const cast = useStore(studio, ({ state }) => state?.cast) ?? NOBODY;
+  const tempo = useStore(studio, ({ state }) => state?.tempo);
+  const told = JSON.stringify([parts, cast, cast.dancers.length && tempo]);
   const [joints, setJoints] = useState([]);
   useEffect(() => {
     if (parts.length === 0) {
@@ -126,13 +130,15 @@ export function usePlayed(studio, movements, { parts }) {
       if (stale) return;
       const composed = new Composed(parts, movements, studio.store.state.title ?? "");
       setJoints(composed.joints);
-      const { time } = studio.viewer.isHome ? studio.viewer.player : { time: 0 };
-      studio.viewer.home(composed, { time });
-      await composed.load();
+      const played = await castOf(studio).gather(composed);
       if (stale) return;
-      movements.keep(parts.map(({ key }) => key));
+      const { time } = studio.viewer.isHome ? studio.viewer.player : { time: 0 };
+      studio.viewer.home(played, { time });
+      await played.load();
+      if (stale) return;
+      movements.keep(played.keys);
       const now = studio.viewer.isHome ? studio.viewer.player.time : 0;
-      studio.viewer.home(composed, { time: now });
+      studio.viewer.home(played, { time: now });
     };
     shown().catch((error) => studio.say(error.message, { kind: "error" }));
     return () => (stale = true);

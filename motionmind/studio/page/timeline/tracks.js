@@ -2,6 +2,7 @@
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { dropped, POSTURE_TYPE } from "../between/desk.js";
+import { Lanes } from "../dancers/lanes.js";
 import { Seams, Stretches, Wishes } from "./blocks.js";
 import { Drag } from "./gestures.js";
 import { groupOf, reaching } from "./groups.js";
@@ -13,7 +14,7 @@ import { Playhead, Ruler } from "./ruler.js";
 const LEAD_PX = 16; // before the piece, as in timeline.css: a posture at its start extends to both sides of 0
 const END_PX = 160; // after the piece, to drop postures
 
-export function Tracks({ does, piece, sight, selection, meter, thumbnail }) {
+export function Tracks({ does, piece, whole, sight, selection, meter, thumbnail }) {
   const scroller = useRef(null);
   const drag = useRef(null);
   const [draft, setDraft] = useState(null);
@@ -123,7 +124,7 @@ export function Tracks({ does, piece, sight, selection, meter, thumbnail }) {
     onDragLeave=${() => setOver("")}
     onDrop=${drop}
   >
-    <div class="inner" style=${{ width: `${Math.max(piece.seconds * sight.scale + END_PX, sight.width)}px` }}>
+    <div class="inner" style=${{ width: `${Math.max(whole * sight.scale + END_PX, sight.width)}px` }}>
       <${Ruler} does=${does} sight=${sight} seconds=${piece.seconds} meter=${meter} />
       <${Notes} does=${does} notes=${piece.notes} sight=${sight} />
       <div
@@ -151,6 +152,7 @@ export function Tracks({ does, piece, sight, selection, meter, thumbnail }) {
         />
       </div>
       <${Playhead} does=${does} scale=${sight.scale} />
+      <${Lanes} does=${does} sight=${sight} />
     </div>
   </div>`;
 }

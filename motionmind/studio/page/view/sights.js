@@ -101,7 +101,7 @@ export function Sights({ studio }) {
       </div>`
     }
     <div class="row">
-      <button class="button quiet" data-testid="sights" aria-expanded=${String(open)} aria-controls=${open ? "sights" : undefined}
+      <button class="button quiet" data-testid="sights" disabled=${Boolean(motion.dancers)} aria-expanded=${String(open)} aria-controls=${open ? "sights" : undefined}
         title="Trails and onion skin" onClick=${() => toggle("open")}>Show</button>
       <button class="button quiet" data-testid="colours" aria-expanded=${String(colours)} title="Legend of the colours (C)"
         onClick=${() => toggle("colours")}>Colours</button>
@@ -121,7 +121,7 @@ function Legend({ viewer }) {
   const list = useRef(/** @type {any} */ (null));
   const write = () => {
     list.current.replaceChildren();
-    if (viewer.motion) writeLegend(list.current, viewer.motion, viewer.motion.body, viewer.motion.colours);
+    if (viewer.motion) writeLegend(list.current, viewer.motion.painted ?? viewer.motion, viewer.motion.body, viewer.motion.colours);
   };
   useLayoutEffect(write, []);
   useEffect(() => {
