@@ -18,6 +18,7 @@ from motionmind.cli.corpora import corpora
 from motionmind.cli.credits import credits as credit
 from motionmind.cli.exits import ExitCode
 from motionmind.cli.gaps import gaps
+from motionmind.cli.laban import laban
 from motionmind.cli.looks import explain, graph
 from motionmind.cli.loops import loop
 from motionmind.cli.measures import measure
@@ -55,7 +56,7 @@ def app(context: click.Context) -> None:
 
 for _command in (
     *(tween, postures, posture, convert, clean, loop, corpora, explain, credit, graph, measure, sheet, render, plan),
-    *(compose, transcribe, library, vary, review, attractor, studio, serve, warm, completion),
+    *(compose, transcribe, laban, library, vary, review, attractor, studio, serve, warm, completion),
 ):
     app.add_command(_command)
 corpora.add_command(gaps)

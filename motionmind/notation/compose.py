@@ -60,15 +60,21 @@ def compose(path: FilePath, clip: str | None = None) -> Motion:
     """
     check_text("clip", clip, or_none=True)
     score = read_score(path)
+    return motions(score, [find_clip(score, clip)])[0]
+
+
+def find_clip(score: Score, name: str | None) -> Clip:
+    """Return a score's clip by name, or its only one; FormatError if there is none."""
     names = [found.name for found in score.clips]
-    if clip is None and len(names) != 1:
+    if name is None and len(names) != 1:
         raise FormatError(
-            f"holds {len(names) or 'no'} clips" + f"; choose one: {enumerated(names, 60)}" * bool(names), path=path
+            f"holds {len(names) or 'no'} clips" + f"; choose one: {enumerated(names, 60)}" * bool(names),
+            path=score.path,
         )
-    if clip is not None and clip not in names:
-        hint = did_you_mean(clip, names) or f"; clips are {enumerated(names, 60)}"
-        raise FormatError(f"no clip {quoted(clip)}{hint}", path=path)
-    return motions(score, [found for found in score.clips if clip is None or found.name == clip])[0]
+    if name is not None and name not in names:
+        hint = did_you_mean(name, names) or f"; clips are {enumerated(names, 60)}"
+        raise FormatError(f"no clip {quoted(name)}{hint}", path=score.path)
+    return next(found for found in score.clips if name is None or found.name == name)
 
 
 def motions(score: Score, clips: Sequence[Clip] | None = None) -> list[Motion]:

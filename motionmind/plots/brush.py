@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from io import BytesIO
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from motionmind._typing import Floats, Pixels
 from motionmind.body.palette import Colour
 from motionmind.render.lettering import font
 from motionmind.render.palette import PAPER
+
+if TYPE_CHECKING:
+    from PIL import Image
 
 Point = tuple[float, float]  # x to the right and y down, pixels of the finished picture
 Anchor = Literal["start", "middle", "end"]
@@ -70,12 +73,17 @@ class Brush:
         inset = Image.fromarray(pixels)
         self._image.paste(inset, (round(N_SUBSAMPLES * at[0]), round(N_SUBSAMPLES * at[1])), inset)
 
-    def png(self) -> bytes:
-        """Average the samples to pixels, and encode them as PNG."""
+    def picture(self, scale: int = 1) -> Image.Image:
+        """Average the samples to `scale` pixels for each pixel of the finished picture."""
         from PIL import Image
 
+        width, height = self._size
+        return self._image.resize((scale * width, scale * height), Image.Resampling.BOX)
+
+    def png(self) -> bytes:
+        """Average the samples to pixels, and encode them as PNG."""
         data = BytesIO()
-        self._image.resize(self._size, Image.Resampling.BOX).save(data, "PNG")
+        self.picture().save(data, "PNG")
         return data.getvalue()
 
 

@@ -139,6 +139,35 @@ class Region:
             brush.line(np.concatenate([ring, ring[:2]]), self.edge, self.width, round_joints=False)
 
 
+@dataclass(frozen=True, eq=False)
+class Polygon:
+    """A filled polygon with an edge.
+
+    Attributes:
+        corners: its corners [N, 2], pixels.
+        fill, edge: its colours.
+        width: width of its edge, pixels.
+    """
+
+    corners: Floats
+    fill: Colour
+    edge: Colour
+    width: float
+
+    def svg(self) -> Iterator[str]:
+        """Yield the polygon as SVG."""
+        places = " ".join(f"{x:.1f},{y:.1f}" for x, y in self.corners.tolist())
+        yield (
+            f'<polygon points="{places}" fill="{hexadecimal(self.fill)}" stroke="{hexadecimal(self.edge)}"'
+            f' stroke-width="{self.width:g}"/>'
+        )
+
+    def paint(self, brush: Brush) -> None:
+        """Draw the polygon with a brush."""
+        brush.polygon(self.corners, self.fill)
+        brush.line(np.concatenate([self.corners, self.corners[:2]]), self.edge, self.width)
+
+
 @dataclass(frozen=True)
 class Dot:
     """A disc with a rim.

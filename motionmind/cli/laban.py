@@ -1,0 +1,100 @@
+"""The command that draws scores in Labanotation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from motionmind.cli.files import check_outputs
+from motionmind.cli.options import Section, command, option, outputs
+from motionmind.cli.printing import count, print_written
+from motionmind.cli.types import FILE
+from motionmind.display import displayed
+from motionmind.files import all_or_none, write_atomically
+
+if TYPE_CHECKING:
+    from motionmind.laban.columns import Off
+    from motionmind.laban.signs import Staff
+
+DRAWN = (".svg", ".png", ".pdf")
+SIGNS, SCORE = ".laban", ".score"
+
+
+@command("motionmind laban ballet/centre.score --clip pirouettes -o pirouettes.svg")
+@click.argument("source", type=FILE)
+@outputs(f"Drawing ({', '.join(DRAWN)}), signs as text ({SIGNS}), or a score of the signs ({SCORE}).")
+@option("--clip", section=Section.PART, metavar="NAME", help="Clip of the score  [default: its only one]")
+@option(
+    "--bar",
+    section=Section.DRAW,
+    type=click.IntRange(1, 64),
+    metavar="COUNTS",
+    help="Counts in a bar  [default: 4, or as the text of signs says]",
+)
+@option("--report", section=Section.OUTPUT, type=FILE, help="File of how far each sign is off, as JSON.")
+def laban(source: Path, outputs: tuple[Path, ...], clip: str | None, bar: int | None, report: Path | None) -> None:
+    """Draw a score in Labanotation.
+
+    SOURCE is a score, or signs as text (.laban). Each sign is the nearest to the movement; the command says how far it
+    is off. docs/notation.md explains the columns and signs.
+    """
+    from motionmind.laban.columns import notate
+    from motionmind.laban.text import read_staff
+    from motionmind.names.finding import locate_score
+    from motionmind.notation.compose import find_clip
+    from motionmind.notation.read import read_score
+
+    is_signs = source.suffix.lower() == SIGNS
+    if is_signs and (clip or bar or report):
+        raise click.UsageError("--clip, --bar and --report are for a score")
+    source = source if is_signs else locate_score(str(source))
+    files = [(path, (*DRAWN, SIGNS, SCORE)) for path in outputs]
+    check_outputs(files + ([(report, ())] if report else []), [source])
+    offs: Sequence[Off] = ()
+    if is_signs:
+        staff = read_staff(source)
+    else:
+        score = read_score(source)
+        staff, offs = notate(score, find_clip(score, clip), bar or 4)
+    contents = {path: _contents(path, staff) for path in outputs}
+    if report:
+        import msgspec
+
+        contents[report] = msgspec.json.encode(offs)
+    with all_or_none():
+        for path, data in contents.items():
+            write_atomically(path, data)
+    click.echo(f"{displayed(staff.title)}: {count(len(staff.signs), 'sign')} in {staff.counts:g} counts")
+    for line in _lines(offs):
+        click.echo(line)
+    print_written([*contents])
+
+
+def _contents(path: Path, staff: Staff) -> bytes:
+    """Return the contents of a file: a drawing, the signs' text, or a score of them, if the body can move so."""
+    from motionmind.laban.drawing import draw_staff
+    from motionmind.laban.scoring import checked_score
+    from motionmind.laban.text import staff_text
+
+    suffix = path.suffix.lower()
+    if suffix in DRAWN:
+        return draw_staff(staff).encode(suffix)
+    if suffix == SIGNS:
+        return staff_text(staff).encode()
+    return checked_score(staff).encode()
+
+
+def _lines(offs: Sequence[Off]) -> Iterator[str]:
+    """Format how far the signs of each column are off at most, and where."""
+    for column in dict.fromkeys(off.column for off in offs):
+        own = [off for off in offs if off.column == column]
+        worst = max(own, key=lambda off: off.degrees)
+        bent = max(own, key=lambda off: off.bend)
+        line = f"{column:13} {worst.degrees:2.0f} degrees off at most: {worst.sign}, at {worst.count:g} counts"
+        if bent.bend:
+            line += f"; bent by {bent.bend:.0f} degrees more or less at {bent.count:g}"
+        if worst.degrees or bent.bend:
+            yield line

@@ -1,0 +1,1 @@
+"""Labanotation: scores as signs on a staff, drawn, written as text, and read back into scores."""
