@@ -119,7 +119,7 @@ def _column(column: str, measured: Measured, supported: Supported, counts: Float
         return [*_gestures(column, measured, counts)]
     if column in TWISTS:
         return [*_twists(column, measured.twists[column], counts)]
-    return [*_turns(measured.facing, counts)]
+    return [*_turns(measured.facing, supported, counts)]
 
 
 def _events(column: str, supported: Supported, counts: Floats) -> Iterator[tuple[Sign | Value, Off]]:
@@ -177,19 +177,30 @@ def _twists(column: str, degrees: Floats, counts: Floats) -> Iterator[tuple[Sign
             yield sign, _off(column, counts[run.end], value, angles[run.end], most, 0.0)
 
 
-def _turns(facing: Floats, counts: Floats) -> Iterator[tuple[Sign | Value, Off]]:
-    """Yield the turn signs of the body: how far it turns."""
+def _turns(facing: Floats, supported: Supported, counts: Floats) -> Iterator[tuple[Sign | Value, Off]]:
+    """Yield the turn signs of the body: how far it turns without rest to one side, until it steps."""
     turned = facing - facing[0]
     states = [nearest_turn(angle) for angle in turned.tolist()]
     angles = np.abs(turned - states)
-    before = 0
+    steps = np.array([any(value for value, _ in events[:2]) for events in supported.events])
+    whole: list[_Run] = []
     for run in _runs(states, angles, np.abs(np.diff(turned)) > STILL_DEG):
-        if run.begin >= 0:
-            value = Turn(states[run.end] - before)
-            most = float(angles[run.end : run.last + 1].max())
-            sign = _made(TURN, value, counts, run.begin, run.end)
-            yield sign, _off(TURN, counts[run.end], value, angles[run.end], most, 0.0)
-        before = states[run.end]
+        last = whole[-1] if whole else run
+        goes_on = (
+            last.begin >= 0
+            and run.begin == last.end
+            and not steps[run.begin + 1 : run.end + 1].any()
+            and (states[run.end] > states[last.end]) == (states[last.end] > states[last.begin])
+        )
+        if goes_on:
+            whole[-1] = _Run(last.begin, run.end, run.last)
+        else:
+            whole.append(run)
+    for before, run in pairwise(whole):
+        value = Turn(states[run.end] - states[before.end])
+        most = float(angles[run.end : run.last + 1].max())
+        sign = _made(TURN, value, counts, run.begin, run.end)
+        yield sign, _off(TURN, counts[run.end], value, angles[run.end], most, 0.0)
 
 
 def _made(column: str, value: Value, counts: Floats, first: int, last: int) -> Sign:

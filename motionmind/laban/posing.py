@@ -15,7 +15,7 @@ from motionmind.laban.measured import LIMBS
 N_TWISTS = 48  # of a limb about the direction in which it points, that are tried
 TILT_RANGE_DEG = (-15.0, 75.0)  # of the pelvis, which leaves a bent standing leg within the hip's limits
 MAX_LIFT_DEG = 150.0  # bend of a knee
-CLEARANCE_M = 0.02  # between the floor and a foot in the air
+CLEARANCE_M = 0.015  # between the floor and a foot in the air
 _UP = np.array([0.0, 1.0, 0.0])
 # Shares of a lean and a turn that joints take; a lean begins in the hips.
 _HEAD = {"cervical": (0.4, 4 / 9, 0.4), "atlantal": (0.6, 5 / 9, 0.6)}
@@ -67,8 +67,8 @@ def pose_trunk(body: Anatomy, torso: Aim, torso_turn: float, head: Aim, head_tur
 def pose_limb(body: Anatomy, limb: str, side: str, aim: Aim, torso: Angles) -> Angles:
     """Return the angles of an arm's or a leg's joints, as written for the left.
 
-    The limb may turn about the line along which it points; of all turns the least is taken that needs no angle beyond
-    the limits, or the one that needs the least beyond.
+    The limb may turn about the line along which it points; of all turns the one is taken that, within the limits,
+    brings it nearest; of several the least.
 
     Args:
         body: a person's anatomy.
@@ -90,8 +90,9 @@ def pose_limb(body: Anatomy, limb: str, side: str, aim: Aim, torso: Angles) -> A
     turned = rot.mul(rot.from_axis_angle(along, turns), rot.between(_line(body, limb, round(aim.bend, 1)), along))
     at_rest = _rotations(body, {})[0, joint]
     degrees = _degrees(body, joint, rot.mul(rot.inv_mul(above, turned), at_rest))
-    beyond = np.abs(degrees - degrees.clip(body.limits[0][joint], body.limits[1][joint])).sum(axis=1)
-    best = int(np.lexsort((np.abs(turns), np.round(beyond, 3)))[0])
+    reached = body.rotations({f"left_{first}": degrees.clip(body.limits[0][joint], body.limits[1][joint])})[:, joint]
+    line = rot.mul_vec(rot.mul(above, rot.mul_inv(reached, at_rest)), _line(body, limb, round(aim.bend, 1)))
+    best = int(np.lexsort((np.abs(turns), np.round(rot.norm(line - along), 3)))[0])
     return {first: _limited(body, first, "left", degrees[best]), middle: _limited(body, middle, "left", bend)}
 
 
@@ -121,11 +122,14 @@ def lift_leg(body: Anatomy, side: str, aim: Aim, torso: Angles, hip_height: floa
         torso: the angles of the torso's joints.
         hip_height: height of the hip over the floor, metres.
     """
-    hip = body.named("hip", "left")
+    hip, ankle = body.named("hip", "left"), body.joints["ankle"].angles["plantar"]
     pelvis = torso["pelvis"] * ([1.0, 1.0, 1.0] if side == SIDES[0] else [1.0, -1.0, -1.0])
     angles: Angles = {}
-    for bend in np.arange(aim.bend, MAX_LIFT_DEG + 1.0, 10.0):
+    for bend in np.arange(aim.bend, MAX_LIFT_DEG + 1.0, 5.0):
         angles = pose_limb(body, "leg", side, aim._replace(bend=float(bend)), torso)
+        flexed = np.zeros(3)  # the foot, so that the toes do not hang lower than the heel
+        flexed[ankle.axis] = -0.5 * ankle.sign * (bend - aim.bend)
+        angles["ankle"] = _limited(body, "ankle", "left", flexed)
         given = {f"left_{joint}": own[None] for joint, own in angles.items()} | {"pelvis": pelvis[None]}
         points = body.skeleton.positions_and_tips(body.rotations(given), np.zeros((1, 3)))[0]
         if points[hip, 1] - _leg_points(body, points).min() < hip_height - CLEARANCE_M:

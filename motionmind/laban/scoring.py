@@ -87,9 +87,11 @@ def score_text(staff: Staff, name: str = "notated") -> str:
     vocabulary = {layer: Vocabulary() for layer in ("legs", "arms", "torso", "head")}
     table: list[list[str]] = []
     before = [""] * len(vocabulary)
+    was_in_air = False
     for row, state in enumerate(_states(staff, times)):
         cells = _cells(body, state, vocabulary)
-        *held, how = _move(staff, times, row, in_air=not state.bears)
+        *held, how = _move(staff, times, row, was_in_air=was_in_air, in_air=not state.bears)
+        was_in_air = not state.bears
         table += held
         table.append([*how, *(new if new != old else "" for new, old in zip(cells, before, strict=True))])
         before = cells
@@ -265,9 +267,9 @@ def _number(value: float) -> str:
 # --- moves ------------------------------------------------------------------------------------------------------------
 
 
-def _move(staff: Staff, times: Sequence[float], row: int, *, in_air: bool) -> list[list[str]]:
+def _move(staff: Staff, times: Sequence[float], row: int, *, was_in_air: bool, in_air: bool) -> list[list[str]]:
     """Return the first cells of a posture: of the move that leads there, and of moves before it if it turns by much."""
-    up = f" up {_UP_CM}" if in_air else ""
+    before, up = (f" up {_UP_CM}" if high else "" for high in (was_in_air, in_air))
     if row == 0:
         return [[f"start{up}"]]
     first, last = times[row - 1], times[row]
@@ -284,8 +286,8 @@ def _move(staff: Staff, times: Sequence[float], row: int, *, in_air: bool) -> li
     moves = max(1, int(np.ceil(abs(turn) / _MAX_TURN_DEG)))
     counts = number_text((last - first) / moves)
     turned = round(turn / moves, 2) + 0.0
-    words = f"{counts}" + (f" turn {abs(turned):g} {'left' if turned > 0 else 'right'}" if turned else "") + up
-    return [[words]] * (moves - 1) + [[words + go]]
+    words = counts + (f" turn {abs(turned):g} {'left' if turned > 0 else 'right'}" if turned else "")
+    return [[words + before]] * (moves - 1) + [[words + up + go]]
 
 
 def _steps(staff: Staff, column: str, count: float) -> bool:
@@ -313,7 +315,11 @@ def _go(around: str) -> str:
 
 
 def checked_score(staff: Staff) -> str:
-    """Return a score of a staff, as `score_text`, that can be composed; MotionMindError says what the body cannot do."""
+    """Return a score of a staff, as `score_text`.
+
+    Raises:
+        MotionMindError: the body cannot follow the signs; says why.
+    """
     text = score_text(staff)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "notated.score"
