@@ -306,7 +306,7 @@ def _at_counts(motion: Motion, tempo: float, every: int, counts: int | None) -> 
 
     last = seconds_to_count(float(motion.times[-1] - motion.times[0]) + 1e-6, tempo)
     numbers = np.arange(1, int(last if counts is None else min(last, counts)) + 1, every)
-    at = motion.at(motion.times[0] + counts_to_seconds(numbers - 1.0, tempo))
+    at = motion.at(motion.times[0] + counts_to_seconds(1.0, tempo) * (numbers - 1))
     return at, [f"count {number}" for number in numbers.tolist()]
 
 
