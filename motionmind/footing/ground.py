@@ -10,6 +10,7 @@ import numpy as np
 from motionmind._typing import Bools, Floats
 from motionmind.body.contact import Posed
 from motionmind.body.skeleton import Skeleton
+from motionmind.footing.course import Course
 from motionmind.footing.feet import Foot
 from motionmind.footing.flight import FLIGHT_CERTAIN_SHARE, FLIGHT_POSSIBLE_SHARE
 from motionmind.footing.root import root_trajectory, stand, steps_easily
@@ -57,12 +58,14 @@ class Given(NamedTuple):
         rates: its first and its last velocity [3], m/s; None where unknown.
         route: points x, z of the path that the root follows over the floor from the first end to the last [P, 2],
             metres; None for any path.
+        course: where it is at which time, in place of a route; None for any.
     """
 
     low: Mapping[int, float]
     ends: tuple[Floats, Floats]
     rates: tuple[Floats | None, Floats | None]
     route: Floats | None = None
+    course: Course | None = None
 
     def scaled(self, by: float) -> Given:
         """Return the same for a body `by` times as large."""
@@ -72,6 +75,7 @@ class Given(NamedTuple):
             (by * self.ends[0], by * self.ends[1]),
             (None if first is None else by * first, None if last is None else by * last),
             None if self.route is None else by * self.route,
+            self.course and self.course.scaled(by),
         )
 
 
@@ -164,7 +168,8 @@ def find_ground(
     held = _at(0.5 * (times[1:] + times[:-1]), half_steps, stance.stands)
     easily = steps_easily(lowest(posed.places, points_of_feet(skeleton, posed.joints, feet)), fps)
     clear = np.maximum(heights - floor, 0.0)
-    root = root_trajectory(skeleton, posed, clear, held, drifts, given.ends, times[-1], easily, given.route)
+    way = given.route, given.course
+    root = root_trajectory(skeleton, posed, clear, held, drifts, given.ends, times[-1], easily, *way)
     root = stand(skeleton, posed.rotations, _with_rates(root, times, given.rates), heights)
     root[0], root[-1] = given.ends
     for end, beside, sign in ((0, 1, 1.0), (-1, -2, -1.0)):  # a body in the air keeps its velocity

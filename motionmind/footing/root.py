@@ -8,6 +8,7 @@ from motionmind._typing import Floats
 from motionmind.body.contact import Posed, lowest_height
 from motionmind.body.limbs import limb_of_points
 from motionmind.body.skeleton import Skeleton
+from motionmind.footing.course import Course
 from motionmind.footing.feet import GRIP_HEIGHT_M
 from motionmind.footing.smoothing import smoothed
 from motionmind.geometry.polylines import length_of, places_along
@@ -29,6 +30,7 @@ def root_trajectory(
     seconds: float,
     easily: Floats,
     route: Floats | None = None,
+    course: Course | None = None,
 ) -> Floats:
     """Return positions [N, 3] of the root, metres, from a to b; `stand` sets their final heights.
 
@@ -38,7 +40,8 @@ def root_trajectory(
 
     The solution is v = (c drift - sum_p w_p v_p + l) / (c + sum_p w_p), with one multiplier l for all frames. It adds
     the distance missing to b where the body stands least firmly. A long distance is added in proportion to `easily`
-    instead, with a ramp at both ends. With a route, it is added along the route instead of straight to b.
+    instead, with a ramp at both ends. With a route, it is added along the route instead of straight to b; on a
+    course, the body is where the course is.
 
     Args:
         skeleton: the body.
@@ -50,6 +53,7 @@ def root_trajectory(
         seconds: total duration.
         easily: ease of stepping between frames [N - 1], LEAST_TRAVEL_SHARE to 1 (`steps_easily`).
         route: points x, z of a path over the floor from a to b [P, 2], metres; None for the straight line.
+        course: where the body is at which time; None if that is free.
     """
     (a, b), points = ends, posed.places[:, : 2 * len(skeleton)]
     height = points[..., 1] - points[..., 1].min(axis=-1, keepdims=True) + clearance[:, None]
@@ -65,27 +69,30 @@ def root_trajectory(
     ramp = easily * np.minimum(np.minimum(since, since[::-1]) / 0.3, 1.0)  # starts and stops in 0.3 s
     slack = (1.0 - evenly) * slack + evenly * ramp / ramp.sum()
     steps += slack[:, None] * missing
-    if route is not None:
-        steps[:, [0, 2]] = np.diff(_along(route, slack, steps[:, [0, 2]], len(steps) / seconds), axis=0)
+    shares = np.minimum(np.concatenate([[0.0], np.cumsum(slack)]), 1.0)
+    way = None if route is None else places_along(route, shares)
+    if course is not None:
+        way = course.at(np.linspace(0.0, seconds, len(shares)))
+    if way is not None:
+        steps[:, [0, 2]] = np.diff(_along(way, slack, steps[:, [0, 2]], len(steps) / seconds), axis=0)
     return np.asarray(a + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]))
 
 
-def _along(route: Floats, slack: Floats, steps: Floats, fps: float) -> Floats:
-    """Return the places [N, 2], metres, of a body that sways about a route.
+def _along(way: Floats, slack: Floats, steps: Floats, fps: float) -> Floats:
+    """Return the places [N, 2], metres, of a body that sways about its way over the floor.
 
     It rounds corners, because no body turns them at once.
 
     Args:
-        route: points x, z of the path [P, 2], metres.
+        way: places x, z on its path at each frame [N, 2], metres.
         slack: share of the path in each step [N - 1].
         steps: steps of the body on its straight way [N - 1, 2], metres; it sways as there.
         fps: frames a second.
     """
-    shares = np.minimum(np.concatenate([[0.0], np.cumsum(slack)]), 1.0)
     sways = np.concatenate([np.zeros((1, 2)), np.cumsum(steps - slack[:, None] * steps.sum(axis=0), axis=0)])
     places = np.empty_like(sways)
-    for axis, (way, sway) in enumerate(zip(places_along(route, shares).T, sways.T, strict=True)):
-        places[:, axis] = smoothed(way, CORNER_S, fps) + sway - smoothed(sway, SWAY_S, fps)
+    for axis, (path, sway) in enumerate(zip(way.T, sways.T, strict=True)):
+        places[:, axis] = smoothed(path, CORNER_S, fps) + sway - smoothed(sway, SWAY_S, fps)
     return places
 
 

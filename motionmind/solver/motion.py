@@ -279,6 +279,9 @@ class _Scene:
             terms.append(reaches)
         if self.given.route is not None:
             terms.append(Route(self.given.route, w.route, w.route_pull))
+        if self.given.course is not None:
+            places = self.given.course.at(np.arange(len(self.reference))[frames] / fps)
+            terms.append(Route(places, w.route, w.route_pull, is_timed=True))
         if len(self.freedom.joints):
             terms.append(Limits(self.reference[self.fixed], bounds.loose, w.limits))
         if self.body.has_masses and "balance" not in self.without:

@@ -114,13 +114,14 @@ def _synthesise(
     clock, rotations, stance = reference.clock, reference.rotations, reference.stance
     kept = [] if wishes.length is None else [*(clock.moves[move] for move in wishes.fixed_times), clock.frames[-1]]
     velocities = _root_velocity(wishes.leaving), _root_velocity(wishes.arriving)
-    ends = Given(reference.low, (a.root, b.root), velocities, wishes.route)
+    course = wishes.course
+    ends = Given(reference.low, (a.root, b.root), velocities, None if course else wishes.route, course)
     before: Synthesis | None = None
     n_slower, n_accented, accented = 0, 0, list[Motion]()
     while True:
         made = solve_motion(
             a.skeleton,
-            rotations,
+            course.faced(rotations, clock.frames) if course else rotations,
             clock.frames,
             stance,
             ends,

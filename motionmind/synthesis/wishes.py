@@ -12,6 +12,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.motion import Posture, Velocity
 from motionmind.corpus.corpus import Corpus
 from motionmind.footing.corrections import Correction
+from motionmind.footing.course import Course
 from motionmind.grammar.grammar import Grammar
 from motionmind.learned.posture_statistics import PostureStatistics
 from motionmind.solver.reaches import Reach, Stay
@@ -66,6 +67,7 @@ class Wishes(NamedTuple):
         accents: moments of greatest or least speed, in a movement of given length; None for none.
         route: points x, z of the path over the floor from `a` to `b` [P, 2], metres; None for any.
         stays: joints that keep their places for a while.
+        course: where the body is, and how it faces, at which time of a given length; None for any.
     """
 
     a: Posture
@@ -87,6 +89,7 @@ class Wishes(NamedTuple):
     route: Floats | None = None
     stays: Sequence[Stay] = ()
     accents: Accents | None = None
+    course: Course | None = None
 
     @property
     def moving(self) -> tuple[bool, bool]:

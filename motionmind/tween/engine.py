@@ -311,6 +311,7 @@ class Engine(LearnedCorpus):
                 formulation.route,
                 resolve_stays(self.corpus.skeleton, request.stay),
                 request.accents,
+                formulation.course,
             ),
         )
 

@@ -11,6 +11,7 @@ import numpy as np
 from motionmind._typing import Bools, Floats
 from motionmind.body.motion import Posture
 from motionmind.errors import MotionMindError
+from motionmind.footing.course import Course
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.progression import fit_progression
@@ -29,7 +30,7 @@ from motionmind.tween.pacing import UsualTime, tolls, usual_times
 from motionmind.tween.problem import build_model, lift_to_moves
 from motionmind.tween.reaches import resolve_reaches, resolve_stays
 from motionmind.tween.request import TweenRequest
-from motionmind.tween.travel import route_between
+from motionmind.tween.travel import course_between, route_between
 from motionmind.tween.whole_body import nearest_posture
 from motionmind.walks.passages import Place
 
@@ -57,6 +58,7 @@ class Formulation:
         detours: whether movement that the corpus shows after postures like A and before ones like B fills spare time.
         place: where the passage to follow begins; None for any passage.
         route: the path over the floor from A to B [P, 2], metres; None for any.
+        course: the same with times and facings; None for any.
     """
 
     ends: Ends
@@ -74,6 +76,7 @@ class Formulation:
     detours: bool
     place: Place | None
     route: Floats | None
+    course: Course | None
 
     @property
     def wished(self) -> Bools:
@@ -162,6 +165,7 @@ def formulate(learned: LearnedCorpus, ends: Ends, request: TweenRequest) -> Form
         detour is not None,
         place,
         route,
+        course_between(ends.a, ends.b, request.along, float(request.length or 0.0)),
     )
 
 

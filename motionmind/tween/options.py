@@ -184,10 +184,12 @@ def _take_path(name: str, value: Any) -> Any:
     for number, point in enumerate(points, start=1):
         for coordinate in point:
             check_real(f"{name}: point {number}", coordinate)
-        if len(point) != 2 or not all(abs(coordinate) <= MAX_REACH for coordinate in point):
-            shown = ", ".join(map(str, point))
+        shown = ", ".join(map(str, point))
+        if len(point) not in (2, 4) or not all(abs(coordinate) <= MAX_REACH for coordinate in point):
             raise MotionMindError(f"{name}: point {number} must be x, z in metres, up to {MAX_REACH:g}, not {shown}")
-        far += 0.0 if number == 1 else math.dist(points[number - 2], point)
+        if len(point) != len(points[0]):
+            raise MotionMindError(f"{name}: all points must have a time and a facing, or none, not {shown}")
+        far += 0.0 if number == 1 else math.dist(points[number - 2][:2], point[:2])
     if far > MAX_PATH_M:
         raise MotionMindError(f"{name}: the path is {far:g} m long, and a tween may travel up to {MAX_PATH_M:g} m")
     return points
@@ -262,6 +264,11 @@ def check_time(joint: str, seconds: float, lasts: float, remedy: str = "") -> No
     if not 0.0 < seconds < lasts:
         between = f"{seconds:g} s is not between A and B: the movement lasts {lasts:.2f} s"
         raise MotionMindError(f"reach {joint}: {between}{remedy}")
+
+
+def is_timed(along: Sequence[Sequence[float]]) -> bool:
+    """Return whether the points of a path have times and facings, too."""
+    return len(along[0]) > 2
 
 
 def take_options(options: Any) -> None:

@@ -14,7 +14,7 @@ from motionmind.footing.corrections import Correction
 from motionmind.grammar.schemes import Scheme, Weights
 from motionmind.synthesis.accent_times import AccentKind, Accents
 from motionmind.tween.counts import counts_to_seconds, parse_time, seconds_to_count
-from motionmind.tween.options import OPTIONS, ReachOption, SearchOptions, StayOption, check_time, take_options
+from motionmind.tween.options import OPTIONS, ReachOption, SearchOptions, StayOption, check_time, is_timed, take_options
 
 if TYPE_CHECKING:
     from motionmind._typing import States
@@ -110,7 +110,8 @@ class TweenRequest:
         to: where B stands: x and z on the floor, metres, as in a floor plan, and its facing, degrees to the left of the
             audience; (x, z) keeps B's own facing. None leaves B where it stands.
         along: points x, z of a path over the floor, metres, that the body follows from A to B; without `to`, B stands
-            at the last. The motion keeps to it within 10 cm, or reports the distance.
+            at the last. The motion keeps to it within 10 cm, or reports the distance. With a duration, points may be
+            (x, z, seconds, facing): the body is there, and faces so, at that time; B then stands where it is.
         stay: joints, each with the shares of the duration between which it keeps its place in the room, and does not
             turn: ("left_wrist", 0.25, 0.5). One that stays until the end, but not from the start, keeps its place in
             B; one that stays from start to end leaves just in time for B.
@@ -173,6 +174,7 @@ class TweenRequest:
         self._check_accents()
         for joint, _, seconds in self.reach if self.length is not None else ():
             check_time(joint, seconds, float(self.length or 0.0))
+        self._check_path()
         if self.unlike:
             self._check_unlike()
         narrowed = self.pin or self.hold or self.avoid or self.via or self.unlike or self.search.sample or self.passage
@@ -228,6 +230,16 @@ class TweenRequest:
         if sorted(set(times)) != times:
             words = ", ".join(one if isinstance(one, str) else f"{one:g}" for one in self.accent)
             raise MotionMindError(f"accent: the counts {displayed(words)} must increase")
+
+    def _check_path(self) -> None:
+        if self.along is None or not is_timed(self.along):
+            return
+        if self.length is None:
+            raise MotionMindError("along: points at times need a duration or counts")
+        times = [point[2] for point in self.along]
+        if not all(before < after for before, after in pairwise([0.0, *times, self.length])):
+            shown = ", ".join(f"{time:g}" for time in times[:8]) + ", ..." * (len(times) > 8)
+            raise MotionMindError(f"along: the times {shown} s must increase, from 0 to the {self.length:g} s")
 
     def _check_unlike(self) -> None:
         if self.what_if:

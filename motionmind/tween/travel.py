@@ -10,8 +10,10 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion, Posture
+from motionmind.footing.course import Course
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.polylines import length_of, offsets_to, places_along
+from motionmind.tween.options import is_timed
 
 NEAR_PATH_M = 0.1  # up to which distance a body is on its path, and B at its place
 TURNED_DEG = 1.0  # up to which B faces as it should
@@ -71,14 +73,27 @@ def stand_at(posture: Posture, to: Sequence[float]) -> tuple[Posture, Floats]:
 
 def destination(to: Sequence[float] | None, along: Sequence[Sequence[float]] | None) -> Sequence[float] | None:
     """Return where B stands: the place of the request, or the end of the path; None for where it stands already."""
-    return to if to is not None or along is None else along[-1]
+    return to if to is not None or along is None or is_timed(along) else along[-1]
+
+
+def course_between(a: Posture, b: Posture, along: Sequence[Sequence[float]] | None, length: float) -> Course | None:
+    """Return the course from A by the timed points of a path to B in `length` seconds; None for points without times.
+
+    Facings turn the shorter way from each to the next.
+    """
+    if along is None or not is_timed(along):
+        return None
+    points = np.asarray(along, dtype=np.float64)
+    headings = [rot.heading(a.rotations[0]), *np.radians(points[:, 3]), rot.heading(b.rotations[0])]
+    places = np.concatenate([a.root[None, [0, 2]], points[:, :2], b.root[None, [0, 2]]])
+    return Course(np.array([0.0, *points[:, 2], length]), places, np.unwrap(headings))
 
 
 def route_between(a: Posture, b: Posture, along: Sequence[Sequence[float]] | None) -> Floats | None:
     """Return the path from A by the drawn points to B [P, 2], metres, each point once; None if none is drawn."""
     if along is None:
         return None
-    points = np.array([a.root[[0, 2]], *along, b.root[[0, 2]]], dtype=np.float64)
+    points = np.array([a.root[[0, 2]], *(point[:2] for point in along), b.root[[0, 2]]], dtype=np.float64)
     apart = np.linalg.norm(np.diff(points, axis=0), axis=1) > SAME_POINT_M
     kept = points[np.concatenate([[True], apart])]
     if len(kept) > MAX_ROUTE_POINTS:
@@ -90,13 +105,17 @@ def find_travelled(
     motion: Motion, to: Sequence[float] | None, along: Sequence[Sequence[float]] | None, route: Floats | None
 ) -> Travelled | None:
     """Measure how near a motion keeps to its path and its place; None if neither was requested."""
-    wanted = destination(to, along)
-    if wanted is None:
+    if to is None and along is None:
         return None
+    wanted = destination(to, along) or motion.root[-1, [0, 2]].tolist()
     path, facing = motion.root[:, [0, 2]], float(np.degrees(rot.heading(motion.rotations[-1, 0])))
     turned = wanted[2] - facing if len(wanted) > 2 else 0.0
     off, seconds = None, None
-    if route is not None:
+    if along is not None and is_timed(along):
+        points = np.asarray(along, dtype=np.float64)
+        far = np.linalg.norm(motion.at(points[:, 2]).root[:, [0, 2]] - points[:, :2], axis=1)
+        off, seconds = float(far.max()), float(points[int(far.argmax()), 2])
+    elif route is not None:
         far = np.linalg.norm(offsets_to(route, path), axis=1)
         frame, off = int(far.argmax()), float(far.max())
         missed = places_along(route, np.linspace(0.0, 1.0, MAX_ROUTE_POINTS))

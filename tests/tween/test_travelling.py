@@ -124,6 +124,33 @@ def test_a_path_that_cannot_be_kept_to_is_reported(ballet: Engine) -> None:
     assert "cm off the path" in str(found.travelled)
 
 
+@pytest.mark.parametrize("sway", [0.0, 60.0])
+def test_the_body_is_where_it_should_be_at_each_time_and_faces_so(ballet: Engine, sway: float) -> None:
+    """On a bow to B, there and back in its facing."""
+    seconds, (x, z), start = 3.0, A.root[[0, 2]], float(np.degrees(rot.heading(A.rotations[0])))
+    shares = np.linspace(0.0, 1.0, 30)[1:-1]
+    bow = np.sin(np.pi * shares)
+    places = np.stack([x + (1.5 - x) * shares + 0.3 * bow, z + (0.5 - z) * shares], axis=1)
+    degrees = start + (60.0 - start) * shares - sway * bow
+    points = np.column_stack([places, seconds * shares, degrees]).tolist()
+    found = ballet.tween(A, B, duration=seconds, to=(1.5, 0.5, 60.0), along=points)
+    there = found.motion.at(seconds * shares)
+    far = np.linalg.norm(there.root[:, [0, 2]] - places, axis=1)
+    turned = np.degrees(rot.heading(there.rotations[:, 0])) - degrees
+    assert far.max() < NEAR_PATH_M
+    assert np.abs((turned + 180.0) % 360.0 - 180.0).max() < 6.0
+    assert found.travelled is not None
+    assert found.travelled.off == pytest.approx(far.max(), abs=1e-9)
+    assert found.travelled.is_met
+    np.testing.assert_allclose(found.motion.root[-1], [1.5, B.root[1], 0.5], atol=1e-12)
+    assert slide(found.motion) < 0.5
+
+
+def test_with_times_b_stands_where_it_is(ballet: Engine) -> None:
+    found = ballet.tween(A, B, duration=2.0, along=[(*A.root[[0, 2]], 1.0, 0.0)])
+    np.testing.assert_array_equal(found.motion.root[-1], B.root)
+
+
 def test_the_command_line_travels(run: Run) -> None:
     Path("path.csv").write_text("x,z\n0.4,0\n0.8,0.4  # there\n")
     ran = run(*TWEEN, "--along", "path.csv", "--to", "1,0.6,45", "-o", "t.json", "--report", "r.json", "--details")
@@ -143,6 +170,13 @@ def test_the_command_line_travels(run: Run) -> None:
         ({"to": (1.0, float("nan"))}, "to must be x and z"),
         ({"along": []}, "along must have 1 to 10000 points, not 0"),
         ({"along": [(0.0, 1.0, 2.0)]}, "along: point 1 must be x, z in metres, up to 10000, not 0.0, 1.0, 2.0"),
+        ({"along": [(0.0, 0.0), (1.0, 0.0, 1.0, 0.0)]}, "along: all points must have a time and a facing, or none"),
+        ({"along": [(0.0, 0.0, 1.0, 0.0)]}, "along: points at times need a duration or counts"),
+        (
+            {"along": [(0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 1.0, 0.0)], "duration": 2.0},
+            "along: the times 1, 1 s must increase, from 0 to the 2 s",
+        ),
+        ({"along": [(0.0, 0.0, 2.5, 0.0)], "duration": 2.0}, "along: the times 2.5 s must increase"),
         ({"along": [(0.0, 0.0), (300.0, 0.0)]}, "along: the path is 300 m long, and a tween may travel up to 200 m"),
     ],
 )
