@@ -155,14 +155,16 @@ def flow_effort(points: MassPoints, fps: float) -> float:
 def space_effort(points: MassPoints) -> float:
     """Return the weighted mean of the length of each point's path over the distance between its ends, 1 or more.
 
-    Points that never move are left out: NaN if none does. Infinite if a point returns to exactly where it began.
+    Points that never move are left out: NaN if none does. Infinite if a point returns to where it began, but for
+    rounding.
     """
     paths, distances = _ways(points)
     moved = (paths > 0.0) & (points.shares > 0.0)
     if not moved.any():
         return float("nan")
-    with np.errstate(divide="ignore"):
-        return float(np.average(paths[moved] / distances[moved], weights=points.shares[moved]))
+    if np.any(distances[moved] < 1e-9 * paths[moved]):
+        return float("inf")
+    return float(np.average(paths[moved] / distances[moved], weights=points.shares[moved]))
 
 
 def directness(points: MassPoints) -> float:
