@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli import completion
+from motionmind.cli.files import check_outputs
 from motionmind.cli.options import HOME, JSON, Section, command, given_option, option, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_movements, read_part, select_part, spelled
@@ -24,6 +25,7 @@ from motionmind.errors import MotionMindError
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
     from motionmind.metrics.figures import Figure
+    from motionmind.names.spelling import PostureName
 
 
 @command("motionmind measure tween.json --corpus ballet")
@@ -153,10 +155,12 @@ def _write_efforts(
     from motionmind.files import write_atomically
     from motionmind.metrics.effort import EFFORT, measure_effort
 
+    named = [parse_movement(source, home) for source in sources]
+    check_outputs([(table, (".csv",))], [path for one in named for path in one.source.paths])
     text, n_rows = io.StringIO(), 0
     writer = csv.DictWriter(text, ["clip", "start", "end", *EFFORT], lineterminator="\n")
     writer.writeheader()
-    for name, motion in _clips(sources, home, options):
+    for name, motion in _clips(named, home, options):
         for row in measure_effort(replace(motion, name=name), window=window):
             cells = {key: "" if math.isnan(value) else f"{value:.6g}" for key, value in row.items()}
             writer.writerow({"clip": name, **cells})
@@ -165,10 +169,11 @@ def _write_efforts(
     click.echo(f"wrote {displayed_path(table)}: {count(n_rows, 'row')}, {count(len(EFFORT), 'figure')} each")
 
 
-def _clips(sources: Sequence[str], home: Path | None, options: Mapping[str, Any]) -> Iterator[tuple[str, Motion]]:
+def _clips(
+    sources: Sequence[PostureName], home: Path | None, options: Mapping[str, Any]
+) -> Iterator[tuple[str, Motion]]:
     """Yield all clips of all sources, each with a name that commands understand."""
-    for word in sources:
-        named = parse_movement(word, home)
+    for named in sources:
         holds_clips = named.source.kind != "file" and not named.source.name
         for motion in read_movements(named.source, (), home, whole=True, **options):
             frames = select_part(named, motion, 0, -1)

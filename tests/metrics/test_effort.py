@@ -275,6 +275,9 @@ def test_the_figures_of_effort_stand_beside_the_corpus(run: Run) -> None:
     ("arguments", "words"),
     [
         (["--csv", "effort.csv", "--window", "9"], "is too short: 31 frames"),
+        (["--csv", "effort.json"], "effort.json: cannot be written: the name must end in one of .csv"),
+        (["--csv", "nowhere/effort.csv"], "there is no folder"),
+        (["missing.json", "--csv", "effort.csv"], "missing.json"),
         (["--csv", "effort.csv", "--corpus", "ballet"], "--corpus excludes --csv"),
         (["--csv", "effort.csv", "--json"], "--json excludes --csv"),
         (["--window", "1", "--corpus", "ballet"], "--window is only for --csv FILE"),
@@ -287,4 +290,4 @@ def test_a_table_that_cannot_be_made_is_not_begun(run: Run, arguments: list[str]
     said = run("measure", "short.json", *arguments)
     assert (said.code, said.out) == (2, "")
     assert words in said.err.splitlines()[-1]
-    assert not Path("effort.csv").exists()
+    assert not [*Path().glob("effort.*")]
