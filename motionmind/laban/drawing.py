@@ -8,8 +8,7 @@ Source: A. Hutchinson Guest, "Labanotation: the system of analyzing and recordin
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from math import ceil, floor
@@ -21,7 +20,20 @@ from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.laban.shapes import EDGE_PX, Box, draw_sign
-from motionmind.laban.signs import COLUMNS, PATH, SUPPORTS, TURN, TWISTS, Direction, Hold, Sign, Staff, Turn, Value
+from motionmind.laban.signs import (
+    COLUMNS,
+    PATH,
+    SUPPORTS,
+    TURN,
+    TWISTS,
+    Direction,
+    Hold,
+    Sign,
+    Staff,
+    Turn,
+    Value,
+    overlapping,
+)
 from motionmind.plots.brush import Brush
 from motionmind.plots.canvas import Plate, svg
 from motionmind.plots.marks import Group, Line, Mark, Words
@@ -60,6 +72,9 @@ _COUNT_RANGE_PX = (40.0, 170.0)  # least and greatest length of a count
 _SHORT_SIGN_PX = 22.0  # length of a short sign
 _LEAST_SIGN_PX = 3.0
 _HOLD_PX = 12.0
+
+
+_Turns = dict[Sign, tuple[float, float]]  # the left and the right edge of each, in widths of a column
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,13 +166,14 @@ def draw_staff(staff: Staff) -> Drawing:
     if count == 1:
         width = 2 * ceil(_MARGIN_PX) + ceil(max(staves * _staff_px() - _GAP_PX, _LETTER_PX * min(len(staff.title), 44)))
         height = ceil(_TITLE_PX + layout.height + _START_PX + _LABEL_PX + 2 * _MARGIN_PX)
+    turns = _place_turns(staff)
     pages = []
     for page in range(count):
         marks: list[Mark] = []
         bottom = height - _MARGIN_PX - _LABEL_PX - _START_PX
         for place in range(min(layout.per_page, staves - page * layout.per_page)):
             centre = _MARGIN_PX + _NUMBERS_PX - _STAFF_WIDTH[0] * _COLUMN_PX + place * _staff_px()
-            marks += _draw_part(staff, layout, page * layout.per_page + place, centre, bottom)
+            marks += _draw_part(staff, layout, turns, page * layout.per_page + place, centre, bottom)
         tempo = f"{staff.tempo:g} counts a minute, bars of {staff.bar}"
         pages.append(Plate(width, height, title, tuple(marks), (*_headings(staff.title, tempo, page, count, width),)))
     return Drawing(tuple(pages))
@@ -187,12 +203,15 @@ def _layout(staff: Staff) -> _Layout:
     return _Layout(count, (*breaks, staff.counts), per_page)
 
 
-def _draw_part(staff: Staff, layout: _Layout, number: int, centre: float, bottom: float) -> Iterator[Mark]:
+def _draw_part(
+    staff: Staff, layout: _Layout, turns: _Turns, number: int, centre: float, bottom: float
+) -> Iterator[Mark]:
     """Yield the marks of one staff, from one break to the next.
 
     Args:
         staff: the signs.
         layout: how they are divided.
+        turns: where the turns of the body stand.
         number: which part.
         centre: place of the centre line, pixels.
         bottom: place of the staff's lower end, pixels.
@@ -210,15 +229,12 @@ def _draw_part(staff: Staff, layout: _Layout, number: int, centre: float, bottom
     if number == 0:
         for column, value in staff.start.items():
             edges = _EDGES[column], _EDGES[column] + 1.0
-            place = box(edges, bottom + 7.0, bottom + 7.0 + _START_SIGN_PX)
-            yield _group(f"{column}, start: {value}", value, place, on_left=edges[0] < 0.0, css="start")
-    turns = _place_turns(staff)
+            below = box(edges, bottom + 7.0, bottom + 7.0 + _START_SIGN_PX)
+            yield _group(f"{column}, start: {value}", value, below, on_left=edges[0] < 0.0, css="start")
     for column in COLUMNS:
-        faces = _left(staff.start.get(column))
-        for sign in staff.column(column):
-            before, faces = faces, _left(sign.value)
-            if sign.end <= first or sign.begin >= last:
-                continue
+        signs = staff.column(column)
+        for place in overlapping(signs, first, last):
+            sign = signs[place]
             begin, edges = sign.begin, turns.get(sign, (_EDGES.get(column, -1.0), _EDGES.get(column, -1.0) + 1.0))
             if isinstance(sign.value, Hold):
                 begin = _after_turns(sign, turns)
@@ -229,45 +245,39 @@ def _draw_part(staff: Staff, layout: _Layout, number: int, centre: float, bottom
             top = max(top, low - _HOLD_PX) if isinstance(sign.value, Hold) else top  # which stands where it begins
             title = f"{column}, counts {sign.begin:g} to {sign.end:g}: {sign.value}"
             css = "hold" if isinstance(sign.value, Hold) else "sign" if begin >= first else "continued"
-            facing = before if column in TWISTS else 0
-            yield _group(title, sign.value, box(edges, top, low - 0.5), on_left=edges[0] < 0.0, css=css, faces=facing)
+            faced = _left(signs[place - 1].value if place else staff.start.get(column)) if column in TWISTS else 0
+            yield _group(title, sign.value, box(edges, top, low - 0.5), on_left=edges[0] < 0.0, css=css, faces=faced)
 
 
 def _left(value: Value | None) -> int:
     return value.left if isinstance(value, Turn) else 0
 
 
-def _place_turns(staff: Staff) -> dict[Sign, tuple[float, float]]:
+def _place_turns(staff: Staff) -> _Turns:
     """Return the edges of the body's turn signs, in widths of a column right of the centre line.
 
     They stand across the support columns; but where a step has to stand there, beside the path, at the right.
     """
-    supports = [[*staff.column(name)] for name in SUPPORTS]
+    supports = [staff.column(name) for name in SUPPORTS]
     steps = [[sign for sign in signs if isinstance(sign.value, Direction)] for signs in supports]
-    paths = [*staff.column(PATH)]
-    out = {}
+    paths = staff.column(PATH)
+    out: _Turns = {}
     for sign in staff.column(TURN):
-        if any(_overlapping(sign, column) for column in steps):
-            out[sign] = (7.0, 8.0) if _overlapping(sign, paths) else (6.0, 7.0)
+        if any(overlapping(column, sign.begin, sign.end) for column in steps):
+            out[sign] = (7.0, 8.0) if overlapping(paths, sign.begin, sign.end) else (6.0, 7.0)
         else:
-            bears = [bool(_overlapping(sign, column)) for column in supports]
+            bears = [bool(overlapping(column, sign.begin, sign.end)) for column in supports]
             out[sign] = (-1.0, 1.0) if bears[0] == bears[1] else (-1.0, 0.0) if bears[0] else (0.0, 1.0)
     return out
 
 
-def _overlapping(sign: Sign, others: Sequence[Sign]) -> Sequence[Sign]:
-    """Return those signs of a column that share some time with a sign."""
-    first = bisect_right(others, sign.begin, key=lambda other: other.end)
-    last = bisect_left(others, sign.end, key=lambda other: other.begin)
-    return others[first:last]
-
-
-def _after_turns(hold: Sign, turns: Mapping[Sign, tuple[float, float]]) -> float:
+def _after_turns(hold: Sign, turns: _Turns) -> float:
     """Return the count where a hold is drawn: after the turns on its foot, which show that it keeps its weight."""
     begin = hold.begin
-    for turn, (left, _) in turns.items():
-        if left < 1.0 and turn.begin <= begin < turn.end:
-            begin = turn.end
+    across = [turn for turn, (left, _) in turns.items() if left < 1.0]
+    for place in overlapping(across, hold.begin, hold.end):
+        if across[place].begin <= begin:
+            begin = across[place].end
     return begin
 
 

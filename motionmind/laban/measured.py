@@ -32,7 +32,7 @@ class Measured:
         facing: where the body faces [T], degrees to the left, without jumps.
         bears: whether the left and the right leg bear weight [T, 2].
         touches: whether they rest on the floor without weight [T, 2].
-        feet: places of the ankles in the world [T, 2, 3], metres.
+        feet: places of the middles of the feet in the world [T, 2, 3], metres.
         levels: of each leg if it bears weight [T, 2]: 0 low, 1 middle, 2 high.
     """
 
@@ -88,7 +88,7 @@ def measure(body: Anatomy, rows: Sequence[Row], motion: Motion) -> Measured:
     parts = (body.named("thorax", ""), body.named("atlantal", ""))
     twists = {c: np.degrees(rot.heading(turned[:, part])) for c, part in zip(TWISTS, parts, strict=True)}
     bears, touches = _supports(body, leg, rows)
-    ankles = [body.named(leg.ankle, side) for side in SIDES]
+    ankles, balls = ([body.named(joint, side) for side in SIDES] for joint in (leg.ankle, leg.toes))
     knees = np.stack([bends[column] for column in LEGS], axis=1)
     lifted = _heel_lift(body, leg, points, motion) >= ON_BALL_DEG
     return Measured(
@@ -98,7 +98,7 @@ def measure(body: Anatomy, rows: Sequence[Row], motion: Motion) -> Measured:
         face[0] + np.concatenate([[0.0], np.cumsum(_wrapped(np.diff(face)))]),
         bears,
         touches,
-        points[:, ankles],
+        0.5 * (points[:, ankles] + points[:, balls]),  # which stays where a foot turns
         np.where(knees >= LOW_SUPPORT_DEG, 0, np.where(lifted, 2, 1)),
     )
 

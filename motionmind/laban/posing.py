@@ -14,6 +14,7 @@ from motionmind.laban.measured import LIMBS
 
 N_TWISTS = 48  # of a limb about the direction in which it points, that are tried
 TILT_RANGE_DEG = (-15.0, 75.0)  # of the pelvis, which leaves a bent standing leg within the hip's limits
+MAX_LIST_DEG = 15.0  # of the pelvis to a side, for the same reason
 MAX_LIFT_DEG = 150.0  # bend of a knee
 CLEARANCE_M = 0.015  # between the floor and a foot in the air
 _UP = np.array([0.0, 1.0, 0.0])
@@ -50,7 +51,7 @@ def pose_trunk(body: Anatomy, torso: Aim, torso_turn: float, head: Aim, head_tur
         wanted = lean * [1.0, 0.0, 1.0]
         wanted[1] = torso_turn * _TORSO_TURN.get(joint, 0.0)
         if joint == "pelvis":
-            wanted[0] = np.clip(wanted[0], *TILT_RANGE_DEG)
+            wanted[[0, 2]] = np.clip(wanted[0], *TILT_RANGE_DEG), np.clip(wanted[2], -MAX_LIST_DEG, MAX_LIST_DEG)
         angles[joint] = _limited(body, joint, "", wanted)
         lean = lean - angles[joint]  # what is beyond the hips' limits
     chest = _global(body, angles, "thorax")

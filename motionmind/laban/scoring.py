@@ -6,6 +6,7 @@ import tempfile
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,8 @@ from motionmind.laban.signs import (
     Staff,
     Turn,
     Value,
+    ending,
+    overlapping,
     vector_of,
 )
 from motionmind.laban.text import number_text
@@ -116,7 +119,7 @@ class _Track:
 
     def __init__(self, staff: Staff, column: str) -> None:
         self.start = staff.start.get(column)
-        self.signs = [*staff.column(column)]
+        self.signs = staff.column(column)
         self.ends = [sign.end for sign in self.signs]
 
     def at(self, count: float) -> tuple[Sign | None, Sign | None]:
@@ -273,36 +276,33 @@ def _move(staff: Staff, times: Sequence[float], row: int, *, was_in_air: bool, i
     if row == 0:
         return [[f"start{up}"]]
     first, last = times[row - 1], times[row]
+    turns = staff.column(TURN)
     turn = sum(
         _left(sign.value) * (min(sign.end, last) - max(sign.begin, first)) / sign.counts
-        for sign in staff.column(TURN)
-        if sign.begin < last and sign.end > first
+        for sign in (turns[place] for place in overlapping(turns, first, last))
     )
     go = ""
     for column in (*SUPPORTS, PATH):
-        value = next((sign.value for sign in staff.column(column) if sign.end == last), None)
-        if isinstance(value, Direction) and value.around != PLACE and (column == PATH or _steps(staff, column, last)):
-            go = _go(value.around)
+        sign = ending(staff.column(column), last)
+        if sign is None or not isinstance(sign.value, Direction) or sign.value.around == PLACE:
+            continue
+        if column == PATH or _steps(staff, sign):
+            go = _go(sign.value.around)
     moves = max(1, int(np.ceil(abs(turn) / _MAX_TURN_DEG)))
-    counts = number_text((last - first) / moves)
+    counts = number_text(last - first) if moves == 1 else str(Fraction(number_text(last - first)) / moves)
     turned = round(turn / moves, 2) + 0.0
     words = counts + (f" turn {abs(turned):g} {'left' if turned > 0 else 'right'}" if turned else "")
     return [[words + before]] * (moves - 1) + [[words + up + go]]
 
 
-def _steps(staff: Staff, column: str, count: float) -> bool:
-    """Return whether a support's sign that ends at a count is a step onto that foot alone, not a stance of both."""
-    other = SUPPORTS[1 - SUPPORTS.index(column)]
-    bears = any(sign.begin < count <= sign.end for sign in staff.column(other))
-    return not bears and _begins(staff, column, count)
-
-
-def _begins(staff: Staff, column: str, count: float) -> bool:
-    """Return whether the foot of a support's sign that ends at a count did not bear weight before."""
-    sign = next(sign for sign in staff.column(column) if sign.end == count)
+def _steps(staff: Staff, sign: Sign) -> bool:
+    """Return whether a support's sign is a step onto that foot alone, which did not bear weight before."""
+    other = staff.column(SUPPORTS[1 - SUPPORTS.index(sign.column)])
+    if any(other[place].end >= sign.end for place in overlapping(other, sign.begin, sign.end)):
+        return False
     if sign.begin == 0.0:
-        return column not in staff.start
-    return not any(before.end == sign.begin for before in staff.column(column))
+        return sign.column not in staff.start
+    return ending(staff.column(sign.column), sign.begin) is None
 
 
 def _go(around: str) -> str:

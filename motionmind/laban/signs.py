@@ -8,8 +8,10 @@ Source: A. Hutchinson Guest, "Labanotation: the system of analyzing and recordin
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from bisect import bisect_left, bisect_right
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import floor
 
 import numpy as np
@@ -124,9 +126,28 @@ class Staff:
     start: Mapping[str, Value]
     signs: tuple[Sign, ...]
 
-    def column(self, name: str) -> Iterator[Sign]:
-        """Yield the signs of a column in order of time."""
-        return (sign for sign in self.signs if sign.column == name)
+    def column(self, name: str) -> Sequence[Sign]:
+        """Return the signs of a column in order of time."""
+        return self._columns.get(name, ())
+
+    @cached_property
+    def _columns(self) -> dict[str, list[Sign]]:
+        columns: dict[str, list[Sign]] = {}
+        for sign in self.signs:
+            columns.setdefault(sign.column, []).append(sign)
+        return columns
+
+
+def overlapping(signs: Sequence[Sign], begin: float, end: float) -> range:
+    """Return the places of those signs of a column that share some time with an interval."""
+    first = bisect_right(signs, begin, key=lambda sign: sign.end)
+    return range(first, bisect_left(signs, end, key=lambda sign: sign.begin))
+
+
+def ending(signs: Sequence[Sign], count: float) -> Sign | None:
+    """Return the sign of a column that ends at a count."""
+    place = bisect_left(signs, count, key=lambda sign: sign.end)
+    return signs[place] if place < len(signs) and signs[place].end == count else None
 
 
 def allowed(column: str, value: Value) -> bool:

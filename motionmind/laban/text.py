@@ -44,7 +44,7 @@ SUFFIX = ".laban"
 LABAN_VERSION = 1
 MAX_BAR_COUNTS = 64
 MAX_STAFF_COUNTS = 100_000.0
-MAX_SIGNS = 200_000
+MAX_SIGNS = 20_000
 _FIELDS = ("laban", "title", "body", "tempo", "bar", "counts")
 
 

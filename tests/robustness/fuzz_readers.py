@@ -35,6 +35,8 @@ from motionmind.formats import read_clips
 from motionmind.formats.floor_path import read_floor_path
 from motionmind.formats.papers import read_papers
 from motionmind.geometry import rotations as rot
+from motionmind.laban.drawing import draw_staff
+from motionmind.laban.text import read_staff, staff_text
 from motionmind.music import Sound, read_beats, read_sound
 from motionmind.notation import compose as notation
 from motionmind.notation.read import read_score
@@ -55,6 +57,27 @@ P_GENERATED = 0.5  # of a reader's inputs, if it has a generator; a quarter of t
 FLOOR_PATH = b"""<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 0C.5 0 1 .5 1 1q0 1-1 1V2h-1.5Z"/></svg>"""
 BEATS = b"# a waltz\n0.25 3\n0.75 1\n1.25 2\n1.75\n"
 
+SIGNS = b"""laban 1
+title A step
+body human23
+tempo 96.5
+bar 3
+counts 6
+left support
+  start | place middle
+  0 1   | hold
+right support
+  start | place middle
+  0 2   | left-forward high
+left leg
+  1 1   | back low very bent touch
+head turn
+  0 0.5 | turn 45 left
+turn
+  2 3   | turn 360 right
+path
+  1 4   | back
+"""
 ENSEMBLE = b"""\
 piece = "p"
 tempo = 108
@@ -154,6 +177,13 @@ def _score(path: Path) -> None:
 
 def _report(path: Path) -> None:
     str(explain(read_report(path)))
+
+
+def _signs(path: Path) -> None:
+    """Read signs, draw them, and write them again."""
+    staff = read_staff(path)
+    draw_staff(staff).encode(".svg")
+    staff_text(staff)
 
 
 def _ensemble(path: Path) -> None:
@@ -321,6 +351,7 @@ def readers(folder: Path) -> list[Reader]:
         Reader("ensemble", "a.toml", [ENSEMBLE], _ensemble),
         Reader("floor path, text", "a.csv", [b"x,z\n0,0\n0.5,1.25\n# on\n2;3\n"], read_floor_path),
         Reader("floor path, SVG", "a.svg", [FLOOR_PATH], read_floor_path),
+        Reader("Labanotation's signs", "a.laban", [SIGNS], _signs),
         Reader("text of beats", "a.txt", [BEATS], _beats),
         Reader("MIDI", "a.mid", [_midi()], _beats),
         Reader("sound", "a.wav", [_sound("WAV"), _sound("FLAC")], read_sound),
