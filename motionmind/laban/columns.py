@@ -123,7 +123,7 @@ def _column(column: str, measured: Measured, supported: Supported, counts: Float
 
 
 def _events(column: str, supported: Supported, counts: Floats) -> Iterator[tuple[Sign | Value, Off]]:
-    """Yield the signs of supports and paths, each of which takes one move, and the holds between them."""
+    """Yield the signs of supports and paths, each for one move, and the holds between them."""
     side = SUPPORTS.index(column) if column in SUPPORTS else -1
     held = -1  # the row where a hold begins
     for row in range(len(counts) + 1):

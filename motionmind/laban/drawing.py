@@ -19,7 +19,7 @@ import numpy as np
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
-from motionmind.laban.shapes import EDGE_PX, Box, draw_sign
+from motionmind.laban.shapes import SIGN_EDGE_PX, Box, draw_sign
 from motionmind.laban.signs import (
     COLUMNS,
     PATH,
@@ -62,8 +62,8 @@ _STAFF_WIDTH = (-4.0, 7.0)
 _INSET_PX = 2.5  # between a sign and the edges of its column
 _NUMBERS_PX = 34.0  # left of a staff, for its counts
 _GAP_PX = 26.0  # between staves
-_MARGIN_PX = 36.0
-_TITLE_PX = 54.0
+_STAFF_MARGIN_PX = 36.0
+_STAFF_TITLE_PX = 54.0
 _LETTER_PX = 8.8  # width of a letter of the title
 _START_PX = 44.0  # below a staff, for the starting position
 _START_SIGN_PX = 30.0
@@ -164,15 +164,17 @@ def draw_staff(staff: Staff) -> Drawing:
         raise MotionMindError(f"{count} pages, and at most {MAX_PAGES} are drawn; choose a shorter clip")
     width, height = PAGE_WIDTH_PX // _PRINT_SCALE, PAGE_HEIGHT_PX // _PRINT_SCALE
     if count == 1:
-        width = 2 * ceil(_MARGIN_PX) + ceil(max(staves * _staff_px() - _GAP_PX, _LETTER_PX * min(len(staff.title), 44)))
-        height = ceil(_TITLE_PX + layout.height + _START_PX + _LABEL_PX + 2 * _MARGIN_PX)
+        width = 2 * ceil(_STAFF_MARGIN_PX) + ceil(
+            max(staves * _staff_px() - _GAP_PX, _LETTER_PX * min(len(staff.title), 44))
+        )
+        height = ceil(_STAFF_TITLE_PX + layout.height + _START_PX + _LABEL_PX + 2 * _STAFF_MARGIN_PX)
     turns = _place_turns(staff)
     pages = []
     for page in range(count):
         marks: list[Mark] = []
-        bottom = height - _MARGIN_PX - _LABEL_PX - _START_PX
+        bottom = height - _STAFF_MARGIN_PX - _LABEL_PX - _START_PX
         for place in range(min(layout.per_page, staves - page * layout.per_page)):
-            centre = _MARGIN_PX + _NUMBERS_PX - _STAFF_WIDTH[0] * _COLUMN_PX + place * _staff_px()
+            centre = _STAFF_MARGIN_PX + _NUMBERS_PX - _STAFF_WIDTH[0] * _COLUMN_PX + place * _staff_px()
             marks += _draw_part(staff, layout, turns, page * layout.per_page + place, centre, bottom)
         tempo = f"{staff.tempo:g} counts a minute, bars of {staff.bar}"
         pages.append(Plate(width, height, title, tuple(marks), (*_headings(staff.title, tempo, page, count, width),)))
@@ -180,9 +182,9 @@ def draw_staff(staff: Staff) -> Drawing:
 
 
 def _headings(title: str, tempo: str, page: int, count: int, width: int) -> Iterator[Mark]:
-    yield Words((_MARGIN_PX, _MARGIN_PX), displayed(title, max(44, int(width / _LETTER_PX) - 8)), 16.0, INK)
+    yield Words((_STAFF_MARGIN_PX, _STAFF_MARGIN_PX), displayed(title, max(44, int(width / _LETTER_PX) - 8)), 16.0, INK)
     about = tempo if count == 1 else f"{tempo}; page {page + 1} of {count}"
-    yield Words((_MARGIN_PX, _MARGIN_PX + 22.0), about, 12.0, SHEET.pale)
+    yield Words((_STAFF_MARGIN_PX, _STAFF_MARGIN_PX + 22.0), about, 12.0, SHEET.pale)
 
 
 def _staff_px() -> float:
@@ -194,12 +196,12 @@ def _layout(staff: Staff) -> _Layout:
     """Choose the length of a count so that most signs are long enough, and break the staff at bar lines."""
     lengths = [sign.counts for sign in staff.signs] or [1.0]
     count = float(np.clip(_SHORT_SIGN_PX / np.percentile(lengths, 10), *_COUNT_RANGE_PX))
-    room = PAGE_HEIGHT_PX / _PRINT_SCALE - 2 * _MARGIN_PX - _TITLE_PX - _START_PX - _LABEL_PX
+    room = PAGE_HEIGHT_PX / _PRINT_SCALE - 2 * _STAFF_MARGIN_PX - _STAFF_TITLE_PX - _START_PX - _LABEL_PX
     bars = max(1, floor(room / (count * staff.bar)))
     count = min(count, room / (bars * staff.bar))
     step = bars * staff.bar
     breaks = [float(step * number) for number in range(max(1, ceil(round(staff.counts / step, 6))))]
-    per_page = max(1, floor((PAGE_WIDTH_PX / _PRINT_SCALE - 2 * _MARGIN_PX + _GAP_PX) / _staff_px()))
+    per_page = max(1, floor((PAGE_WIDTH_PX / _PRINT_SCALE - 2 * _STAFF_MARGIN_PX + _GAP_PX) / _staff_px()))
     return _Layout(count, (*breaks, staff.counts), per_page)
 
 
@@ -308,20 +310,20 @@ def _lines(
     left, right = centre - 2 * _COLUMN_PX, centre + 2 * _COLUMN_PX
     start = bottom + (_START_PX if first == 0.0 else 0.0)
     for x in (left, centre, right):
-        yield Line(np.array([(x, start), (x, top)]), INK, EDGE_PX)
+        yield Line(np.array([(x, start), (x, top)]), INK, SIGN_EDGE_PX)
     for y in (bottom, bottom + 3.0) if first == 0.0 else (bottom,):
-        yield Line(np.array([(left, y), (right, y)]), INK, EDGE_PX)
+        yield Line(np.array([(left, y), (right, y)]), INK, SIGN_EDGE_PX)
     if last == staff.counts:
-        for y, width in ((top, EDGE_PX), (top - 4.0, 2.5)):
+        for y, width in ((top, SIGN_EDGE_PX), (top - 4.0, 2.5)):
             yield Line(np.array([(left, y), (right, y)]), INK, width)
     numbers = centre + _STAFF_WIDTH[0] * _COLUMN_PX - 8.0
     for number in range(ceil(first), ceil(last)):
         y = bottom - count * (number - first)
         if number % staff.bar == 0:
-            yield Line(np.array([(left, y), (right, y)]), INK, EDGE_PX)
+            yield Line(np.array([(left, y), (right, y)]), INK, SIGN_EDGE_PX)
             yield Words((numbers - 16.0, y - 8.0), str(number // staff.bar + 1), 11.0, SHEET.pale, "end")
         else:
-            yield Line(np.array([(centre - 4.0, y), (centre + 4.0, y)]), INK, EDGE_PX)
+            yield Line(np.array([(centre - 4.0, y), (centre + 4.0, y)]), INK, SIGN_EDGE_PX)
         yield Words((numbers, y - 8.0), str(number % staff.bar + 1), 11.0, INK, "end")
     for place, column in enumerate(_EDGES):
         if column not in staff.start and not any(staff.column(column)):

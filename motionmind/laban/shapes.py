@@ -16,7 +16,7 @@ from motionmind.laban.signs import PLACE, Direction, Hold, Turn, Value
 from motionmind.plots.marks import Dot, Line, Mark, Polygon, Words
 from motionmind.render.palette import INK, PAPER
 
-EDGE_PX = 1.4  # of a sign
+SIGN_EDGE_PX = 1.4  # of a sign
 _STRIPE_PX = 5.0  # between the stripes of a high sign
 _DOT_PX = 2.2
 _POINT_SHARE = 1 / 3  # of a sign's height that points ahead or back, at most a column's width
@@ -48,7 +48,7 @@ def draw_sign(value: Value, box: Box, *, on_left: bool, faces: int = 0) -> Itera
         faces: for a turn sign of torso or head, the degrees to the left that it faced before.
     """
     if isinstance(value, Hold):
-        yield Dot(box.middle, 4.0, PAPER, INK, EDGE_PX)
+        yield Dot(box.middle, 4.0, PAPER, INK, SIGN_EDGE_PX)
     elif isinstance(value, Turn):
         yield from _turn(value.left, value.left - faces, box)
     elif not value.level:
@@ -91,7 +91,7 @@ def _direction(value: Direction, box: Box, *, on_left: bool) -> Iterator[Mark]:
             yield from _cross(box.middle[0] + shift, box.bottom - 0.5 * room, 0.5 * (room - 3.0))
         box = box._replace(bottom=box.bottom - room)
     corners = outline(value.around, box, on_left=on_left)
-    yield Polygon(corners, INK if value.level == "low" else PAPER, INK, EDGE_PX)
+    yield Polygon(corners, INK if value.level == "low" else PAPER, INK, SIGN_EDGE_PX)
     if value.level == "high":
         yield from (Line(stripe, INK, 1.0) for stripe in stripes(corners))
     if value.level == "middle":
@@ -127,7 +127,7 @@ def stripes(corners: Floats) -> Iterator[Floats]:
 
 def _cross(x: float, y: float, half: float) -> Iterator[Mark]:
     for slope in (1.0, -1.0):
-        yield Line(np.array([(x - half, y - slope * half), (x + half, y + slope * half)]), INK, EDGE_PX)
+        yield Line(np.array([(x - half, y - slope * half), (x + half, y + slope * half)]), INK, SIGN_EDGE_PX)
 
 
 def _turn(faces: int, turned: int, box: Box) -> Iterator[Mark]:
@@ -140,7 +140,7 @@ def _turn(faces: int, turned: int, box: Box) -> Iterator[Mark]:
         (box.right, box.bottom - drop[0]),
         (box.left, box.bottom - drop[1]),
     ]
-    yield Polygon(np.array(corners), PAPER, INK, EDGE_PX)
+    yield Polygon(np.array(corners), PAPER, INK, SIGN_EDGE_PX)
     yield from _pin(box.middle, faces, min(_PIN_PX, 0.4 * (box.right - box.left), 0.4 * (box.bottom - box.top)))
     if abs(faces) > 360:
         x, y = box.middle
@@ -161,8 +161,8 @@ def _pin(at: tuple[float, float], left: float, half: float) -> Iterator[Mark]:
 def _path(around: str, box: Box, *, on_left: bool) -> Iterator[Mark]:
     """Yield a straight path: a line for as long as it lasts, and its direction in the middle."""
     x, y = box.middle
-    yield Line(np.array([(x, box.top + 1.0), (x, box.bottom - 1.0)]), INK, EDGE_PX)
+    yield Line(np.array([(x, box.top + 1.0), (x, box.bottom - 1.0)]), INK, SIGN_EDGE_PX)
     for end in (box.top + 1.0, box.bottom - 1.0):
-        yield Line(np.array([(x - 4.0, end), (x + 4.0, end)]), INK, EDGE_PX)
+        yield Line(np.array([(x - 4.0, end), (x + 4.0, end)]), INK, SIGN_EDGE_PX)
     half = min(7.0, 0.3 * (box.bottom - box.top))
-    yield Polygon(outline(around, Box(x - 5.0, y - half, x + 5.0, y + half), on_left=on_left), PAPER, INK, EDGE_PX)
+    yield Polygon(outline(around, Box(x - 5.0, y - half, x + 5.0, y + half), on_left=on_left), PAPER, INK, SIGN_EDGE_PX)

@@ -169,6 +169,14 @@ def test_a_turn_stands_across_the_supports_but_beside_a_step() -> None:
     assert step[0] > 100.0
 
 
+def test_the_documents_show_the_drawing_of_their_score(tmp_path: Path) -> None:
+    docs = Path(__file__).parents[2] / "docs"
+    path = tmp_path / "tendu.score"
+    path.write_text((docs / "notation.md").read_text("utf-8").split("```text\n")[1].partition("```")[0], "utf-8")
+    score = read_score(path)
+    assert (docs / "gallery" / "tendu.svg").read_text("utf-8") == drawn(notate(score, score.clips[0], 4).staff)
+
+
 def test_a_score_that_is_too_long_is_refused() -> None:
     staff = Staff("Long", "human23", 60.0, 4, 100_000.0, {}, (Sign("turn", 0.0, 1.0, Turn(90)),))
     with pytest.raises(MotionMindError, match="pages, and at most 100 are drawn"):
