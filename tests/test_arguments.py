@@ -131,7 +131,10 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
         "read_report": (mm.read_report, {"path": folder / "report.json"}),
         "read_score": (mm.read_score, {"path": folder / "bends.score"}),
         "read_variation": (mm.read_variation, {"path": folder / "variation.json"}),
-        "transcribe": (transcription.transcribe, {"motion": motion.slice(0, 2), "tolerance": 6.0, "name": "c", "repeats": True}),
+        "transcribe": (
+            transcription.transcribe,
+            {"motion": motion.slice(0, 2), "tolerance": 6.0, "name": "c", "repeats": True},
+        ),
         "to_human23": (retarget.to_human23, {"movement": motion}),
         "vary": (mm.vary, {"piece": motion}),
         "draw_attractor": (plots.draw_attractor, {"path": path.with_suffix(".svg"), "variation": variation}),

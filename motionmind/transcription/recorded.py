@@ -64,8 +64,8 @@ def prepare(motion: Motion, tolerance: float) -> Recorded:
             f"at most {MAX_RECORDING_S:g} s; choose a part"
         )
     moved, body = to_human23(motion), anatomy_named("human23")
-    if len(moved) > 1 and (not moved.is_even or moved.fps > MAX_RATE_FPS):
-        moved = moved.resample(min(MAX_RATE_FPS, moved.fps))
+    if len(moved) > 1 and (moved.keyframed or not moved.is_even or moved.fps > MAX_RATE_FPS):
+        moved = moved.resample(MAX_RATE_FPS)
     root = moved.root * (body.skeleton.height / moved.skeleton.height)
     moved = replace(moved, skeleton=body.skeleton, root=root)
     stands = np.zeros((len(moved), 2), dtype=np.bool_)

@@ -78,6 +78,13 @@ def test_the_adagio_comes_back_in_about_as_many_postures_as_it_was_written_in() 
     assert 0.7 * len(whole) <= len(found.keys) <= 1.0 * len(whole)
 
 
+def test_movement_between_keyframes_is_transcribed_to_its_end() -> None:
+    whole = ballet_clip("temps-lie")
+    found = transcribe(whole, 12.0)
+    assert found.motion.times[-1] == pytest.approx(whole.times[-1] - whole.times[0], abs=0.04)
+    assert len(found.recording) > 10 * len(whole)
+
+
 def test_deviations_are_those_of_the_composed_movement() -> None:
     found = transcribed()
     played = found.motion.at(found.recording.times)
