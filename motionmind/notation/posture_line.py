@@ -33,6 +33,7 @@ class Row(NamedTuple):
             floor.
         faced: whether this line, or an earlier one of its phrase, sets an absolute facing; else the facing is relative
             to the one before the phrase.
+        line: number of the line of the clip, or of the phrase that is played, which is the posture or calls it.
     """
 
     where: Where
@@ -43,6 +44,7 @@ class Row(NamedTuple):
     seconds: float | None
     go: tuple[float, float] = (0.0, 0.0)
     faced: bool = False
+    line: int = 0
 
     def same_posture(self, other: Row) -> bool:
         """Return whether the postures are the same, regardless of the moves that lead to them."""

@@ -67,13 +67,15 @@ def _player(phrase: Phrase, words: dict[str, str], counts: float, depth: int, wo
         for written in phrase.lines:
             line = _fill(written, words, work)
             work.add(1 + len(line.text) // N_CHARS_PER_WORK, line.where)
-            standing = rows[-1] if rows else before
+            standing, known = rows[-1] if rows else before, len(rows)
             if _is_tempo(line.text):
                 pace = tempo(line.text.partition(" ")[2].strip(), line.where)
             elif "|" in line.text or is_hold(line.text):
                 rows += _continue([read_row(phrase.score, line, standing, 60.0 / pace, work)], rows, line.where)
             else:
                 rows += _continue(_call(phrase, line, pace, depth, work)(standing), rows, line.where)
+            if depth == 0:
+                rows[known:] = [row._replace(line=line.where.line) for row in rows[known:]]
             _check_count(rows, line.where)
         if not rows:
             raise phrase.where.error(f"{phrase.name} has no postures")

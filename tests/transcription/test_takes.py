@@ -83,8 +83,8 @@ def test_phrases_play_the_same_postures_and_moves(tmp_path: Path, sides: int) ->
         path.write_text(writer.text(moves, 103.0, "clip-1", "A dance", given_repeats), encoding="utf-8")
         out.append(played(read_score(path))[0])
     plain, called = out
-    assert [row._replace(where=None, words=(), faced=False) for row in plain[0]] == [  # type: ignore[arg-type]
-        row._replace(where=None, words=(), faced=False)  # type: ignore[arg-type]
+    assert [row._replace(where=None, words=(), faced=False, line=0) for row in plain[0]] == [  # type: ignore[arg-type]
+        row._replace(where=None, words=(), faced=False, line=0)  # type: ignore[arg-type]
         for row in called[0]
     ]
     for name in ("rotations", "root", "times"):
