@@ -19,7 +19,7 @@ pytestmark = pytest.mark.long
 AxeFaults = Callable[[Any], list[str]]
 Enter = Callable[[Literal["light", "dark"], int], Any]
 
-PANELS = ("between", "vary", "pose", "movement", "take")
+PANELS = ("between", "vary", "pose", "dancers", "movement", "take")
 # The engine's words, not a choreographer's.
 FORBIDDEN = re.compile(r"\b(nats?|states?|lyapunov|quaternions?|entropy|likelihoods?|posteriors?)\b", re.IGNORECASE)
 _NEEDS = """(field) => {

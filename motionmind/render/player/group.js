@@ -232,7 +232,7 @@ export function writeDancers(group, ensemble, refresh) {
   group.hidden = false;
 }
 
-/** The bodies of pieces: those that are alike are one. */
+/** The bodies of pieces; pieces with equal bodies share one. */
 function bodiesOf(pieces) {
   const known = new Map();
   return pieces.map(({ skeleton, body }) => {

@@ -12,7 +12,7 @@ import { Ensemble } from "motionmind/group";
 /** The dancers, with the interface of a piece: `own` and `clock` lead to the piece's time and back. */
 export class Troupe extends Ensemble {
   /**
-   * @param {any} piece a Composed, of which the first movement has loaded
+   * @param {any} piece a Composed whose first movement has loaded
    * @param {Data} data
    * @param {Map<string, any>} others movements of the dancers' own, and the mirrored piece, as `playedBy` names them
    */
@@ -57,7 +57,7 @@ export class Troupe extends Ensemble {
     return this.leader ? this.piece.placeAt(this.own(time)) : null;
   }
 
-  /** The same, with movements that stay loaded. @param {any} movements */
+  /** A copy with movements of its own. @param {any} movements where it loads them */
   async copy(movements) {
     return gather(await this.piece.copy(movements), this.data);
   }

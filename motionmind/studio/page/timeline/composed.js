@@ -83,13 +83,13 @@ export class Composed {
     return this.parts.map(({ key }) => key);
   }
 
-  /** The same, of movements of which the first has then loaded. @param {Movements} movements */
+  /** A copy, once its first movement has loaded. @param {Movements} movements where it loads them */
   async copy(movements) {
     await movements.load(this.parts[0].key);
     return new Composed(this.parts, movements, this.name);
   }
 
-  /** The mirrored piece, of which the first movement has then loaded. */
+  /** The mirrored piece, once its first movement has loaded. */
   async mirrored() {
     const parts = this.parts.map((part) => ({
       ...part,
