@@ -180,6 +180,32 @@ def test_the_viewer_plays_what_the_ensemble_is(page: Any, studio_server: Served)
             assert same.min() > 1.0 - 1e-4, (time, motion.name)
 
 
+def test_the_mirrored_piece_mirrors_it_wherever_its_parts_are(page: Any, studio_server: Served) -> None:
+    put(studio_server, "anna")
+    wait_for_dancers(page, 1)
+    until(page, "studio.viewer.motion.piece.times.length > 0")
+    found = page.evaluate(
+        """async () => {
+          const { piece } = studio.viewer.motion;
+          const [part] = piece.parts;
+          const moved = Object.assign(Object.create(Object.getPrototypeOf(piece)), piece, {
+            parts: [{ ...part, place: [2, 3], turn: 0.7 }, { ...part, at: part.seconds + 1, place: [-1, 4], turn: -2 }],
+          });
+          const own = await moved.copy(piece.movements);
+          const mirrored = await own.mirrored();
+          const pose = (one, time) => {
+            const [rotations, root] = [new Float64Array(4 * one.joints.length), new Float64Array(3)];
+            one.sample(time, rotations, root);
+            return [[...root], [...rotations.slice(0, 4)]];
+          };
+          return [0.5, 4, part.seconds + 0.5, part.seconds + 6].map((time) => [pose(own, time), pose(mirrored, time)]);
+        }"""
+    )
+    for ((x, y, z), (qx, qy, qz, qw)), (root, rotation) in found:
+        assert root == pytest.approx([-x, y, z], abs=1e-4)
+        assert abs(np.dot(rotation, [qx, -qy, -qz, qw])) == pytest.approx(1.0, abs=1e-6)
+
+
 def test_the_time_line_follows_the_first_dancer_who_waits(page: Any, studio_server: Served) -> None:
     put(studio_server, "anna", entry=3.0)
     studio_server.edit(edit="formations", changes=[{"at": 5, "counts": 4, "places": {"anna": [2, 0]}}])
