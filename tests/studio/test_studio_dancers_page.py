@@ -12,6 +12,7 @@ from pages import RESTING, Tabs
 from piece_page import until
 from studio_server import LARGE, SMALL, Served
 from test_studio_dancers import TRIO, ensemble_in, opened, put
+from test_studio_timeline import box_at_rest
 
 pytestmark = pytest.mark.long
 
@@ -160,6 +161,31 @@ def test_fields_place_turn_rename_and_change_formations(page: Any, studio_server
     until(page, "studio.store.state.cast.changes[0].places.anna?.[0] === 4")
     page.get_by_test_id("change-0-remove").click()
     until(page, "studio.store.state.cast.changes.length === 0")
+
+
+def test_places_are_dragged_on_the_floor_and_moved_by_keys(page: Any, studio_server: Served) -> None:
+    put(studio_server, "anna")
+    put(studio_server, "ben", place=[1.5, 0.0])
+    wait_for_dancers(page, 2)
+    page.get_by_role("button", name="Top", exact=True).click()
+    until(page, "document.querySelectorAll('.stage .spot:not([hidden])').length === 2")
+    anna, ben = (box_at_rest(page, f"spot-{name}") for name in ("anna", "ben"))
+    bx, by = ben["x"] + 0.5 * ben["width"], ben["y"] + 0.5 * ben["height"]
+    metre = (ben["x"] - anna["x"]) / 1.5  # seen from above
+    page.mouse.move(bx, by)
+    page.mouse.down()
+    page.mouse.move(bx + 0.4 * metre, by - 0.3 * metre, steps=5)
+    until(page, "studio.viewer.motion.dancers[1].place[0] > 1.8")  # the body goes along
+    page.mouse.move(bx + 0.5 * metre, by - metre, steps=5)
+    page.mouse.up()
+    until(page, "studio.store.state.cast.dancers[1].place[0] !== 1.5")
+    assert cast(page)[1]["place"] == pytest.approx([2.0, -1.0], abs=0.15)
+    page.get_by_test_id("spot-anna").focus()
+    for key in ("ArrowRight", "ArrowRight", "ArrowDown"):
+        page.keyboard.press(key)
+    until(page, "JSON.stringify(studio.store.state.cast.dancers[0].place) === '[0.2,0.1]'")
+    page.get_by_test_id("open-take").click()
+    until(page, "document.querySelectorAll('.stage .spot').length === 0")
 
 
 def test_the_viewer_plays_what_the_ensemble_is(page: Any, studio_server: Served) -> None:

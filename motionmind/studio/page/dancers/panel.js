@@ -5,6 +5,7 @@ import { NumberField } from "../shell/fields.js";
 import { useChange } from "../shell/hooks.js";
 import { castOf } from "./cast.js";
 import { Formations } from "./formations.js";
+import { Spots } from "./spots.js";
 
 const MAX_PLACE_M = 1000;
 const MAX_TURN_DEG = 3600;
@@ -16,6 +17,10 @@ export function Panel({ studio }) {
   useChange(cast, () => cast.version);
   const { dancers } = useChange(studio.store, () => cast.now);
   const empty = useChange(studio.store, () => !studio.store.state?.piece?.blocks.length);
+  useEffect(() => {
+    const spots = new Spots(cast);
+    return () => spots.close();
+  }, [cast]);
   return html`<div class="stack dancers" data-testid="dancers">
     <h2>Dancers</h2>
     ${empty && html`<p class="empty">The piece is empty. Put movement on the time line, and dancers dance it.</p>`}
