@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-import ipaddress
-import re
-import stat
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING
 
 import msgspec
 from starlette.requests import Request
-from starlette.responses import FileResponse, Response
+from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError
 from motionmind.studio import api
 from motionmind.studio.edits import SetReference
+from motionmind.studio.local_files import LocalFile, PathText, find_file, is_here, show_file
 from motionmind.studio.project import RefusedError
 
 if TYPE_CHECKING:
     from motionmind.studio.studio import Studio
 
-_MAX_PART_BYTES = 2**20  # of an answer: browsers ask for the next part when they need it, and hold no connection open
-_RANGE = re.compile(r"bytes=(\d{0,15})-(\d{0,15})")
 _ELSEWHERE = "the reference video is shown only on the studio's own computer"
 
 
@@ -31,45 +26,19 @@ class Referring(msgspec.Struct, forbid_unknown_fields=True):
     """The window that chooses a video, and the video's path."""
 
     window: api.Window
-    path: Annotated[str, msgspec.Meta(max_length=4_096)]
+    path: PathText
 
 
-class Video(NamedTuple):
-    """A video file.
-
-    Attributes:
-        path: the file.
-        type: its media type.
-        size: its size in bytes.
-    """
-
-    path: Path
-    type: str
-    size: int
-
-
-def find_video(path: str) -> Video:
+def find_video(path: str) -> LocalFile:
     """Return the video at a path; raise MotionMindError if there is none that browsers know.
 
     Args:
         path: the path, absolute or beginning with "~".
     """
-    try:
-        file = Path(path).expanduser()
-        if not file.is_absolute():
-            raise MotionMindError(f"{displayed_path(path)}: needs its whole path, such as {Path.home() / 'dance.mp4'}")
-        status = file.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise MotionMindError(f"{displayed_path(file)}: is not a file")
-        with file.open("rb") as opened:
-            head = opened.read(12)
-    except (OSError, ValueError, RuntimeError) as error:  # ValueError: a null character; RuntimeError: no such home
-        reason = error.strerror.lower() if isinstance(error, OSError) and error.strerror else str(error)
-        raise MotionMindError(f"{displayed_path(path)}: {reason}") from error
-    kind = _type_of(head)
-    if not kind:
-        raise MotionMindError(f"{displayed_path(file)}: is not a video that browsers play: WebM, MP4, MOV or Ogg")
-    return Video(file, kind, status.st_size)
+    video = find_file(path, "dance.mp4", _type_of)
+    if not video.type:
+        raise MotionMindError(f"{displayed_path(video.path)}: is not a video that browsers play: WebM, MP4, MOV or Ogg")
+    return video
 
 
 def routes(studio: Studio) -> list[BaseRoute]:
@@ -77,7 +46,7 @@ def routes(studio: Studio) -> list[BaseRoute]:
 
     async def choose(request: Request) -> Response:
         given = await api.body_of(request, Referring)
-        if not _is_here(request):
+        if not is_here(request):
             return api.error(_ELSEWHERE, 403)
         video = find_video(given.path)
         try:
@@ -87,7 +56,7 @@ def routes(studio: Studio) -> list[BaseRoute]:
         return api.json(studio.view(given.window))
 
     async def show(request: Request) -> Response:
-        if not _is_here(request):
+        if not is_here(request):
             return api.error(_ELSEWHERE, 403)
         if not studio.project.state.reference.path:
             return api.error("the piece has no reference video", 404)
@@ -95,30 +64,9 @@ def routes(studio: Studio) -> list[BaseRoute]:
             video = find_video(studio.project.state.reference.path)
         except MotionMindError as error:
             return api.error(str(error), 404)
-        if "range" not in request.headers:
-            return FileResponse(video.path, media_type=video.type)
-        return _part(video, request.headers["range"])
+        return show_file(request, video)
 
     return [Route("/api/reference", show), Route("/api/reference", choose, methods=["POST"])]
-
-
-def _part(video: Video, wanted: str) -> Response:
-    """Return the beginning of a range of a video's bytes."""
-    found = _RANGE.fullmatch(wanted)
-    first, last = found.groups() if found else ("", "")
-    if first:
-        begin, end = int(first), min(int(last) + 1 if last else video.size, video.size)
-    else:
-        begin, end = max(video.size - int(last or 0), 0), video.size
-    if begin >= end:
-        answer = api.error(f"{displayed_path(video.path)} has {video.size} bytes", 416)
-        answer.headers["content-range"] = f"bytes */{video.size}"
-        return answer
-    with video.path.open("rb") as file:
-        file.seek(begin)
-        data = file.read(min(end - begin, _MAX_PART_BYTES))
-    headers = {"content-range": f"bytes {begin}-{begin + len(data) - 1}/{video.size}", "accept-ranges": "bytes"}
-    return Response(data, 206, headers, media_type=video.type)
 
 
 def _type_of(head: bytes) -> str:
@@ -128,11 +76,3 @@ def _type_of(head: bytes) -> str:
     if head[4:8] == b"ftyp":
         return "video/mp4"
     return "video/ogg" if head.startswith(b"OggS") else ""
-
-
-def _is_here(request: Request) -> bool:
-    """Return whether a request comes from this computer."""
-    client, server = request.scope.get("client"), request.scope.get("server")
-    if not client or not server:
-        return False
-    return client[0] == server[0] or ipaddress.ip_address(client[0]).is_loopback

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,9 @@ from starlette.requests import Request
 from studio_server import LARGE, SMALL, Client, Served
 
 from motionmind.errors import MotionMindError
+from motionmind.studio.local_files import is_here
 from motionmind.studio.project import Project
-from motionmind.studio.reference import _is_here, find_video
+from motionmind.studio.reference import find_video
 
 FPS, N_FRAMES, WIDTH, HEIGHT = 25, 300, 160, 96
 FRAME_S = 1.0 / FPS
@@ -201,8 +203,8 @@ def test_ranges_are_answered_part_by_part(studio_server: Served, tmp_path: Path)
 )
 def test_only_this_computer_is_shown_a_video(client: str, server: str, here: bool) -> None:
     scope = {"type": "http", "client": (client, 5), "server": (server, 6)}
-    assert _is_here(Request(scope)) is here
-    assert not _is_here(Request({"type": "http", "client": None, "server": None}))
+    assert is_here(Request(scope)) is here
+    assert not is_here(Request({"type": "http", "client": None, "server": None}))
 
 
 # --- the page -------------------------------------------------------------------------------------------------------
@@ -214,15 +216,14 @@ def open_page(studio_server: Served, tabs: Tabs) -> Iterator[Callable[..., Any]]
 
     def enter(size: tuple[int, int] = LARGE) -> Any:
         studio_server.insert("b1", "ballet/adagio", 0, 20)
-        page = using.__enter__()
-        page.set_viewport_size({"width": size[0], "height": size[1]})
+        using = tabs.tab({}, viewport={"width": size[0], "height": size[1]}, **RESTING)
+        page = opened.enter_context(using)
         page.goto(studio_server.entry)
         wait_for(page, "studio.viewer.piece?.length > 1")
         return page
 
-    using = tabs.tab({}, viewport={"width": LARGE[0], "height": LARGE[1]}, **RESTING)
-    yield enter
-    using.__exit__(None, None, None)
+    with ExitStack() as opened:
+        yield enter
 
 
 def ready(page: Any) -> None:

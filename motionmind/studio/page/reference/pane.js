@@ -5,11 +5,10 @@ import { NumberField } from "../shell/fields.js";
 import { icon } from "../shell/icons.js";
 import { useStore } from "../store.js";
 import { Follow } from "./follow.js";
+import { MOST_S, useShift } from "./shift.js";
 
 const S_PER_PX = 0.01; // of a drag
 const KEY_STEP_S = 0.04; // a frame at 25 frames a second
-const PAGE_STEP_S = 1;
-const MOST_S = 36_000;
 
 /** @param {{studio: any, hidden: boolean}} props; hidden, it keeps its file */
 export function Pane({ studio, hidden }) {
@@ -68,13 +67,8 @@ function Choose({ studio, take }) {
 function Film({ studio, shown, set, fail, hidden }) {
   const video = useRef(/** @type {any} */ (null));
   const follow = useRef(/** @type {any} */ (null));
-  const dragged = useRef(/** @type {{x: number, from: number} | null} */ (null));
-  const [draft, setDraft] = useState(/** @type {number | null} */ (null));
   const [muted, setMuted] = useState(true);
-  const begins = draft ?? shown.begins;
-  const latest = useRef(begins); // keys come faster than pictures
-  latest.current = begins;
-  const sending = useRef(false);
+  const { now: begins, shift, keep, handlers } = useShift({ value: shown.begins, digits: 2, step: KEY_STEP_S, perPixel: () => S_PER_PX, set });
   useEffect(() => {
     follow.current = new Follow(video.current, studio.viewer);
     return () => follow.current.end();
@@ -83,34 +77,6 @@ function Film({ studio, shown, set, fail, hidden }) {
     follow.current.begins = begins;
     follow.current.step();
   }, [begins]);
-  const shift = (/** @type {number} */ seconds) => {
-    const rounded = Math.round(100 * Math.min(Math.max(seconds, -MOST_S), MOST_S)) / 100;
-    latest.current = rounded;
-    setDraft(rounded);
-    return rounded;
-  };
-  const keep = async () => {
-    if (sending.current) return; // which goes on to the latest
-    sending.current = true;
-    let value = shown.begins;
-    while (latest.current !== value) {
-      value = latest.current;
-      await set(value); // one after the other: two at once may arrive in the other order
-    }
-    sending.current = false;
-    setDraft((now) => (now === value ? null : now)); // unless it has moved on
-  };
-  const drop = () => {
-    dragged.current = null;
-    keep();
-  };
-  const press = (/** @type {KeyboardEvent} */ event) => {
-    if (event.altKey || event.ctrlKey || event.metaKey) return;
-    const by = { ArrowRight: KEY_STEP_S, ArrowUp: KEY_STEP_S, ArrowLeft: -KEY_STEP_S, ArrowDown: -KEY_STEP_S, PageUp: PAGE_STEP_S, PageDown: -PAGE_STEP_S }[event.key];
-    if (!by && event.key !== "Home") return;
-    event.preventDefault();
-    shift(by ? latest.current + by : 0);
-  };
   const failed = async () => {
     const answer = shown.path && (await fetch(shown.src, { headers: { Range: "bytes=0-0" } }).catch(() => null));
     const told = answer && !answer.ok ? await answer.json().catch(() => ({})) : {};
@@ -129,16 +95,7 @@ function Film({ studio, shown, set, fail, hidden }) {
         aria-valuenow=${begins}
         aria-valuetext=${`the piece starts at ${begins.toFixed(2)} s of the video`}
         title="Drag sideways to shift the video against the piece (arrow keys)"
-        onPointerDown=${(/** @type {PointerEvent} */ event) => {
-          /** @type {Element} */ (event.currentTarget).setPointerCapture(event.pointerId);
-          dragged.current = { x: event.clientX, from: begins };
-        }}
-        onPointerMove=${(/** @type {PointerEvent} */ event) => dragged.current && shift(dragged.current.from + S_PER_PX * (event.clientX - dragged.current.x))}
-        onPointerUp=${drop}
-        onPointerCancel=${drop}
-        onKeyDown=${press}
-        onKeyUp=${keep}
-        onBlur=${keep}
+        ...${handlers}
       ></div>
     </div>
     <div class="row" hidden=${hidden}>
