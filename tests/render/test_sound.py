@@ -5,11 +5,10 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from click_tracks import at_tempo, clicks, onsets
+from click_tracks import at_tempo, clicks, onsets, played, recording
 from pages import Opened
 
 from motionmind import draw_picture
@@ -61,45 +60,6 @@ def test_a_films_clicks_sound_with_their_frames(bpm: float, fps: float | None, t
     assert sound.seconds == pytest.approx(len(differences) / rate, abs=0.03)  # so that it loops in step
 
 
-# Records when clicks leave the page, and where the play head is then.
-_RECORD = """
-(async () => {
-  const { sound, player } = motionmind, { context } = sound;
-  await sound.ready;
-  const code = `registerProcessor("listener", class extends AudioWorkletProcessor {
-    process([[heard]]) {
-      for (let i = 0; heard && i < heard.length; i++) {
-        const now = currentTime + i / sampleRate;
-        if (Math.abs(heard[i]) < 0.15) continue;
-        if (now - (this.last ?? -1) > 0.15) this.port.postMessage(now);
-        this.last = now;
-      }
-      return true;
-    }
-  });`;
-  await context.audioWorklet.addModule("data:text/javascript," + encodeURIComponent(code));
-  const listener = new AudioWorkletNode(context, "listener");
-  sound.output.connect(listener);
-  window.found = { onsets: [], heads: [] };
-  listener.port.onmessage = ({ data }) => found.onsets.push(data);
-  player.addEventListener("change", () => found.heads.push([context.currentTime, player.time]));
-})()
-"""
-
-
-def played(found: dict[str, Any], latency: float) -> Floats:
-    """Return where the play head was at each click that was heard, seconds; NaN between the end and the start."""
-    heads = np.array(found["heads"])
-    out = []
-    for onset in np.array(found["onsets"]) + latency:
-        at = int(np.searchsorted(heads[:, 0], onset))
-        if not 0 < at < len(heads):
-            continue
-        (before, one), (after, other) = heads[at - 1 : at + 1]
-        out.append(np.nan if other < one else one + (other - one) * (onset - before) / max(after - before, 1e-9))
-    return np.array(out)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("speed", [1.0, 0.5])
 def test_a_pages_clicks_sound_at_their_moments_from_loop_to_loop(show: Callable[..., Opened], speed: float) -> None:
@@ -107,7 +67,7 @@ def test_a_pages_clicks_sound_at_their_moments_from_loop_to_loop(show: Callable[
     tab = show(hopping(at, 2.3), sound=clicks(at, 3.0), viewport={"width": 320, "height": 240})
     tab.click("sound")
     tab.wait("motionmind.sound.audible")
-    tab.get(_RECORD)
+    tab.get(recording("motionmind"))
     tab.page.select_option("#speed", f"{speed:g}")
     tab.press("Space")
     tab.wait(f"window.found && found.onsets.length >= {12 if speed == 1.0 else 6}")

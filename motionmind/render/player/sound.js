@@ -11,14 +11,18 @@ export class Sound extends EventTarget {
   #playing; // {source, gain, at, offset, speed}: `offset` seconds of the sound were at `at` of the context's clock
   #corrected = 0;
   #muted = false;
+  #ended = new AbortController();
 
   /**
    * @param {Player} player
-   * @param {ArrayBuffer} file a sound file, which begins with the movement
+   * @param {ArrayBuffer} file a sound file
+   * @param {() => boolean} shown whether the player shows the movement that the sound belongs to
    */
-  constructor(player, file) {
+  constructor(player, file, shown = () => true) {
     super();
     this.player = player;
+    this.shown = shown;
+    this.begins = 0; // the sound's time when the movement begins, seconds; less than 0 if it begins later
     this.context = new AudioContext();
     this.output = new GainNode(this.context);
     this.output.connect(this.context.destination);
@@ -26,9 +30,22 @@ export class Sound extends EventTarget {
       this.#buffer = buffer;
       this.#follow();
     });
-    player.addEventListener("change", () => this.#follow());
-    this.context.addEventListener("statechange", () => this.#changed());
-    document.addEventListener("visibilitychange", () => document.hidden && this.#stop()); // no pictures follow then
+    const { signal } = this.#ended;
+    player.addEventListener("change", () => this.#follow(), { signal });
+    this.context.addEventListener("statechange", () => this.#changed(), { signal });
+    document.addEventListener("visibilitychange", () => document.hidden && this.#stop(), { signal }); // no pictures follow then
+  }
+
+  /** Fall silent for good. */
+  end() {
+    this.#ended.abort();
+    this.#stop();
+    this.context.close();
+  }
+
+  /** The decoded sound, once it is ready. */
+  get buffer() {
+    return this.#buffer;
   }
 
   /** Whether sound comes while the movement plays: browsers wait for a click or a key. */
@@ -51,7 +68,7 @@ export class Sound extends EventTarget {
   get heard() {
     if (!this.#playing) return undefined;
     const { at, offset, speed } = this.#playing;
-    return this.player.motion.start + offset + (this.context.currentTime - this.#latency - at) * speed;
+    return this.player.motion.start - this.begins + offset + (this.context.currentTime - this.#latency - at) * speed;
   }
 
   get #latency() {
@@ -65,14 +82,14 @@ export class Sound extends EventTarget {
 
   #follow() {
     const { player } = this;
-    if (!player.playing || !this.audible || !this.#buffer || document.hidden) {
+    if (!player.playing || !this.audible || !this.#buffer || document.hidden || !this.shown()) {
       this.#stop();
       return;
     }
     const off = this.#playing?.speed === player.speed ? Math.abs(this.heard - player.time) : Infinity;
     if (off < APART || (off < JUMP && this.context.currentTime < this.#corrected + PATIENCE)) return;
     this.#stop();
-    this.#start(player.time - player.motion.start + this.#latency * player.speed, player.speed);
+    this.#start(player.time - player.motion.start + this.begins + this.#latency * player.speed, player.speed);
   }
 
   #start(offset, speed) {
@@ -81,7 +98,7 @@ export class Sound extends EventTarget {
     gain.gain.linearRampToValueAtTime(1, at + FADE);
     const source = new AudioBufferSourceNode(this.context, { buffer: this.#buffer, playbackRate: speed });
     source.connect(gain).connect(this.output);
-    source.start(at, Math.min(offset, this.#buffer.duration));
+    source.start(at + Math.max(-offset, 0) / speed, Math.min(Math.max(offset, 0), this.#buffer.duration));
     this.#playing = { source, gain, at, offset, speed };
   }
 
