@@ -98,6 +98,7 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
     (folder / "beats.txt").write_text("0.5 1")
     return {
         "Beats": (music.Beats, {"times": [0.0, 0.5]}),
+        "Beats.count": (beats.count, {"seconds": 0.7}),
         "Beats.grid": (beats.grid, {"every": 2, "seconds": 3.0}),
         "Beats.seconds": (beats.seconds, {"count": 3}),
         "Beats.starting_at": (beats.starting_at, {"seconds": 0.2}),

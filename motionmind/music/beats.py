@@ -100,6 +100,24 @@ class Beats:
         before, after = self.times[at : at + 2]
         return float(before + (place - at) * (after - before) - self.start)
 
+    def count(self, seconds: float) -> float:
+        """Return the count at a time, seconds from count 1; the inverse of `seconds`.
+
+        Raises:
+            MotionMindError: the time is not a finite number.
+
+        >>> from motionmind.music import Beats
+        >>> Beats([0.5, 1.0, 2.0]).count(1.0)
+        2.5
+        """
+        check_real("seconds", seconds)
+        if not np.isfinite(seconds):
+            raise MotionMindError(f"a time must be a finite number, not {seconds}")
+        time = self.start + float(seconds)
+        at = int(np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, len(self) - 2))
+        before, after = self.times[at : at + 2]
+        return float(at - self._first + 1.0 + (time - before) / (after - before))
+
     def grid(self, every: int, seconds: float) -> Floats:
         """Return when counts 1, 1 + every, 1 + 2 every, ... come, up to the first at or after `seconds`.
 

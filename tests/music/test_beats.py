@@ -81,6 +81,15 @@ def test_counts_go_on_after_the_last_beat() -> None:
     assert beats_of_tempo(120.0).grid(1, 0.0).tolist() == [0.0, 0.5]
 
 
+def test_the_count_at_a_time_is_the_inverse_of_the_time_of_a_count() -> None:
+    beats = Beats(np.cumsum(np.random.default_rng(0).uniform(0.1, 2.0, 40)), first=7)
+    for count in np.linspace(-20.0, 60.0, 333):
+        assert beats.count(beats.seconds(count)) == pytest.approx(count)
+    assert [beats.count(time - beats.start) for time in beats.times] == pytest.approx(np.arange(40) - 6)
+    with pytest.raises(MotionMindError, match="a time must be a finite number"):
+        beats.count(np.inf)
+
+
 def test_a_grid_holds_every_nth_count() -> None:
     beats = Beats(np.cumsum(np.random.default_rng(3).uniform(0.3, 0.8, 40)), first=3)
     for every in (1, 2, 3):
