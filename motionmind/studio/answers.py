@@ -222,6 +222,15 @@ class Approaching(Answer):
     count: float
 
 
+class MusicView(Answer):
+    """The path of the piece's music, or "", its time at the piece's start, its beats, and which of them is count 1."""
+
+    path: str
+    begins: float
+    beats: list[float]
+    first: int
+
+
 class ProjectView(Answer):
     """The project as a window sees it; with `access` "look" little else than its piece."""
 
@@ -236,6 +245,7 @@ class ProjectView(Answer):
     counts: int
     reference: ReferenceView
     stage: tuple[float, float] | None
+    music: MusicView
     words: list[Text]
     missing: list[Text]
     postures: list[Saved]

@@ -16,7 +16,7 @@ from starlette.routing import BaseRoute, Route
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.render.page import player_data
-from motionmind.studio.edits import Edit, SetReference, each
+from motionmind.studio.edits import Edit, SetMusic, SetReference, each
 from motionmind.studio.guard import is_looking
 from motionmind.studio.movements import STORED
 from motionmind.studio.neighbours import MIRRORED
@@ -102,10 +102,11 @@ def _project_routes(studio: Studio) -> list[BaseRoute]:
 
     async def edits(request: Request) -> Response:
         given = await body_of(request, Edited)
-        # Only this computer may choose a file of it, by /api/reference.
-        videos = {one.path for one in each(given.edit) if isinstance(one, SetReference)}
-        if videos - {"", studio.project.state.reference.path}:
-            return error("open the reference video first: an edit only shifts or removes the one in the piece", 409)
+        # Only this computer may choose a file of it, by /api/reference and /api/music.
+        state = studio.project.state
+        for kind, own, name in ((SetReference, state.reference, "reference video"), (SetMusic, state.music, "music")):
+            if {one.path for one in each(given.edit) if isinstance(one, kind)} - {"", own.path}:
+                return error(f"open the {name} first: an edit only shifts or removes the one in the piece", 409)
         return written(given.window, lambda: studio.project.edit(given.window, given.edit))
 
     async def undo(request: Request) -> Response:

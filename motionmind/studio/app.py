@@ -20,6 +20,7 @@ from motionmind.studio import (
     filming,
     imports,
     keeping,
+    music,
     posing,
     printing,
     recent,
@@ -60,6 +61,7 @@ _PARTS = (
     posing,
     recent,
     reference,
+    music,
 )
 
 

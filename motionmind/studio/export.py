@@ -23,6 +23,9 @@ from motionmind.formats import write_motion
 from motionmind.formats.bvh import write_bvh
 from motionmind.render.page import page
 from motionmind.studio.api import json
+from motionmind.studio.edits import SetMusic
+from motionmind.studio.local_files import is_here
+from motionmind.studio.music import has_sound, sound_of
 from motionmind.studio.placement import performance
 from motionmind.studio.view import layout_of
 
@@ -76,7 +79,6 @@ def file_name(title: str, suffix: str) -> str:
 def routes(studio: Studio) -> list[BaseRoute]:
     """Return the routes for exports and credits."""
     makers: dict[str, Callable[[Motion], bytes]] = {
-        "html": lambda motion: page(motion).encode(),
         "glb": lambda motion: written(".glb", lambda path: write_motion(path, motion)),
         "bvh": lambda motion: bvh(motion if motion.is_even else motion.resample(30.0)),
         "json": lambda motion: written(".json", lambda path: write_motion(path, motion)),
@@ -87,8 +89,12 @@ def routes(studio: Studio) -> list[BaseRoute]:
         title = studio.project.state.title
         if form == "project":
             return saved(studio.project.path.read_bytes(), file_name(title, "motionmind"))
+        if form == "html":
+            music = music_for(studio, request)
+            data = await run_in_threadpool(_page, composed(studio), music)
+            return saved(data, file_name(title, form))
         if form not in makers:
-            raise MotionMindError(f"cannot export as {form!r:.20}{suggestion(form, list(makers))}")
+            raise MotionMindError(f"cannot export as {form!r:.20}{suggestion(form, ['html', *makers])}")
         data = await run_in_threadpool(makers[form], composed(studio))
         return saved(data, file_name(title, form))
 
@@ -97,6 +103,17 @@ def routes(studio: Studio) -> list[BaseRoute]:
         return json({"sections": [{"heading": heading, "lines": lines} for heading, lines in sections.items()]})
 
     return [Route("/api/export/{format}", export), Route("/api/credits", credit)]
+
+
+def music_for(studio: Studio, request: Request) -> SetMusic | None:
+    """Return the music that goes into a film or page that a request makes; None for silence, as on other computers."""
+    return studio.project.state.music if has_sound(studio.project.state) and is_here(request) else None
+
+
+def _page(motion: Motion, music: SetMusic | None) -> bytes:
+    """Return the page that plays a movement, with its music."""
+    seconds = float(motion.times[-1] - motion.times[0])
+    return page(motion, sound=sound_of(music.path, music.begins, seconds) if music else None).encode()
 
 
 def bvh(motion: Motion) -> bytes:

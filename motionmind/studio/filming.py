@@ -20,7 +20,9 @@ from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 from motionmind.studio import api
 from motionmind.studio.casting import ensemble_of
-from motionmind.studio.export import composed, file_name, saving_headers
+from motionmind.studio.edits import SetMusic
+from motionmind.studio.export import composed, file_name, music_for, saving_headers
+from motionmind.studio.music import sound_of
 from motionmind.studio.room import Room
 from motionmind.studio.workers import Job, Report
 
@@ -49,7 +51,9 @@ class _Film(NamedTuple):
     job: Job
 
 
-def draw_film(report: Report, motions: Sequence[Motion], direction: Direction, path: Path) -> None:
+def draw_film(
+    report: Report, motions: Sequence[Motion], direction: Direction, path: Path, music: SetMusic | None
+) -> None:
     """Draw and encode a film, in a worker.
 
     Args:
@@ -57,6 +61,7 @@ def draw_film(report: Report, motions: Sequence[Motion], direction: Direction, p
         motions: the motion, or those of several dancers on one clock, at the film's rate.
         direction: where the camera stands.
         path: the file.
+        music: the music that the film carries; None for a silent film.
     """
     from motionmind.render.film import encode_mp4
     from motionmind.render.group import GroupStage
@@ -77,7 +82,8 @@ def draw_film(report: Report, motions: Sequence[Motion], direction: Direction, p
                 report(number, len(stage))
             yield picture
 
-    encode_mp4(path, stage, FILM_RATE_FPS, reported())
+    sound = sound_of(music.path, music.begins, len(stage) / FILM_RATE_FPS) if music else None
+    encode_mp4(path, stage, FILM_RATE_FPS, reported(), sound)
 
 
 def routes(studio: Studio) -> list[BaseRoute]:
@@ -111,7 +117,7 @@ def routes(studio: Studio) -> list[BaseRoute]:
         folder = room.folder / str(number)
         folder.mkdir()
         path = folder / "film.mp4"
-        job = studio.workers.submit("film", draw_film, motions, direction, path)
+        job = studio.workers.submit("film", draw_film, motions, direction, path, music_for(studio, request))
         films[job.id] = _Film(path, file_name(studio.project.state.title, "mp4"), job)
         tidying.add(task := asyncio.create_task(tidy(job)))
         task.add_done_callback(tidying.discard)

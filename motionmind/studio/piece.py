@@ -33,6 +33,7 @@ from motionmind.studio.edits import (
     Play,
     SavePosture,
     SetCorpus,
+    SetMusic,
     SetReference,
     SetStage,
     SetTempo,
@@ -66,6 +67,7 @@ class State:
         reference: the video beside it.
         stage: width and depth of the stage around the origin, metres; None for none.
         cast: the dancers.
+        music: the music that it plays with.
     """
 
     title: str = ""
@@ -82,6 +84,7 @@ class State:
     reference: SetReference = field(default_factory=SetReference)
     stage: tuple[float, float] | None = None
     cast: Cast = field(default_factory=Cast)
+    music: SetMusic = field(default_factory=SetMusic)
 
     @cached_property
     def seams(self) -> tuple[Seam, ...]:
@@ -218,6 +221,9 @@ def _apply(state: State, edit: Single) -> State:  # noqa: PLR0911 (one case an e
             return _saved(state, name, posture)
         case SetCorpus(name):
             return replace(state, corpus=name)
+        case SetMusic():
+            _ = edit.counting  # raises if the beats are not in order
+            return replace(state, music=edit)
         case SetReference():
             return replace(state, reference=edit)
         case SetStage(size):

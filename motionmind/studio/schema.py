@@ -34,6 +34,7 @@ from motionmind.studio.between import Acceptance, Between, Desk, DeskKeeping
 from motionmind.studio.comments import Comment
 from motionmind.studio.corpora import Lesson
 from motionmind.studio.filming import Direction
+from motionmind.studio.music import ChoosingMusic
 from motionmind.studio.panel_answers import (
     CorpusView,
     Credited,
@@ -125,6 +126,8 @@ CALLS = (
     Call("POST", "/api/ensemble", None, ProjectView),
     Call("GET", "/api/ensemble/near", None, list[Approaching]),
     Call("GET", "/api/ensemble/{format}", None, "application/octet-stream"),
+    Call("GET", "/api/music", None, "application/octet-stream"),
+    Call("POST", "/api/music", ChoosingMusic, Begun),
     Call("GET", "/api/recent", None, list[RecentProject]),
     Call("POST", "/api/recent", RecentOpening, Nothing),
     Call("GET", "/api/versions", None, list[VersionView]),

@@ -10,8 +10,11 @@ from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import msgspec
+
 from motionmind.jit import interpreted
 from motionmind.render.page import player_data
+from motionmind.studio.edits import SetMusic
 from motionmind.studio.events import Events
 from motionmind.studio.movements import Movements
 from motionmind.studio.neighbours import MIRRORED
@@ -147,6 +150,7 @@ class Studio:
             "counts": state.counts,
             "reference": {"path": state.reference.path, "begins": state.reference.begins},
             "stage": state.stage,
+            "music": msgspec.structs.asdict(state.music),
             "words": project.words,
             "missing": project.missing,
             "postures": [{"name": name, "key": key} for name, key in state.postures.items()],
@@ -167,6 +171,7 @@ class Studio:
         self._shown |= shown
         nothing = {"file": "", "corpus": "", "corpora": {}, "words": [], "missing": [], "postures": []}
         nothing["reference"] = {"path": "", "begins": 0.0}
+        nothing["music"] = msgspec.structs.asdict(SetMusic())
         shared = ("sequence", "title", "saved", "tempo", "counts", "stage", "cast")
         known = {name: whole[name] for name in shared}
         return known | nothing | {"access": "look", "piece": piece | {"seams": []}, "undo": None, "redo": None}

@@ -3,6 +3,7 @@
 import { castOf } from "../dancers/cast.js";
 import { copyGroup, groupOf, moveGroup, reaching, together } from "./groups.js";
 import { noteFrom } from "./notes.js";
+import { meterOf, recount } from "../music/beats.js";
 import { countFrom, fitting, middleOf, nearestCount, revealing, zoomed } from "./scale.js";
 import {
   discard,
@@ -84,8 +85,7 @@ export class Actions {
 
   /** @returns {import("./scale.js").Meter} */
   get meter() {
-    const { tempo = 120, counts = 8 } = this.studio.store.state ?? {};
-    return { tempo, counts };
+    return meterOf(this.studio.store.state);
   }
 
   snap() {
@@ -102,13 +102,9 @@ export class Actions {
     return this.sight.snaps ? countFrom(at + seconds, steps, this.meter) - at : seconds + steps * DURATION_STEP_S;
   }
 
-  /** Count the piece by another tempo, or in other phrases. @param {Partial<import("./scale.js").Meter>} change */
+  /** Count the piece by another tempo, or in other phrases. @param {{tempo?: number, counts?: number}} change */
   count(change) {
-    return this.edit(() => {
-      const now = this.meter;
-      const next = { ...now, ...change };
-      return next.tempo === now.tempo && next.counts === now.counts ? null : { edit: "tempo", ...next };
-    });
+    return this.edit(() => recount(this.studio.store.state, change));
   }
 
   /** Have an insertion end at a time of the piece, as it is now. */

@@ -3,6 +3,8 @@
 import { html, useEffect, useMemo, useReducer, useState } from "../vendor/htm-preact-standalone.js";
 import { castOf, NOBODY } from "../dancers/cast.js";
 import { movement } from "../movements.js";
+import { meterOf } from "../music/beats.js";
+import { MusicSheet } from "../music/sheet.js";
 import { thumbnail } from "../places.js";
 import { useStore } from "../store.js";
 import { Actions } from "./actions.js";
@@ -32,10 +34,9 @@ export function Panel({ studio }) {
     sheet: false,
     note: "", // the id of the one that is written; "new" for another
     snaps: false,
+    music: false, // whether its sheet is open
   }));
-  const tempo = useStore(studio, ({ state }) => state?.tempo) ?? 120;
-  const counts = useStore(studio, ({ state }) => state?.counts) ?? 8;
-  const meter = { tempo, counts };
+  const meter = useStore(studio, ({ state }) => meterOf(state));
   const does = useMemo(() => new Actions(studio, new Movements((key) => movement(studio.api, key)), show), [studio]);
   does.sight = sight;
   const joints = usePlayed(studio, does.movements, piece).filter((name) => LIMBS.test(name));
@@ -85,6 +86,7 @@ export function Panel({ studio }) {
         does.focused = true;
       }}
     />`}
+    ${sight.music && !sight.sheet && !sight.note && html`<${MusicSheet} does=${does} />`}
     ${(note || sight.note === "new") &&
     html`<${NoteSheet}
       key=${sight.note}

@@ -15,7 +15,7 @@ export function Ruler({ does, sight, seconds, meter }) {
     if (!current) return;
     current.setAttribute("aria-valuenow", time.toFixed(2));
     current.setAttribute("aria-valuetext", `${clock(time)} seconds, ${countAt(time, meter)}`);
-  }), [does, meter.tempo, meter.counts]);
+  }), [does, meter]);
   const scrub = (event) => {
     if (event.button !== 0) return;
     const { currentTarget: ruler } = event;

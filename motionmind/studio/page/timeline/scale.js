@@ -1,5 +1,7 @@
 /** The time line's scale and ticks. Nothing here knows a view. */
 
+import { countOf, timeOf } from "../music/beats.js";
+
 const [MIN_SCALE, MAX_SCALE] = [2, 1200]; // pixels a second
 const MIN_LABEL_DISTANCE_PX = 64;
 const STEPS_S = [0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1200, 3600];
@@ -52,26 +54,23 @@ export function secondTicks(from, to, scale) {
   return ticks;
 }
 
-/**
- * How the piece is counted.
- * @typedef {{tempo: number, counts: number}} Meter counts a minute, and counts of a phrase
- */
+/** @typedef {import("../music/beats.js").Meter} Meter */
 
 /** Ticks of counts: [{at, label, strong}]; each phrase begins with a strong one. @param {Meter} meter */
 export function countTicks(from, to, scale, meter) {
   const { tempo, counts } = meter;
   const beat = 60 / tempo;
-  const digits = String(Math.floor(to / beat / counts) + 1).length; // of the last phrase
+  const digits = String(Math.floor(countOf(to, meter) / counts) + 1).length; // of the last phrase
   const room = (each) => (each < counts / 2 ? 26 : 40) + DIGIT_PX * (digits - 1);
   // Parts of a phrase that divide it, then whole phrases: each of these has a strong tick.
   const parts = [1, 2, 4].filter((each) => each < counts && counts % each === 0);
   const steps = [...parts, ...[1, 2, 4, 8, 16, 32].map((each) => each * counts)];
   const every = steps.find((each) => each * beat * scale >= room(each)) ?? 64 * counts;
   const ticks = [];
-  for (let i = Math.max(Math.floor(from / (beat * every)), 0) * every; i * beat <= to; i += every) {
-    const phrase = Math.floor(i / counts) + 1;
-    const count = (i % counts) + 1;
-    ticks.push({ at: i * beat, label: count === 1 ? `${phrase}·1` : String(count), strong: count === 1 });
+  for (let i = Math.floor(countOf(from, meter) / every) * every, at; (at = timeOf(i, meter)) <= to; i += every) {
+    if (at < 0) continue;
+    const { phrase, count } = phrased(i, counts);
+    ticks.push({ at, label: count === 1 ? `${phrase}·1` : String(count), strong: count === 1 });
   }
   return ticks;
 }
@@ -86,20 +85,30 @@ export function clock(seconds, step = 0.01) {
 
 /** The phrase and the count at a time, in words. @param {Meter} meter */
 export function countAt(seconds, meter) {
-  const { tempo, counts } = meter;
-  const count = Math.floor((seconds * tempo) / 60 + 1e-6);
-  return `${counts === 8 ? "eight" : "phrase"} ${Math.floor(count / counts) + 1}, count ${(count % counts) + 1}`;
+  const { counts } = meter;
+  const { phrase, count } = phrased(Math.floor(countOf(seconds, meter) + 1e-6), counts);
+  return `${counts === 8 ? "eight" : "phrase"} ${phrase}, count ${count}`;
+}
+
+/** The phrase and the count, from 1, of a count from 0; an upbeat, less than 0, is in phrase 0. */
+function phrased(/** @type {number} */ count, /** @type {number} */ counts) {
+  const phrase = Math.floor(count / counts);
+  return { phrase: phrase + 1, count: count - phrase * counts + 1 };
+}
+
+/** The time of a whole count, or of the first one in the piece. @param {Meter} meter */
+function inPiece(/** @type {number} */ count, meter) {
+  return timeOf(Math.max(count, Math.ceil(countOf(0, meter) - 1e-9)), meter);
 }
 
 /** The time of the count nearest to a time. @param {Meter} meter */
 export function nearestCount(seconds, meter) {
-  return (Math.max(Math.round((seconds * meter.tempo) / 60), 0) * 60) / meter.tempo;
+  return inPiece(Math.round(countOf(seconds, meter)), meter);
 }
 
 /** The time `by` counts on from a time; between counts, from the one before or after. @param {Meter} meter */
 export function countFrom(seconds, by, meter) {
-  const { tempo } = meter;
-  const count = (seconds * tempo) / 60;
+  const count = countOf(seconds, meter);
   const whole = by > 0 ? Math.floor(count + COUNT_SLACK) : Math.ceil(count - COUNT_SLACK);
-  return (Math.max(whole + by, 0) * 60) / tempo;
+  return inPiece(whole + by, meter);
 }

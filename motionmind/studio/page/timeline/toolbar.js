@@ -1,6 +1,8 @@
 /** The bar above the tracks: actions on the selection, progress of smoothing, tempo and zoom. */
 
 import { html } from "../vendor/htm-preact-standalone.js";
+import { countOf, timeOf } from "../music/beats.js";
+import { MusicButtons } from "../music/sheet.js";
 import { NumberField } from "../shell/fields.js";
 import { groupOf } from "./groups.js";
 import { FASTEST, isPosture, LONGEST_HOLD, MOST_REPEATS, selected, SLOWEST } from "./items.js";
@@ -34,7 +36,7 @@ export function Toolbar({ does, piece, selection, meter, snaps, stopped, onStop,
   return html`<div class="toolbar row" role="toolbar" aria-label="Time line">
     <h2 class="aside">Time line</h2>
     ${group.length > 1 && html`<${OfGroup} does=${does} group=${group} />`}
-    ${item?.block && group.length === 1 && html`<${OfStretch} does=${does} block=${item.block} tempo=${meter.tempo} />`}
+    ${item?.block && group.length === 1 && html`<${OfStretch} does=${does} block=${item.block} meter=${meter} />`}
     ${item?.seam && html`<${OfSeam} does=${does} seam=${item.seam} sheet=${sheet} />`}
     ${!item && html`<p class="hint grow cut">${hintFor(piece)}</p>`}
     <${Smoothing} piece=${piece} stopped=${stopped} onStop=${onStop} />
@@ -86,18 +88,19 @@ function Counting({ does, meter, snaps }) {
     >
       ${COUNTS.map((count) => html`<option value=${count}>${count}</option>`)}
     </select>
+    <${MusicButtons} does=${does} />
     <${Button} icon="snap" words="Snap to counts (G)" pressed=${snaps} does=${() => does.snap()} test="snap" />
   </div>`;
 }
 
-function OfStretch({ does, block, tempo }) {
+function OfStretch({ does, block, meter }) {
   return html`<p class="grow cut" data-testid="selected">
       <b>${block.title}</b>${" "}<span class="pale numbers"
         >${block.mirrored ? "mirrored, " : ""}${clock(block.seconds)} s · ${framesOf(block)} of ${block.frames}</span
       >
     </p>
     ${isPosture(block)
-      ? html`<${Hold} does=${does} block=${block} tempo=${tempo} />`
+      ? html`<${Hold} does=${does} block=${block} meter=${meter} />`
       : html`<${Played} does=${does} block=${block} />`}
     <${Button} icon="split" words="Split (S)" does=${() => does.split()} test="split" />
     <${Button} icon="duplicate" words="Duplicate (D)" does=${() => does.duplicate()} test="duplicate" />
@@ -131,24 +134,26 @@ function framesOf({ first, last }) {
 }
 
 /** How long a posture is held, in seconds and in counts. */
-function Hold({ does, block, tempo }) {
-  const field = (unit, words, seconds) => html`<label class="hold row">
+function Hold({ does, block, meter }) {
+  const from = countOf(block.at, meter);
+  const field = (unit, words, value, secondsOf) => html`<label class="hold row">
     <${NumberField}
       min="0"
-      max=${LONGEST_HOLD / seconds}
+      max=${unit === "s" ? LONGEST_HOLD : countOf(block.at + LONGEST_HOLD, meter) - from}
       step=${unit === "s" ? 0.1 : 1}
-      value=${Number((block.hold / seconds).toFixed(2))}
+      value=${Number(value.toFixed(2))}
       data-testid=${`hold-${unit}`}
       aria-label=${`Hold the posture, ${words}`}
       use=${(given) => {
-        does.hold(block, given * seconds);
+        does.hold(block, secondsOf(given));
         return given;
       }}
     />
     <span class="pale">${unit}</span>
   </label>`;
   return html`<div class="row" role="group" aria-label="Hold" title="How long the body stands still (Shift ← →)">
-    ${field("s", "seconds", 1)}${field("counts", "counts", 60 / tempo)}
+    ${field("s", "seconds", block.hold, (given) => given)}
+    ${field("counts", "counts", countOf(block.at + block.hold, meter) - from, (given) => timeOf(from + given, meter) - block.at)}
   </div>`;
 }
 

@@ -3,6 +3,7 @@
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { dropped, POSTURE_TYPE } from "../between/desk.js";
 import { Lanes } from "../dancers/lanes.js";
+import { MusicLane } from "../music/lane.js";
 import { Seams, Stretches, Wishes } from "./blocks.js";
 import { Drag } from "./gestures.js";
 import { groupOf, reaching } from "./groups.js";
@@ -126,6 +127,7 @@ export function Tracks({ does, piece, whole, sight, selection, meter, thumbnail 
   >
     <div class="inner" style=${{ width: `${Math.max(whole * sight.scale + END_PX, sight.width)}px` }}>
       <${Ruler} does=${does} sight=${sight} seconds=${piece.seconds} meter=${meter} />
+      <${MusicLane} does=${does} sight=${sight} meter=${meter} />
       <${Notes} does=${does} notes=${piece.notes} sight=${sight} />
       <div
         onPointerDown=${down}

@@ -2,6 +2,7 @@
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { Reaches } from "../asks/reaches.js";
+import { countOf, timeOf } from "../music/beats.js";
 import { NumberField } from "../shell/fields.js";
 import { limbName } from "./blocks.js";
 import { lasting, lengthOf, LONGEST, SHORTEST } from "./items.js";
@@ -150,7 +151,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
 function Landing({ does, seam, locked }) {
   const { meter } = does;
   const end = seam.at + lengthOf(seam);
-  const field = (name, words, first, seconds) => html`<label class="hold row">
+  const field = (name, words, first, value, timeAt) => html`<label class="hold row">
     ${words}
     <${NumberField}
       min=${first}
@@ -158,15 +159,16 @@ function Landing({ does, seam, locked }) {
       aria-label=${`Lands at ${words}`}
       data-testid=${`wish-${name}`}
       disabled=${locked}
-      value=${Number((end / seconds + first).toFixed(2))}
+      value=${Number(value.toFixed(2))}
       use=${(given) => {
-        does.land(seam, (given - first) * seconds);
+        does.land(seam, timeAt(given));
         return given;
       }}
     />
   </label>`;
   return html`<div class="row" role="group" aria-label="Lands at" title="As long as nothing earlier changes">
-    <span class="grow">Lands at</span> ${field("time", "second", 0, 1)} ${field("count", "count", 1, 60 / meter.tempo)}
+    <span class="grow">Lands at</span> ${field("time", "second", 0, end, (given) => given)}
+    ${field("count", "count", 1, countOf(end, meter) + 1, (given) => timeOf(given - 1, meter))}
   </div>`;
 }
 
