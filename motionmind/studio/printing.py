@@ -6,6 +6,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import replace
 from io import BytesIO
+from math import ceil, floor
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import msgspec
@@ -19,6 +20,7 @@ from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 from motionmind.render.print_sheet import PrintPosture, pdf, print_pages, print_picture
 from motionmind.render.sheet import MAX_SHEET_POSTURES, tiles
+from motionmind.studio.edits import SetMusic
 from motionmind.studio.export import composed, file_name, saved
 from motionmind.studio.view import layout_of, noted
 
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 
 _N_COUNTS = 8  # in a phrase: dancers count eights
 _TIME_SLACK_S = 1e-3
+_SILENCE = SetMusic()
 
 
 class Spacing(msgspec.Struct, forbid_unknown_fields=True):
@@ -44,40 +47,56 @@ class Spacing(msgspec.Struct, forbid_unknown_fields=True):
 
     @property
     def seconds(self) -> float:
-        """The time from posture to posture."""
+        """The time from posture to posture, without music."""
         return self.every * (60.0 / self.tempo if self.unit == "counts" else 1.0)
 
-    def caption(self, time: float) -> str:
+    def time(self, number: float, music: SetMusic) -> float:
+        """Return the time of a posture, by its number from 0 at count 1 or 0 s: counts follow the beats of music."""
+        if (beats := music.counting) is None or self.unit == "seconds":
+            return number * self.seconds
+        return beats.start + beats.seconds(1.0 + number * self.every) - music.begins
+
+    def number(self, time: float, music: SetMusic) -> float:
+        """Return the number at a time, the inverse of `time`."""
+        if (beats := music.counting) is None or self.unit == "seconds":
+            return time / self.seconds
+        return (beats.count(time + music.begins - beats.start) - 1.0) / self.every
+
+    def caption(self, time: float, music: SetMusic) -> str:
         """Return the count at a time, as "2·1" for the first count of the second eight, or "" without counts."""
         if self.unit == "seconds":
             return ""
-        count = int(time * self.tempo / 60.0 + 1e-6)
+        count = floor(self.number(time, music) * self.every + 1e-6)
         return f"{count // _N_COUNTS + 1}·{count % _N_COUNTS + 1}"
 
 
-def postures_at(spacing: Spacing, seconds: float, notes: Sequence[dict[str, Any]]) -> dict[float, PrintPosture]:
+def postures_at(
+    spacing: Spacing, seconds: float, notes: Sequence[dict[str, Any]], music: SetMusic = _SILENCE
+) -> dict[float, PrintPosture]:
     """Choose the postures of a sheet, by time.
 
-    A section begins with a posture of its own, if none is there. Other notes stand under the posture before them.
+    The piece and each section begin with a posture. Other notes stand under the posture before them.
 
     Args:
         spacing: how far apart the postures are.
         seconds: duration of the piece.
         notes: its notes, as `view.noted` returns them.
+        music: the music that it plays with.
 
     Raises:
         MotionMindError: there would be too many postures.
     """
     sections = [note for note in notes if note["kind"] == "section"]
-    count = int((seconds + _TIME_SLACK_S) / spacing.seconds) + 1
+    first = ceil(spacing.number(-_TIME_SLACK_S, music))
+    count = floor(spacing.number(seconds + _TIME_SLACK_S, music)) + 1 - first
     if count + len(sections) > MAX_SHEET_POSTURES:
         raise MotionMindError(
             f"a sheet holds {MAX_SHEET_POSTURES} postures, not {count + len(sections)}: put them farther apart"
         )
-    times = [min(number * spacing.seconds, seconds) for number in range(count)]
-    for section in sections:
-        if min(abs(section["at"] - time) for time in times) > _TIME_SLACK_S:
-            times.append(section["at"])
+    times = [min(max(spacing.time(first + number, music), 0.0), seconds) for number in range(count)]
+    for begin in (0.0, *(section["at"] for section in sections)):
+        if min((abs(begin - time) for time in times), default=np.inf) > _TIME_SLACK_S:
+            times.append(begin)
     times.sort()
     headings, texts = dict[int, str](), dict[int, list[str]]()
     for note in notes:
@@ -87,7 +106,9 @@ def postures_at(spacing: Spacing, seconds: float, notes: Sequence[dict[str, Any]
         elif words := f"{note['author']}: {note['text']}" if note["author"] else note["text"] or "marker":
             texts.setdefault(place, []).append(words)
     return {
-        time: PrintPosture(spacing.caption(time), f"{time:.2f} s", headings.get(place, ""), tuple(texts.get(place, ())))
+        time: PrintPosture(
+            spacing.caption(time, music), f"{time:.2f} s", headings.get(place, ""), tuple(texts.get(place, ()))
+        )
         for place, time in enumerate(times)
     }
 
@@ -115,7 +136,7 @@ def routes(studio: Studio) -> list[BaseRoute]:
         notes = noted(
             project.state, layout_of(project.state, project.finding, project.marks, project.standing), project.marks
         )
-        postures = postures_at(spacing, float(motion.times[-1] - motion.times[0]), notes)
+        postures = postures_at(spacing, float(motion.times[-1] - motion.times[0]), notes, project.state.music)
         title = project.state.title or "piece"
         data = await run_in_threadpool(draw, replace(motion, name=title), postures, title, form)
         return saved(data, file_name(project.state.title, form))

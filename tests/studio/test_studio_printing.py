@@ -27,6 +27,7 @@ from motionmind.render.print_sheet import (
     print_picture,
 )
 from motionmind.render.sheet import tiles
+from motionmind.studio.edits import SetMusic
 from motionmind.studio.printing import Spacing, postures_at
 
 
@@ -64,6 +65,15 @@ def test_captions_count_eights():
     found = [one.count for one in postures_at(spacing, 8.5, []).values()]
     assert found == [f"{eight}·{count}" for eight in (1, 2) for count in range(1, 9)] + ["3·1", "3·2"]
     assert {one.count for one in postures_at(Spacing(1.0, "seconds"), 3.0, []).values()} == {""}
+
+
+def test_postures_at_counts_follow_the_beats_of_music():
+    music = SetMusic("/song.wav", 0.9, (0.5, 1.0, 1.6, 2.3, 3.1), first=1)
+    found = postures_at(Spacing(1.0), 3.8, [], music)
+    assert [*found] == pytest.approx([0.0, 0.1, 0.7, 1.4, 2.2, 3.0, 3.8])
+    assert [one.count for one in found.values()] == ["0·8", *(f"1·{count}" for count in range(1, 7))]
+    assert [*postures_at(Spacing(2.0), 3.8, [], music)] == pytest.approx([0.0, 0.1, 1.4, 3.0])
+    assert [*postures_at(Spacing(1.0, "seconds"), 3.8, [], music)] == [0.0, 1.0, 2.0, 3.0]
 
 
 def test_too_many_postures_are_refused():
