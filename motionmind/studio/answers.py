@@ -181,11 +181,10 @@ class ReferenceView(Answer):
 
 
 class CastView(Answer):
-    """The dancers of the piece, their changes of formation, and the size of their stage."""
+    """The dancers of the piece and their changes of formation."""
 
     dancers: list[Dancer]
     changes: list[Change]
-    stage: tuple[float, float] | None
 
 
 class DancerView(Answer):

@@ -70,8 +70,8 @@ class Travel(_Struct, frozen=True):
     """A path over the floor for an insertion, or the place where it ends.
 
     Attributes:
-        points: x and z of each point, metres: to the left and ahead of the insertion's first posture. The insertion ends
-            on the last; with several, it follows the straight lines from its first posture through all of them.
+        points: x and z of each point, metres: to the left and ahead of the insertion's first posture. The insertion
+            ends on the last; with several, it follows the straight lines from its first posture through all of them.
         facing: where the body faces at the end, degrees to the left of its first posture (of the audience, if the
             corpus's dancers face it); None for where it does anyway.
     """

@@ -28,7 +28,7 @@ from motionmind.render.group_page import dancer_data, paints
 from motionmind.studio import api
 from motionmind.studio.casting_files import MAKERS, name_in
 from motionmind.studio.dancers import Cast, Change, Dancer, PutDancer, RemoveDancer, SetFormations
-from motionmind.studio.edits import Arrange, Block, SetTempo, Several, Single
+from motionmind.studio.edits import Arrange, Block, SetStage, SetTempo, Several, Single
 from motionmind.studio.export import composed, file_name, saved
 from motionmind.studio.piece import State
 from motionmind.studio.project import Project, RefusedError
@@ -41,7 +41,13 @@ _STUDIO_TEMPI_BPM = (20.0, 300.0)  # of a project, as in `edits.Tempo`
 _MAX_ENSEMBLE_BYTES = 2**20  # of a file
 
 
-def staged(cast: Cast, piece: Motion, movement: Callable[[str], Motion], tempo: float) -> Ensemble:
+def staged(
+    cast: Cast,
+    piece: Motion,
+    movement: Callable[[str], Motion],
+    tempo: float,
+    stage: tuple[float, float] | None = None,
+) -> Ensemble:
     """Return a project's dancers as an ensemble.
 
     Args:
@@ -49,6 +55,7 @@ def staged(cast: Cast, piece: Motion, movement: Callable[[str], Motion], tempo: 
         piece: the piece, which all dance who have no movement of their own.
         movement: returns movements by key.
         tempo: counts a minute.
+        stage: width and depth of the stage, metres; None for none.
     """
     found: Sequence[dancers.Dancer] = [
         dancers.Dancer(
@@ -70,7 +77,7 @@ def staged(cast: Cast, piece: Motion, movement: Callable[[str], Motion], tempo: 
         for number, one in enumerate(cast.dancers):
             targets[number] = change.places.get(one.id, targets[number])
         found = send(found, targets, start, end)
-    return Ensemble(piece.name, tuple(found), tempo, cast.stage)
+    return Ensemble(piece.name, tuple(found), tempo, stage)
 
 
 def cast_of(ensemble: Ensemble, sources: Sequence[str]) -> Cast:
@@ -104,7 +111,7 @@ def cast_of(ensemble: Ensemble, sources: Sequence[str]) -> Cast:
                 places={one.id: (x, z) for one, (x, z) in zip(own, places, strict=True)},
             )
         )
-    return Cast(own, tuple(changes), ensemble.stage)
+    return Cast(own, tuple(changes))
 
 
 def check_tempo(ensemble: Ensemble) -> None:
@@ -143,7 +150,7 @@ def take_in_ensemble(project: Project, ensemble: Ensemble, window: str) -> None:
         edits.append(SetTempo(ensemble.tempo, state.counts))
     edits += [RemoveDancer(one.id) for one in state.cast.dancers]
     edits += [PutDancer(one) for one in cast.dancers]
-    edits.append(SetFormations(cast.changes, cast.stage))
+    edits += [SetFormations(cast.changes), SetStage(ensemble.stage)]
     project.edit(window, Several(tuple(edits), words))
 
 
@@ -152,7 +159,7 @@ async def ensemble_of(studio: Studio) -> Ensemble:
     state = studio.project.state
     if not state.cast.dancers:
         raise MotionMindError("the piece has no dancers: add one first")
-    return await run_in_threadpool(staged, state.cast, composed(studio), studio.movements.get, state.tempo)
+    return await run_in_threadpool(staged, state.cast, composed(studio), studio.movements.get, state.tempo, state.stage)
 
 
 def routes(studio: Studio) -> list[BaseRoute]:

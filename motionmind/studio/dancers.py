@@ -16,7 +16,6 @@ DancerId = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.-]{1,40}\Z")]
 DancerName = Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
 Count = Annotated[float, msgspec.Meta(ge=1.0, le=1e5)]  # the first count of a piece is 1
 Coordinate = Annotated[float, msgspec.Meta(ge=-1000.0, le=1000.0)]  # metres
-Side = Annotated[float, msgspec.Meta(ge=1.0, le=200.0)]  # of a stage, metres
 
 
 class _Struct(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -84,11 +83,9 @@ class SetFormations(_Edit, frozen=True, tag="formations"):
 
     Attributes:
         changes: the changes, in order, none before the last has ended.
-        stage: width and depth of the stage around the origin, metres; None if it has none.
     """
 
     changes: Annotated[tuple[Change, ...], msgspec.Meta(max_length=MAX_CHANGES)]
-    stage: tuple[Side, Side] | None = None
 
 
 CastEdit: TypeAlias = PutDancer | RemoveDancer | SetFormations
@@ -99,7 +96,6 @@ class Cast(NamedTuple):
 
     dancers: tuple[Dancer, ...] = ()
     changes: tuple[Change, ...] = ()
-    stage: tuple[float, float] | None = None
 
 
 def recast(cast: Cast, edit: CastEdit) -> Cast:
@@ -123,7 +119,7 @@ def recast(cast: Cast, edit: CastEdit) -> Cast:
             if all(one.id != name for one in cast.dancers):
                 raise MotionMindError("this dancer is no longer there")
             return cast._replace(dancers=tuple(one for one in cast.dancers if one.id != name))
-        case SetFormations(changes, stage):
+        case SetFormations(changes):
             last = 1.0
             for number, change in enumerate(changes, start=1):
                 if change.at < last:
@@ -132,7 +128,7 @@ def recast(cast: Cast, edit: CastEdit) -> Cast:
                         f"at {last:g}"
                     )
                 last = change.at + change.counts
-            return cast._replace(changes=changes, stage=stage)
+            return cast._replace(changes=changes)
 
 
 def described(edit: CastEdit) -> str:

@@ -3,7 +3,7 @@
 import { perStudio } from "../shell/hooks.js";
 import { gather } from "./troupe.js";
 
-export const NOBODY = { dancers: [], changes: [], stage: null };
+export const NOBODY = { dancers: [], changes: [] };
 const SPACING_M = 1.5; // between neighbours
 const SAME_PLACE_M = 0.5;
 
@@ -36,7 +36,7 @@ class Cast extends EventTarget {
     this.version = 0;
   }
 
-  /** @returns {{dancers: Dancer[], changes: Change[], stage: number[] | null}} */
+  /** @returns {{dancers: Dancer[], changes: Change[]}} */
   get now() {
     return this.studio.store.state?.cast ?? NOBODY;
   }
@@ -144,7 +144,7 @@ class Cast extends EventTarget {
 
   /** Replace the changes of formation. @param {(changes: Change[]) => Change[]} change */
   form(change) {
-    return this.edit(() => ({ edit: "formations", changes: change(this.now.changes), stage: this.now.stage }));
+    return this.edit(() => ({ edit: "formations", changes: change(this.now.changes) }));
   }
 
   /** Add a dancer; the first one comes with it. @param {{canon: number, mirrored: boolean, place: [number, number], facing: number}} how */
