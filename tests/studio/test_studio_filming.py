@@ -118,13 +118,19 @@ def test_a_film_from_any_direction_shows_all_of_the_body(azimuth: float, elevati
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("dancers", [0, 2])
 def test_without_an_encoder_the_browser_films(
-    studio_server: Served, studio_page: Any, monkeypatch: pytest.MonkeyPatch
+    studio_server: Served, studio_page: Any, monkeypatch: pytest.MonkeyPatch, dancers: int
 ) -> None:
     page = studio_page
     monkeypatch.setattr(film, "encoder_program", lambda: None)
     studio_server.insert("b1", "ballet/adagio", 0, 1)
-    until(page, "studio.viewer.piece?.end > 0")
+    for number in range(dancers):
+        dancer = {"id": f"d{number}", "name": str(number), "place": [number, 0], "mirrored": number == 1}
+        studio_server.edit(edit="dancer", dancer=dancer)
+    until(
+        page, "(count) => studio.viewer.piece?.end > 0 && (studio.viewer.piece.dancers ?? []).length === count", dancers
+    )
     page.get_by_test_id("open-take").click()
     with page.expect_download(timeout=LONG) as download:
         page.get_by_test_id("export-film").press("Enter")

@@ -40,7 +40,8 @@ export class Spots {
     const { clientWidth: width, clientHeight: height } = viewer.overlay;
     for (const dancer of dancers) {
       const button = this.buttons.get(dancer.id) ?? this.#made(dancer.id);
-      const [x, z] = this.held?.id === dancer.id ? this.held.place : dancer.place;
+      const { held } = this;
+      const [x, z] = held && held.id === dancer.id ? held.place : dancer.place;
       const [left, top, depth] = pixelOf([x, 0, z], viewer.stage.camera, width, height);
       button.hidden = cast.hidden.has(dancer.id) || depth > 1;
       button.style.transform = `translate(${left.toFixed(1)}px, ${top.toFixed(1)}px) translate(-50%, -50%)`;
