@@ -12,7 +12,7 @@ from pages import RESTING, Tabs
 from piece_page import until
 from studio_server import LARGE, SMALL, Served
 from test_studio_dancers import TRIO, ensemble_in, opened, put
-from test_studio_timeline import box_at_rest
+from test_studio_timeline import box_at_rest, wait_for_states
 
 pytestmark = pytest.mark.long
 
@@ -248,6 +248,23 @@ def test_the_time_line_follows_the_first_dancer_who_waits(page: Any, studio_serv
     per_second = scale - ruler["x"]  # she enters after one second
     page.mouse.click(ruler["x"] + 2.0 * per_second, ruler["y"] + 8)
     until(page, "Math.abs(studio.viewer.player.time - 5) < 0.1")
+
+
+def test_an_insertion_of_several_dancers_is_selected_and_flipped(page: Any, studio_server: Served) -> None:
+    studio_server.send("POST", "/api/seams")
+    studio_server.insert("b2", "ballet/plies", 0, 20)
+    wait_for_states(page, ["inserted"])
+    put(studio_server, "anna")
+    pin = {"joint": "left_wrist", "hold": "place"}
+    studio_server.edit(edit="ask", left="b1", right="b2", pins=[pin])
+    wait_for_states(page, ["inserted"])
+    wait_for_dancers(page, 1)
+    page.get_by_test_id("insertion-1").click()
+    page.get_by_test_id("selected").wait_for()
+    at = page.evaluate("studio.store.state.piece.seams[0].at")
+    page.evaluate("(time) => studio.viewer.player.seek(time)", at + 0.2)
+    until(page, "studio.viewer.motion.insertedAt(studio.viewer.player.time)")
+    assert page.locator(".overlay .pin").count() == 0
 
 
 def test_who_comes_too_near_is_shown_at_that_moment(page: Any, studio_server: Served) -> None:

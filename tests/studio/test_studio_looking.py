@@ -485,3 +485,13 @@ def test_the_link_is_printed_and_goes_on_after_a_restart(tmp_path: Path, browser
         assert again.send("GET", "/api/project", Cookie=owner.cookie).status == 401
         again.post("/api/link", {})
         assert looking.send("GET", "/api/project").status == 401
+
+
+@pytest.mark.long
+def test_the_link_plays_all_dancers(served: Served, open_page: Callable[..., Any]) -> None:
+    for number in range(2):
+        dancer = {"id": f"d{number}", "name": str(number), "place": [number, 0], "mirrored": number == 1}
+        served.edit(edit="dancer", dancer=dancer)
+    page = open_page(link_of(served))
+    until(page, "studio.viewer.motion.dancers?.length === 2")
+    until(page, "studio.viewer.motion.dancers.every(({ piece }) => piece.times.length > 1)")

@@ -23,7 +23,8 @@ export function askedOf(studio) {
     const change = (/** @type {Change} */ make) => desk.reach(make(desk.reaches));
     return { name: "desk", ask, begin: 0, seconds: desk.scene.end, place: [0, 0], turn: 0, locked: false, change };
   }
-  const piece = viewer.isHome && viewer.motion && store.state?.piece;
+  const alone = viewer.isHome && viewer.motion && !viewer.motion.dancers; // of several dancers, which one would reach?
+  const piece = alone && store.state?.piece;
   const seam = piece && selected(piece, store.selection)?.seam;
   const part = seam?.stands && piece.parts.find((/** @type {any} */ one) => one.inserted && one.at === seam.at);
   if (!part) return null;
