@@ -25,6 +25,7 @@ from motionmind.studio import (
     printing,
     recent,
     reference,
+    scoring,
     seams,
     varied,
 )
@@ -62,6 +63,7 @@ _PARTS = (
     recent,
     reference,
     music,
+    scoring,
 )
 
 

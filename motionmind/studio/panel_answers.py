@@ -115,6 +115,18 @@ class KeptView(Answer):
     frames: int = 1
 
 
+class ComposedView(KeptView):
+    """A score that was composed: its movement, and the time of each posture, seconds, its line, and the clip's line.
+
+    Without a key if the text is wrong: `error` says why.
+    """
+
+    error: str = ""
+    calls: list[int] = msgspec.field(default_factory=list)
+    lines: list[int] = msgspec.field(default_factory=list)
+    times: list[float] = msgspec.field(default_factory=list)
+
+
 class CorpusView(Answer):
     """A corpus, or the error on reading it."""
 

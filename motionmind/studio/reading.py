@@ -16,7 +16,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
@@ -28,6 +28,7 @@ from motionmind.studio.score_files import take_together
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
     from motionmind.corpus.clip import JointFlip
+    from motionmind.notation.posture_line import Row
 
 READABLE_SUFFIXES = (".bvh", ".glb", ".vrm", ".vrma", ".amc", ".npz", ".json", ".score")  # without a second file
 TIME_LIMIT_S = 60.0
@@ -176,6 +177,17 @@ def load_clip(folder: Path, facts: Facts, number: int) -> Motion:
         )
 
 
+def lines_of(rows: Sequence[Row]) -> dict[str, list[int]]:
+    """Return the line of each posture of a score, and the line of the clip that calls it or is it; from 1."""
+    return {"lines": [row.where.line for row in rows], "calls": [row.line for row in rows]}
+
+
+def load_lines(folder: Path, number: int) -> dict[str, list[int]]:
+    """Return the lines of a score's clip that the child has read, as `lines_of`."""
+    with np.load(folder / clip_file(number), allow_pickle=False) as arrays:
+        return {name: arrays[name].tolist() for name in ("lines", "calls")}
+
+
 # --- in the child -----------------------------------------------------------------------------------------------------
 
 
@@ -186,8 +198,8 @@ def main() -> None:
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            motions = _read(order)
-            facts = _understand(order, motions)
+            motions, lines = _read(order)
+            facts = _understand(order, motions, lines)
         notes = tuple(dict.fromkeys(_worded(str(one.message), order) for one in caught))[:_MAX_NOTES]
         answer = Answer(msgspec.structs.replace(facts, notes=notes))
     except MotionMindError as error:
@@ -220,18 +232,18 @@ def _worded(message: str, order: Order) -> str:
     return displayed(message.replace(f"{Path.cwd()}{os.sep}", ""), 400)
 
 
-def _read(order: Order) -> list[Motion]:
-    """Read the clips of a file, on the file's own joints."""
+def _read(order: Order) -> tuple[list[Motion], list[dict[str, list[int]]]]:
+    """Read the clips of a file, on the file's own joints, and the lines of a score's (`lines_of`)."""
     from motionmind.formats import read_clips
 
     path, stem = Path(order.file), displayed(Path(order.name).stem)
     if path.suffix == ".score":
-        from motionmind.notation.compose import motions
+        from motionmind.notation.compose import played
         from motionmind.notation.read import read_score
 
         taken = take_together(order.file, displayed(order.name), order.scores)
         try:
-            found = motions(read_score(next(iter(taken))))
+            found = played(read_score(next(iter(taken))))
         except MotionMindError as error:
             message = re.sub("|".join(map(re.escape, taken)), lambda match: taken[match[0]], str(error))
             raise MotionMindError(message) from error
@@ -239,15 +251,15 @@ def _read(order: Order) -> list[Motion]:
             raise FormatError("has no clip: write one that passes through its postures", path=path)
         if len(found) > _MAX_CLIPS:
             raise FormatError(f"has {len(found)} clips: at most {_MAX_CLIPS} are allowed", path=path)
-        return [replace(one, name=displayed(one.name)) for one in found]
-    found = list(islice(read_clips(path, unit=order.unit, asf=order.asf, fps=order.fps), _MAX_CLIPS + 1))
-    if len(found) > _MAX_CLIPS:
+        return [replace(one, name=displayed(one.name)) for _, one in found], [lines_of(rows) for rows, _ in found]
+    clips = list(islice(read_clips(path, unit=order.unit, asf=order.asf, fps=order.fps), _MAX_CLIPS + 1))
+    if len(clips) > _MAX_CLIPS:
         raise FormatError(f"has more than {_MAX_CLIPS} clips, which is too many", path=path)
-    names = [stem + displayed(one.name.removeprefix(path.stem)) for one in found] if len(found) > 1 else [stem]
-    return [replace(one, name=name) for one, name in zip(found, names, strict=True)]
+    names = [stem + displayed(one.name.removeprefix(path.stem)) for one in clips] if len(clips) > 1 else [stem]
+    return [replace(one, name=name) for one, name in zip(clips, names, strict=True)], [lines_of([]) for _ in clips]
 
 
-def _understand(order: Order, motions: list[Motion]) -> Facts:
+def _understand(order: Order, motions: list[Motion], lines: list[dict[str, list[int]]]) -> Facts:
     """Write the clips, on the corpora's body if their joints map to it, and return the facts."""
     from motionmind.body.human import human23, human44
     from motionmind.body.tempo import question_tempo
@@ -263,7 +275,9 @@ def _understand(order: Order, motions: list[Motion]) -> Facts:
     faults: list[Fault] = []
     clips = []
     for number, motion in enumerate(own):
-        np.savez(clip_file(number), rotations=motion.rotations, root=motion.root, times=motion.times)
+        rows = {name: np.array(values, dtype=np.int64) for name, values in lines[number].items()}
+        arrays: dict[str, Any] = {"rotations": motion.rotations, "root": motion.root, "times": motion.times, **rows}
+        np.savez(clip_file(number), **arrays)
         is_posed = is_posed_first(motion)
         faults += _faults([flip for flip in find_flips(motion) if not (is_posed and flip.frame == 1)], motion, number)
         seconds, still = float(motion.times[-1] - motion.times[0]), motion.keyframed or len(motion) == 1

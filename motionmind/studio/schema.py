@@ -36,6 +36,7 @@ from motionmind.studio.corpora import Lesson
 from motionmind.studio.filming import Direction
 from motionmind.studio.music import ChoosingMusic
 from motionmind.studio.panel_answers import (
+    ComposedView,
     CorpusView,
     Credited,
     Gallery,
@@ -51,6 +52,7 @@ from motionmind.studio.panel_answers import (
 from motionmind.studio.posing import Changing, Dragging, Keeping, Opening, Telling, Turning
 from motionmind.studio.recent import RecentOpening, RecentProject
 from motionmind.studio.reference import Referring
+from motionmind.studio.scoring import Composing, Scoring
 from motionmind.studio.uploads import Choices
 from motionmind.studio.varied import Ordering, Wish
 
@@ -120,6 +122,8 @@ CALLS = (
     Call("POST", "/api/pose/change", Changing, Posed),
     Call("POST", "/api/pose/keep", Keeping, KeptView),
     Call("POST", "/api/pose/score", Keeping, Lines),
+    Call("POST", "/api/score", Scoring, Begun),
+    Call("POST", "/api/score/compose", Composing, ComposedView),
     Call("GET", "/api/reference", None, "application/octet-stream"),
     Call("POST", "/api/reference", Referring, ProjectView),
     Call("GET", "/api/ensemble", None, EnsembleView),

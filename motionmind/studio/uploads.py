@@ -169,7 +169,7 @@ class Uploads:
             others = scores if own.kind == "score" else {}
             order = Order(f"upload.{own.kind}", own.name, choices.unit, choices.fps, asf, others)
             async with self._reading:
-                answer = await _read(folder, order)
+                answer = await read_apart(folder, order)
         facts = answer.facts
         error = answer.error if facts is None else ""
         new = msgspec.structs.replace(own, choices=choices, facts=facts, error=error)
@@ -211,8 +211,8 @@ class Uploads:
         return self._room.folder / upload
 
 
-async def _read(folder: Path, order: Order) -> Answer:
-    """Let a child process read a file, within the time limit."""
+async def read_apart(folder: Path, order: Order) -> Answer:
+    """Let a child process read a file in a folder, within the time limit."""
     shown = displayed(order.name)
     (folder / FACTS_FILE).unlink(missing_ok=True)
     (folder / ORDER_FILE).write_bytes(msgspec.json.encode(order))

@@ -2,12 +2,15 @@
 
 import { html, useEffect, useMemo, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { playable } from "../movements.js";
+import { AsScore } from "../scores/panel.js";
 import { perStudio, useChange } from "../shell/hooks.js";
 import { insert, newId } from "../timeline/items.js";
 import { Corpora } from "./corpora.js";
 import { FileCard } from "./file.js";
 import { ACCEPT, Imports } from "./imports.js";
 import { Learn } from "./learn.js";
+
+export { Centre } from "../scores/editor.js";
 
 const importsOf = perStudio((studio) => new Imports(studio.api));
 
@@ -72,6 +75,7 @@ export function Panel({ studio }) {
           onLook=${(/** @type {number} */ clip) => look(file, clip).catch(failed)} onPut=${(/** @type {number} */ clip) => studio.once(`put ${file.id} ${clip}`, () => put(file, clip))} />`,
       )}
     </ul>
+    <${AsScore} studio=${studio} />
     <${Learn} studio=${studio} imports=${imports} />
     <${Corpora} studio=${studio} imports=${imports} />
   </section>`;
