@@ -55,6 +55,7 @@ SUBJECTS = {
         "human23",
         "human44",
     ),
+    "Duets": ("duets.tween_duet", "duets.DuetTween"),
     "Cleaning": ("clean.clean_motion", "clean.Cleaning"),
     "Files": (
         "read_motion",

@@ -15,6 +15,7 @@ import click
 
 from motionmind.cli import completion
 from motionmind.cli.delivery import Delivery, check_delivery, find_rig, for_program, on_rig, rig_files, takes_delivery
+from motionmind.cli.duets import are_duets, tween_duets
 from motionmind.cli.exits import ExitCode
 from motionmind.cli.files import MOTION_SUFFIXES, check_outputs, numbered
 from motionmind.cli.music import in_seconds, read_counts, sound_of_counts, with_music
@@ -22,7 +23,7 @@ from motionmind.cli.options import HOME, OUTPUT_KINDS, Section, command, option,
 from motionmind.cli.printing import Interruption, note, print_alternatives, print_tween
 from motionmind.cli.search_options import request_options, searching, via_sources
 from motionmind.cli.sources import ends_reader
-from motionmind.cli.types import FILE, Place, Whole, known_corpora
+from motionmind.cli.types import EXISTING_FILE, FILE, Place, Whole, known_corpora
 from motionmind.cli.warming import preparing
 from motionmind.cli.words import parse_reaches
 from motionmind.display import displayed
@@ -107,6 +108,15 @@ if TYPE_CHECKING:
     type=FILE,
     help="File with the path to B over the floor: an SVG path in metres, or a point x,z in each line.",
 )
+@option(
+    "--duets",
+    section=Section.CORPORA,
+    advanced=True,
+    type=EXISTING_FILE,
+    multiple=True,
+    help="Ensemble of two (.bvh, .toml) that shows how couples keep together, where A and B are of two dancers  "
+    "[default: the files of A and B]. Repeatable.",
+)
 @searching()
 @with_music(
     Section.SEARCH,
@@ -133,6 +143,7 @@ def tween(
     reach: tuple[str, ...],
     to: tuple[float, ...] | None,
     along: Path | None,
+    duets: tuple[Path, ...],
     music: Path | None,
     offset: float | None,
     joints: Path | None,
@@ -147,7 +158,7 @@ def tween(
     A and B are postures of corpora, such as ballet/arabesque or ballet/adagio@23 (the postures command lists them),
     files of one posture, or frames of clips. Frames count from 0: clip.bvh@240, or by time clip.bvh@2.0s; of a clip of
     a glTF file, 'hero.glb#Dance@240'. Velocities are free; clip.bvh@240~ has the clip's velocity. The input options
-    apply to every motion file on the command line.
+    apply to every motion file on the command line. Two frames of ensembles of two, such as duo.bvh@12, make a duet.
 
     Ctrl-C ends the search: the command writes the best movement found and its bound, and exits with code 130. Exit
     code 3 means that no path joins A and B under these constraints; --report then holds the diagnosis.
@@ -166,6 +177,10 @@ def tween(
     from motionmind.tween.report import plain
 
     named = parse_posture(a, home), parse_posture(b, home)
+    given = {"joints": joints, "unit": unit, "asf": asf, "source_fps": source_fps, "up": up}
+    if are_duets(named, duets):
+        tween_duets(named, duets, outputs, corpus, home, options | {"to": to, "along": along}, given)
+        return
     files = _Files(outputs, report, problem, alternatives)
     taker = check_delivery(outputs, program, rig)
     sources = [one.source for one in named]
@@ -175,10 +190,13 @@ def tween(
     )
     corpus = _corpus_of(named, home) if corpus is None else corpus
     locate(corpus, home)
-    given = {"joints": joints, "unit": unit, "asf": asf, "source_fps": source_fps, "up": up}
     read = ends_reader([*sources, *vias], corpus, home, **given)
-    request = request_options(options, home, read) | {"what_if": what_if, "reach": parse_reaches(reach)}
-    request |= {"to": to, "along": None if along is None else read_floor_path(along)}
+    request = request_options(options, home, read) | {
+        "what_if": what_if,
+        "reach": parse_reaches(reach),
+        "to": to,
+        "along": None if along is None else read_floor_path(along),
+    }
     beats = read_counts(music, offset, options["tempo"])
     request = in_seconds(request, beats)
     for source in sources:

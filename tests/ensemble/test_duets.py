@@ -92,3 +92,60 @@ def test_a_file_that_is_damaged_below_its_bodies_is_refused(duo: Path, run: Run)
         assert ran.err.count("\n") == 1
         assert "duo.bvh" in ran.err
         assert not Path("duo.html").exists()
+
+
+TWEEN = "tween", "duo.bvh@30", "duo.bvh@100", "--corpus", "ballet"
+
+
+def test_tween_leads_a_couple_from_one_duet_posture_to_another(duo: Path, run: Run) -> None:
+    Path("sub").mkdir()
+    ran = run(*TWEEN, "-o", "sub/t.toml", "-o", "t.html", "-o", "t.glb", "-o", "t.bvh")
+    assert ran.code == 0, ran.err
+    assert "leader:\n" in ran.out
+    assert "\ncouple    " in ran.out
+    assert "no hands held" in ran.out
+    assert "in the duets\n" in ran.out
+    assert all(
+        Path(name).exists() for name in ("t.html", "t.glb", "t-1.bvh", "t-2.bvh", "sub/t-1.json", "sub/t-2.json")
+    )
+    ensemble = read_ensemble(Path("sub/t.toml"), lambda piece: read_motion(f"sub/{piece}"))
+    for dancer, whole, name in zip(ensemble.dancers, face_to_face(), ("pelvis", "pelvis (2)"), strict=True):
+        assert dancer.name == name
+        for frame, given in ((0, 30), (-1, 100)):
+            there = dancer.placed().slice(frame % len(dancer.piece), frame % len(dancer.piece) + 1)
+            np.testing.assert_allclose(there.positions()[0], whole.positions()[given], atol=3e-3)
+    again = run("tween", "sub/t.toml@0", "duo.bvh@60~", "--corpus", "ballet", "--duets", "duo.bvh", "--duration", "1")
+    assert again.code == 0, again.err
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("duo.bvh@30", "ballet/fifth"), "duo.bvh@30 is of several dancers, and ballet/fifth of one"),
+        (("duo.bvh#pelvis@3", "duo.bvh@9"), "duo.bvh@9 is of several dancers, and duo.bvh#pelvis@3 of one"),
+        (("duo.bvh@30", "duo.bvh@9999"), "duo.bvh: frames are 0 to "),
+        (("duo.bvh", "duo.bvh@9"), "frames, where one posture was expected; say which"),
+        (("solo.toml@0", "duo.bvh@9"), "solo.toml: a duet has two dancers, not 1"),
+        (("odd.toml@0", "duo.bvh@9"), "odd.toml: Anna and Ben have different joints: "),
+        (("duo.bvh@3", "duo.bvh@9", "--alternatives", "2"), "duo.bvh: --alternatives is not for an ensemble"),
+        (("duo.bvh@3", "duo.bvh@9", "-o", "t.json"), "t.json: cannot be written: the name must end in one of .toml"),
+        (("duo.bvh@3", "duo.bvh@9", "-o", "t.toml", "--duets", "0.bvh"), "0.bvh: a duet has two dancers, not 1"),
+        (("ballet/fifth", "ballet/tendu", "--duets", "duo.bvh"), "--duets: ballet/fifth and ballet/tendu are of one"),
+    ],
+)
+def test_what_is_no_duet_is_one_line(duo: Path, run: Run, words: tuple[str, ...], told: str) -> None:
+    Path("solo.toml").write_text('[[dancer]]\npiece = "ballet/balances"\n')
+    Path("odd.toml").write_text(
+        '[[dancer]]\nname = "Anna"\npiece = "ballet/balances"\n[[dancer]]\nname = "Ben"\npiece = "walk-hexapod/wave"\n'
+    )
+    ran = run("tween", *words, "--corpus", "ballet")
+    assert (ran.code, ran.out) == (2, ""), ran
+    assert told in ran.err
+    assert ran.err.strip().splitlines()[-1].startswith("error: ")
+    assert not list(Path().glob("t*"))
+
+
+def test_duets_need_a_corpus(duo: Path, run: Run) -> None:
+    ran = run(*TWEEN[:3])
+    assert ran.code == 2
+    assert "Missing option '--corpus': duet postures are in files." in ran.err
