@@ -40,7 +40,7 @@ STILL_DEG = 1.0  # a part that turns or bends by less in a move is still
 
 
 class Off(msgspec.Struct, frozen=True):
-    """How far a sign is from the movement that it stands for.
+    """Deviation of a sign from the movement that it stands for.
 
     Attributes:
         column: the sign's column.

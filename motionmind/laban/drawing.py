@@ -132,7 +132,7 @@ class Drawing:
 
 @dataclass(frozen=True)
 class _Layout:
-    """How a staff is divided.
+    """Division of a staff.
 
     Attributes:
         count: length of a count, pixels.
@@ -291,7 +291,7 @@ def _group(title: str, value: Value, box: Box, *, on_left: bool, css: str, faces
 
 @dataclass(frozen=True)
 class _Title:
-    """What shows under the pointer."""
+    """Text that shows under the pointer."""
 
     text: str
 

@@ -1,4 +1,4 @@
-"""What the columns of a staff measure in a score's postures: directions of limbs, bends, supports, turns."""
+"""Measure in a score's postures what the columns of a staff say: directions of limbs, bends, supports, turns."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ _Event = tuple[Direction | None, float]
 
 @dataclass(frozen=True)
 class Supported:
-    """What happens to the supports in the move to each row.
+    """Changes of the supports in the move to each row.
 
     Attributes:
         bears: whether the left and the right foot bear weight [T, 2].
