@@ -120,7 +120,7 @@ def studio(
             return
         try:
             if given_option(context, ["corpus"]) and project.state.corpus != corpus:
-                from motionmind.studio.edits import SetCorpus
+                from motionmind.studio.settings import SetCorpus
 
                 project.edit(_TERMINAL_WINDOW, SetCorpus(corpus))
             for words in (*project.words, *project.missing):

@@ -16,11 +16,12 @@ from starlette.routing import BaseRoute, Route
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.render.page import player_data
-from motionmind.studio.edits import Edit, SetMusic, SetReference, each
+from motionmind.studio.edits import Edit, each
 from motionmind.studio.guard import is_looking
 from motionmind.studio.movements import STORED
 from motionmind.studio.neighbours import MIRRORED
 from motionmind.studio.project import RefusedError
+from motionmind.studio.settings import SetMusic, SetReference
 from motionmind.studio.studio import Studio
 from motionmind.studio.thumbnails import THUMBNAIL_HEIGHT_PX
 

@@ -28,16 +28,17 @@ from motionmind.render.group_page import dancer_data, paints
 from motionmind.studio import api
 from motionmind.studio.casting_files import MAKERS, name_in
 from motionmind.studio.dancers import Cast, Change, Dancer, PutDancer, RemoveDancer, SetFormations
-from motionmind.studio.edits import Arrange, Block, SetStage, SetTempo, Several, Single
+from motionmind.studio.edits import Arrange, Block, Several, Single
 from motionmind.studio.export import composed, file_name, saved
 from motionmind.studio.piece import State
 from motionmind.studio.project import Project, RefusedError
+from motionmind.studio.settings import MAX_TEMPO, MIN_TEMPO, SetStage, SetTempo
 from motionmind.tween.counts import counts_to_seconds, seconds_to_count
 
 if TYPE_CHECKING:
     from motionmind.studio.studio import Studio
 
-_STUDIO_TEMPI_BPM = (20.0, 300.0)  # of a project, as in `edits.Tempo`
+
 _MAX_ENSEMBLE_BYTES = 2**20  # of a file
 
 
@@ -116,7 +117,7 @@ def cast_of(ensemble: Ensemble, sources: Sequence[str]) -> Cast:
 
 def check_tempo(ensemble: Ensemble) -> None:
     """Check that a project can count an ensemble's tempo; raise MotionMindError if it cannot."""
-    low, high = _STUDIO_TEMPI_BPM
+    low, high = MIN_TEMPO, MAX_TEMPO
     if ensemble.tempo is not None and not low <= ensemble.tempo <= high:
         raise MotionMindError(
             f"{displayed(ensemble.name)}: the studio counts {low:g} to {high:g} a minute, not {ensemble.tempo:g}"

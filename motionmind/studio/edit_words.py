@@ -21,17 +21,12 @@ from motionmind.studio.edits import (
     Play,
     SavePosture,
     SaveVersion,
-    SetCorpus,
-    SetMusic,
-    SetReference,
-    SetStage,
-    SetTempo,
-    SetTitle,
     Several,
     Split,
     Trim,
     Wish,
 )
+from motionmind.studio.settings import SetCorpus, SetMusic, SetReference, SetStage, SetTempo, SetTitle
 
 _DESCRIPTIONS: Mapping[type, str] = {
     Insert: "insert a stretch",

@@ -9,12 +9,10 @@ from collections.abc import Iterator
 from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
-import numpy as np
 
-from motionmind.body.stage import STAGE_RANGE_M
-from motionmind.music.beats import MAX_BEATS, Beats
 from motionmind.studio.asks import MAX_INSERTION_S, Ask, Frame, Key, Name, Passing, Pin, Reach, Travel
 from motionmind.studio.dancers import PutDancer, RemoveDancer, SetFormations, cast_places
+from motionmind.studio.settings import SetCorpus, SetMusic, SetReference, SetStage, SetTempo, Setting, SetTitle
 
 MAX_BLOCKS = 10_000  # in a piece
 MAX_HOLD_S = 3600.0
@@ -26,11 +24,6 @@ NoteKind = Literal["note", "marker", "section"]
 Seconds = Annotated[float, msgspec.Meta(ge=0.0, le=MAX_HOLD_S)]  # of a held posture
 Pace = Annotated[float, msgspec.Meta(ge=0.5, le=2.0)]  # of a stretch: 2 is twice as fast as recorded
 Repeats = Annotated[int, msgspec.Meta(ge=1, le=100)]  # of a stretch
-MIN_TEMPO, MAX_TEMPO = 20.0, 300.0  # counts a minute
-Tempo = Annotated[float, msgspec.Meta(ge=MIN_TEMPO, le=MAX_TEMPO)]
-Shift = Annotated[float, msgspec.Meta(ge=-36_000.0, le=36_000.0)]  # seconds of a video or music at the piece's start
-Counts = Annotated[int, msgspec.Meta(ge=2, le=16)]  # of a phrase: dancers count eights
-Side = Annotated[float, msgspec.Meta(ge=STAGE_RANGE_M[0], le=STAGE_RANGE_M[1])]  # of a stage, metres
 Place = str | tuple[str, str]  # touched by an edit: a block's id, or the ids on both sides of a seam
 
 
@@ -254,59 +247,6 @@ class SavePosture(_Edit, frozen=True, tag="posture"):
     posture: Key | None
 
 
-class SetCorpus(_Edit, frozen=True, tag="corpus"):
-    """Judge and smooth the piece with another corpus."""
-
-    name: Name
-
-
-class SetTempo(_Edit, frozen=True, tag="tempo"):
-    """Count the piece by another tempo."""
-
-    tempo: Tempo
-    counts: Counts = 8
-
-
-class SetReference(_Edit, frozen=True, tag="reference"):
-    """Show a video beside the piece, by its path, or none; `begins` is its time at the piece's start, seconds."""
-
-    path: Annotated[str, msgspec.Meta(max_length=4_096)] = ""
-    begins: Shift = 0.0
-
-
-class SetMusic(_Edit, frozen=True, tag="music"):
-    """Play music with the piece, by its path, or none.
-
-    Attributes:
-        path: the file; "" for none.
-        begins: time of the music at the piece's start, seconds.
-        beats: times of its beats, seconds of the music; two or more, or none if unknown.
-        first: index of the beat that is count 1.
-    """
-
-    path: Annotated[str, msgspec.Meta(max_length=4_096)] = ""
-    begins: Shift = 0.0
-    beats: Annotated[tuple[Shift, ...], msgspec.Meta(max_length=MAX_BEATS)] = ()
-    first: Annotated[int, msgspec.Meta(ge=0)] = 0
-
-    @property
-    def counting(self) -> Beats | None:
-        """The beats; None if they are unknown. MotionMindError if they are not in order."""
-        return Beats(np.array(self.beats), first=self.first) if self.beats else None
-
-
-class SetStage(_Edit, frozen=True, tag="stage"):
-    """Draw the edge of the stage, around the origin: its width and depth, metres; None for no stage."""
-
-    size: tuple[Side, Side] | None = None
-
-
-class SetTitle(_Edit, frozen=True, tag="title"):
-    """Rename the piece."""
-
-    title: Annotated[str, msgspec.Meta(max_length=200)]
-
-
 Single: TypeAlias = (
     Insert
     | Move
@@ -384,18 +324,8 @@ def touched(edit: Edit) -> frozenset[Place]:
                 places.add(f"/version/{name}")
             case SavePosture(name=name):
                 places.add(f"own/{name}")
-            case SetCorpus():
-                places.add("/corpus")
-            case SetMusic():
-                places.add("/music")
-            case SetReference():
-                places.add("/reference")
-            case SetStage():
-                places.add("/stage")
-            case SetTempo():
-                places.add("/tempo")
-            case SetTitle():
-                places.add("/title")
+            case Setting():
+                places.add(one.place)
             case PutDancer() | RemoveDancer() | SetFormations():
                 places.add(cast_places(one))
     return frozenset(places)

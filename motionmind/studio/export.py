@@ -23,10 +23,10 @@ from motionmind.formats import write_motion
 from motionmind.formats.bvh import write_bvh
 from motionmind.render.page import page
 from motionmind.studio.api import json
-from motionmind.studio.edits import SetMusic
 from motionmind.studio.local_files import is_here
 from motionmind.studio.music import has_sound, sound_of
 from motionmind.studio.placement import performance
+from motionmind.studio.settings import SetMusic
 from motionmind.studio.view import layout_of
 
 if TYPE_CHECKING:

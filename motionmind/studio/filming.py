@@ -20,10 +20,10 @@ from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 from motionmind.studio import api
 from motionmind.studio.casting import ensemble_of
-from motionmind.studio.edits import SetMusic
 from motionmind.studio.export import composed, file_name, music_for, saving_headers
 from motionmind.studio.music import sound_of
 from motionmind.studio.room import Room
+from motionmind.studio.settings import SetMusic
 from motionmind.studio.workers import Job, Report
 
 if TYPE_CHECKING:

@@ -15,8 +15,9 @@ from motionmind.display import displayed_path
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.music.sound import SOUND_SUFFIXES, Sound
 from motionmind.studio import api
-from motionmind.studio.edits import MAX_TEMPO, MIN_TEMPO, SetMusic, SetTempo, Several, Tempo
+from motionmind.studio.edits import Several
 from motionmind.studio.local_files import LocalFile, PathText, find_file, is_here, show_file
+from motionmind.studio.settings import MAX_TEMPO, MIN_TEMPO, SetMusic, SetTempo, Tempo
 from motionmind.studio.workers import Report
 
 if TYPE_CHECKING:

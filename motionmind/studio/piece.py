@@ -32,12 +32,6 @@ from motionmind.studio.edits import (
     Move,
     Play,
     SavePosture,
-    SetCorpus,
-    SetMusic,
-    SetReference,
-    SetStage,
-    SetTempo,
-    SetTitle,
     Single,
     Split,
     Trim,
@@ -46,6 +40,7 @@ from motionmind.studio.edits import (
 )
 from motionmind.studio.neighbours import MIRRORED, OWN, Pair, Seam, Verdict
 from motionmind.studio.notes import Notes, follow
+from motionmind.studio.settings import SetMusic, SetReference, Setting, changes_of
 from motionmind.studio.versions import Version, changed
 
 
@@ -219,19 +214,8 @@ def _apply(state: State, edit: Single) -> State:  # noqa: PLR0911 (one case an e
             return replace(arranged(state, blocks), used=state.used | names, about=about)
         case SavePosture(name, posture):
             return _saved(state, name, posture)
-        case SetCorpus(name):
-            return replace(state, corpus=name)
-        case SetMusic():
-            _ = edit.counting  # raises if the beats are not in order
-            return replace(state, music=edit)
-        case SetReference():
-            return replace(state, reference=edit)
-        case SetStage(size):
-            return replace(state, stage=size)
-        case SetTempo(tempo, counts):
-            return replace(state, tempo=tempo, counts=counts)
-        case SetTitle(title):
-            return replace(state, title=title)
+        case Setting():
+            return replace(state, **changes_of(edit))
         case PutDancer() | RemoveDancer() | SetFormations():
             return replace(state, cast=recast(state.cast, edit))
         case _:

@@ -20,8 +20,8 @@ from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 from motionmind.render.print_sheet import PrintPosture, pdf, print_pages, print_picture
 from motionmind.render.sheet import MAX_SHEET_POSTURES, tiles
-from motionmind.studio.edits import SetMusic
 from motionmind.studio.export import composed, file_name, saved
+from motionmind.studio.settings import SetMusic
 from motionmind.studio.view import layout_of, noted
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from motionmind.errors import MotionMindError, enumerated
 from motionmind.studio import piece
 from motionmind.studio.checks import check_movements, check_names, corpora_of, missing_in
 from motionmind.studio.edit_words import words_of
-from motionmind.studio.edits import Edit, SetCorpus, Wish, touched
+from motionmind.studio.edits import Edit, Wish, touched
 from motionmind.studio.findings import Finding, Found
 from motionmind.studio.journal import DamagedError, Journal
 from motionmind.studio.movements import Movements, version_of
@@ -23,6 +23,7 @@ from motionmind.studio.piece import State
 from motionmind.studio.placement import Marks
 from motionmind.studio.questions import question_of
 from motionmind.studio.records import Change, Corpora, EditLine, Head, RedoLine, UndoLine, decode_line
+from motionmind.studio.settings import SetCorpus
 from motionmind.studio.view import chosen_at
 
 _log = logging.getLogger(__name__)

@@ -12,9 +12,9 @@ from starlette.routing import BaseRoute, Route
 from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError
 from motionmind.studio import api
-from motionmind.studio.edits import SetReference
 from motionmind.studio.local_files import LocalFile, PathText, find_file, is_here, show_file
 from motionmind.studio.project import RefusedError
+from motionmind.studio.settings import SetReference
 
 if TYPE_CHECKING:
     from motionmind.studio.studio import Studio

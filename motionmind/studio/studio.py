@@ -14,12 +14,12 @@ import msgspec
 
 from motionmind.jit import interpreted
 from motionmind.render.page import player_data
-from motionmind.studio.edits import SetMusic
 from motionmind.studio.events import Events
 from motionmind.studio.movements import Movements
 from motionmind.studio.neighbours import MIRRORED
 from motionmind.studio.preparation import Steps, Told, told
 from motionmind.studio.project import Project
+from motionmind.studio.settings import SetMusic
 from motionmind.studio.thumbnails import THUMBNAIL_HEIGHT_PX, Thumbnails, thumbnail
 from motionmind.studio.uploads import Uploads
 from motionmind.studio.view import view_of

@@ -243,7 +243,8 @@ def basis_of(state: State) -> str:
     """Return the hash, in hexadecimal, of all that variations of a piece depend on: pieces with the same hash have
     the same variations.
 
-    >>> from motionmind.studio.edits import Insert, SetTitle, Trim
+    >>> from motionmind.studio.edits import Insert, Trim
+    >>> from motionmind.studio.settings import SetTitle
     >>> from motionmind.studio.piece import State, apply
     >>> piece = apply(State(), Insert("b1", "ballet/adagio", 0, 40))
     >>> [basis_of(apply(piece, edit)) == basis_of(piece) for edit in (SetTitle("Swan"), Trim("b1", 0, 20))]

@@ -10,10 +10,12 @@ from hypothesis import strategies as st
 from motionmind.errors import MotionMindError
 from motionmind.studio import edits as e
 from motionmind.studio.checks import check_movements, check_names
+from motionmind.studio.dancers import CastEdit
 from motionmind.studio.edit_words import _DESCRIPTIONS, words_of
 from motionmind.studio.neighbours import End, Verdict
 from motionmind.studio.piece import State, apply, apply_all
 from motionmind.studio.questions import question_of
+from motionmind.studio.settings import SetCorpus, SetTempo, SetTitle
 
 IDS = [f"b{number}" for number in range(8)]
 FRAMES = st.integers(0, 12)
@@ -40,9 +42,9 @@ singles = st.one_of(
     st.builds(e.Wish, ids, ids, st.none() | st.floats(0.1, 9.0), st.lists(passing, max_size=2).map(tuple)),
     st.builds(e.Arrange, st.lists(blocks, max_size=4).map(tuple), st.just({"words": "vary the piece"})),
     st.builds(e.SavePosture, st.sampled_from(["rest", "reach"]), st.none() | st.just("m-1")),
-    st.builds(e.SetCorpus, st.sampled_from(["ballet", "karate"])),
-    st.builds(e.SetTempo, st.floats(20.0, 300.0), st.integers(2, 16)),
-    st.builds(e.SetTitle, st.text(max_size=5)),
+    st.builds(SetCorpus, st.sampled_from(["ballet", "karate"])),
+    st.builds(SetTempo, st.floats(20.0, 300.0), st.integers(2, 16)),
+    st.builds(SetTitle, st.text(max_size=5)),
     st.builds(e.Annotate, notes),
     st.builds(e.Erase, st.sampled_from(["n1", "n2"])),
     st.builds(e.SaveVersion, st.just("before"), st.booleans()),
@@ -235,7 +237,7 @@ def test_a_locked_insertion_changes_only_when_it_is_unlocked():
 @pytest.mark.parametrize("name", [".", "..", "arms/."])
 def test_a_posture_has_a_name_by_which_it_can_be_asked_for(name):
     with pytest.raises(MotionMindError, match="cannot be the name"):
-        check_names(e.Several((e.SetTitle("Swan"), e.SavePosture(name, "m-1"))))
+        check_names(e.Several((SetTitle("Swan"), e.SavePosture(name, "m-1"))))
     check_names(e.SavePosture(name, None))  # which an earlier version let save it
     check_names(e.SavePosture(f"{name}bow", "m-1"))
 
@@ -319,6 +321,7 @@ def test_words_say_what_an_edit_does():
     for kind in e.Single.__args__:
         assert kind in _DESCRIPTIONS or kind in (
             *(e.Decide, e.Arrange, e.Annotate, e.SaveVersion, e.GoBack, e.SavePosture),
+            *CastEdit.__args__,
         )
 
 

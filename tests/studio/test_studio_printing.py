@@ -27,8 +27,8 @@ from motionmind.render.print_sheet import (
     print_picture,
 )
 from motionmind.render.sheet import tiles
-from motionmind.studio.edits import SetMusic
 from motionmind.studio.printing import Spacing, postures_at
+from motionmind.studio.settings import SetMusic
 
 
 def note(kind: str, text: str, at: float, author: str = "") -> dict[str, Any]:

@@ -10,10 +10,11 @@ from studio_server import Served
 
 from motionmind.errors import MotionMindError
 from motionmind.studio import piece
-from motionmind.studio.edits import Decide, Delete, Insert, Mirror, Move, SetCorpus, Trim
+from motionmind.studio.edits import Decide, Delete, Insert, Mirror, Move, Trim
 from motionmind.studio.findings import Finding, Found
 from motionmind.studio.journal import OpenElsewhereError
 from motionmind.studio.project import Project, RefusedError
+from motionmind.studio.settings import SetCorpus
 from motionmind.studio.view import chosen_at
 
 Make = Callable[..., Project]

@@ -11,9 +11,10 @@ from studio_server import serving
 
 from motionmind.corpus import store
 from motionmind.errors import MotionMindError
-from motionmind.studio.edits import Insert, SetCorpus
+from motionmind.studio.edits import Insert
 from motionmind.studio.findings import Finding
 from motionmind.studio.project import Project, RefusedError
+from motionmind.studio.settings import SetCorpus
 from motionmind.tween.engine import Engine
 
 

@@ -22,6 +22,7 @@ from motionmind.studio.piece import State, apply, apply_all
 from motionmind.studio.placement import Marks, lay_out, performance
 from motionmind.studio.project import Project, RefusedError
 from motionmind.studio.questions import question_of
+from motionmind.studio.settings import SetTempo
 from motionmind.studio.sides import sides_of
 from motionmind.studio.varying import Clock, Wanted, vary_blocks
 
@@ -386,7 +387,7 @@ def test_the_tempo_belongs_to_the_project(make_project: Callable[..., Project]) 
     project = make_project()
     before = project.state
     assert (before.tempo, before.counts) == (120.0, 8)
-    project.edit("w", e.SetTempo(92.5, 6))
+    project.edit("w", SetTempo(92.5, 6))
     counted = project.state
     assert (counted.tempo, counted.counts) == (92.5, 6)
     assert project.undoable("w") == "change the tempo"
