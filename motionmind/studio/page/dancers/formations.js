@@ -55,7 +55,7 @@ function Change({ cast, change, number }) {
       !change.formation &&
       cast.now.dancers.map(
         (/** @type {any} */ { id, name, place }) => html`<fieldset class="row fields" key=${id}><legend class="hint">${name}</legend>
-          ${placeFields(change.places[id] ?? place, `${test}-${id}`, (next) => put({ places: { ...change.places, [id]: next } }))}</fieldset>`,
+          ${placeFields(change.places[id] ?? place, `${test}-${id}`, (make) => cast.form((/** @type {any[]} */ all) => all.map((one, i) => (i === number ? { ...one, places: { ...one.places, [id]: make(one.places[id] ?? place) } } : one))))}</fieldset>`,
       )
     }
   </li>`;

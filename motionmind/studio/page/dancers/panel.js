@@ -56,17 +56,16 @@ function Near({ cast }) {
 function Member({ cast, dancer, colour }) {
   const { id, name, place, facing, entry, mirrored, source } = dancer;
   const hidden = cast.hidden.has(id);
-  const nameNow = () => cast.now.dancers.find((/** @type {any} */ one) => one.id === id)?.name ?? name;
+  const [written, write] = useState(/** @type {string | null} */ (null)); // other edits do not overwrite what is typed
   const change = (/** @type {object} */ fields) => cast.change(id, () => fields);
   return html`<li class="card member" data-testid=${`dancer-${id}`}>
     <div class="row">
       <i class="swatch" style=${{ background: colour ? `rgb(${colour.join()})` : "transparent" }}></i>
-      <input class="field grow" aria-label="Name" maxlength="100" autocomplete="off" value=${name} data-testid=${`name-${id}`}
-        onChange=${(/** @type {any} */ event) => {
-          const wanted = event.target.value.trim();
-          // It shows the name in use, if this one is refused.
-          if (wanted) change({ name: wanted }).then(() => (event.target.value = nameNow()));
-          else event.target.value = name;
+      <input class="field grow" aria-label="Name" maxlength="100" autocomplete="off" value=${written ?? name} data-testid=${`name-${id}`}
+        onInput=${(/** @type {any} */ event) => write(event.target.value)}
+        onChange=${async () => {
+          if (written?.trim()) await change({ name: written.trim() });
+          write(null); // it shows the name in use, if this one is refused
         }} />
       <button class="button" aria-pressed=${String(!hidden)} data-testid=${`shown-${id}`} title=${`Show or hide ${name} in the viewer`} onClick=${() => cast.toggle(id)}>
         ${hidden ? "Hidden" : "Shown"}</button>
@@ -75,7 +74,7 @@ function Member({ cast, dancer, colour }) {
     </div>
     <div class="row fields">
       ${field("Enters at count", `entry-${id}`, entry, 1, 100_000, "any", (value) => change({ entry: value }))}
-      ${placeFields(place, `place-${id}`, (next) => change({ place: next }))}
+      ${placeFields(place, `place-${id}`, (make) => cast.change(id, ({ place: now }) => ({ place: make(now) })))}
       ${field("Turned left, degrees", `facing-${id}`, facing, -MAX_TURN_DEG, MAX_TURN_DEG, 15, (value) => change({ facing: value }))}
       <label class="row"><input type="checkbox" checked=${mirrored} data-testid=${`mirrored-${id}`}
         onChange=${(/** @type {any} */ event) => change({ mirrored: event.target.checked })} /> mirrored</label>
@@ -103,7 +102,7 @@ function Add({ cast }) {
     <p class="hint">The same piece, later: in canon.</p>
     <div class="row fields">
       ${field("Counts later", "add-canon", canon, 0, 10_000, "any", setCanon)}
-      ${placeFields(wanted, "add-place", setPlace)}
+      ${placeFields(wanted, "add-place", (make) => setPlace(make(wanted)))}
       ${field("Turned left, degrees", "add-facing", facing, -MAX_TURN_DEG, MAX_TURN_DEG, 15, setFacing)}
       <label class="row"><input type="checkbox" checked=${mirrored} data-testid="add-mirrored"
         onChange=${(/** @type {any} */ event) => setMirrored(event.target.checked)} /> mirrored</label>
@@ -156,8 +155,12 @@ export function field(label, test, value, min, max, step, use) {
       }} /></label>`;
 }
 
-/** Fields for a place on the floor. @param {number[]} place @param {string} test @param {(place: [number, number]) => void} use */
+/**
+ * Fields for a place on the floor.
+ * @param {number[]} place @param {string} test
+ * @param {(make: (now: number[]) => [number, number]) => void} use gets the change of the place as it is then
+ */
 export function placeFields([x, z], test, use) {
-  return html`${field("To stage left, m", `${test}-x`, x, -MAX_PLACE_M, MAX_PLACE_M, 0.1, (value) => use([value, z]))}
-    ${field("Downstage, m", `${test}-z`, z, -MAX_PLACE_M, MAX_PLACE_M, 0.1, (value) => use([x, value]))}`;
+  return html`${field("To stage left, m", `${test}-x`, x, -MAX_PLACE_M, MAX_PLACE_M, 0.1, (value) => use(([, now]) => [value, now]))}
+    ${field("Downstage, m", `${test}-z`, z, -MAX_PLACE_M, MAX_PLACE_M, 0.1, (value) => use(([now]) => [now, value]))}`;
 }
