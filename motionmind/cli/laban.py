@@ -67,7 +67,7 @@ def laban(source: Path, outputs: tuple[Path, ...], clip: str | None, bar: int | 
     with all_or_none():
         for path, data in contents.items():
             write_atomically(path, data)
-    click.echo(f"{displayed(staff.title)}: {count(len(staff.signs), 'sign')} in {staff.counts:g} counts")
+    click.echo(f"{displayed(staff.title) or 'Movement'}: {count(len(staff.signs), 'sign')} in {staff.counts:g} counts")
     for line in _lines(offs):
         click.echo(line)
     print_written([*contents])

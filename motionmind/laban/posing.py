@@ -55,11 +55,8 @@ def pose_trunk(body: Anatomy, torso: Aim, torso_turn: float, head: Aim, head_tur
         angles[joint] = _limited(body, joint, "", wanted)
         lean = lean - angles[joint]  # what is beyond the hips' limits
     chest = _global(body, angles, "thorax")
-    skeleton = body.skeleton
-    points = skeleton.positions_and_tips(_rotations(body, {}), np.zeros((1, 3)))[0]
-    rest = points[len(skeleton) + body.named("atlantal", "")] - points[body.named("cervical", "")]
     turn = rot.about_vertical(np.radians(head_turn))
-    swing = rot.between(rest / np.linalg.norm(rest), rot.mul_vec(rot.inv(turn), head.along))
+    swing = rot.between(_UP, rot.mul_vec(rot.inv(turn), head.along))
     local = rot.inv_mul(chest, rot.mul(turn, swing))
     whole = _degrees(body, body.named("cervical", ""), local[None])[0]
     return angles, {joint: _limited(body, joint, "", whole * shares) for joint, shares in _HEAD.items()}

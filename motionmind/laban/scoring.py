@@ -21,6 +21,7 @@ from motionmind.laban.posing import Aim, Angles, lift_leg, pose_limb, pose_trunk
 from motionmind.laban.signs import (
     BEND_STEP_DEG,
     GESTURES,
+    LEGS,
     PATH,
     PLACE,
     SUPPORTS,
@@ -140,6 +141,8 @@ def _states(staff: Staff, times: Sequence[float]) -> Iterator[_State]:
     """Yield the postures at some counts; between the beginning and the end of a sign, a part is on its way."""
     tracks = {column: _Track(staff, column) for column in (*SUPPORTS, *GESTURES, *TWISTS)}
     stands = {column: value for column in SUPPORTS if isinstance(value := staff.start.get(column), Direction)}
+    if not any(column in staff.start or staff.column(column) for column in (*SUPPORTS, *LEGS)):
+        stands = dict.fromkeys(SUPPORTS, Direction(PLACE, "middle"))  # only what moves is written
     bears = frozenset(stands)
     for count in times:
         aims, twists, touches = {}, {}, set()
@@ -151,7 +154,7 @@ def _states(staff: Staff, times: Sequence[float]) -> Iterator[_State]:
         for column in TWISTS:
             before, after, share = tracks[column].values(count)
             twists[column] = _left(before) + (share * (_left(after) - _left(before)) if after else 0.0)
-        if count > 0.0:
+        if count > 0.0 and any(tracks[column].signs for column in (*SUPPORTS, *LEGS)):
             bears = _bearing(tracks, count, bears, stands)
         yield _State(aims, twists, frozenset(touches), bears, dict(stands))
 

@@ -67,7 +67,7 @@ def test_a_limb_points_where_its_sign_says_up_to_its_limits(tmp_path: Path, side
 def test_the_trunk_leans_where_its_sign_says(tmp_path: Path, column: str) -> None:
     values = UPRIGHT_ENOUGH[column]
     signs = [Sign(column, float(i), 1.0, value) for i, value in enumerate(values)]
-    got = danced(staff_of(signs, {}), tmp_path)
+    got = danced(staff_of(signs, {"left leg": Direction(PLACE, "low")}), tmp_path)  # in the air
     assert [str(sign.value) for sign in got.column(column)] == [str(value) for value in values]
 
 
@@ -127,6 +127,15 @@ def test_a_score_that_the_body_cannot_follow_is_refused_in_a_line() -> None:
         MotionMindError, match=r"the body cannot follow the signs: the left fingers would be \d+ cm under"
     ):
         checked_score(staff)
+
+
+def test_who_has_no_signs_for_legs_stands(tmp_path: Path) -> None:
+    raises = Sign("left arm", 0.0, 3.0, Direction("left", "high"))
+    got = danced(staff_of([raises], {}), tmp_path)
+    assert [str(got.start[f"{side} support"]) for side in ("left", "right")] == ["place middle"] * 2
+    assert [*got.column("left arm")] == [raises]
+    assert "head" in got.start
+    assert not got.column("head")
 
 
 def test_a_body_that_is_unknown_is_refused() -> None:
