@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,8 @@ from motionmind.cli.music import check_sounding, read_part_of_sound, track_of, w
 from motionmind.cli.options import HOME, Section, command, option, output, outputs, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_movement, read_movements, select_part
-from motionmind.cli.types import COUNT, FILE_OR_FOLDER, FRAME, RATE, Number, Whole
+from motionmind.cli.stages import note_overstep
+from motionmind.cli.types import COUNT, FILE_OR_FOLDER, FRAME, RATE, Area, Number, Whole
 from motionmind.clip_names import GLTF_SUFFIXES, distinct_names
 from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError, enumerated
@@ -202,6 +204,13 @@ def sheet(
     metavar="PIXELS",
     help="Height of a film or the picture of a posture  [default: 480]",
 )
+@option(
+    "--stage",
+    section=Section.DRAW,
+    type=Area(),
+    metavar="WIDTHxDEPTH",
+    help="Edge of the stage in the floor plan of an .html, metres, around the origin; a note says where it is left.",
+)
 @with_music(
     Section.DRAW,
     "Sound of an .mp4 or .html (.wav, .flac, .ogg, .mp3)  [default: the file beside it, as clip.wav beside clip.bvh]",
@@ -216,6 +225,7 @@ def render(
     start: int,
     end: int,
     program: str | None,
+    stage: tuple[float, float] | None,
     home: Path | None,
     music: Path | None,
     offset: float | None,
@@ -236,10 +246,13 @@ def render(
 
     drawing = {key: options.pop(key) for key in ("fps", "view", "size")}
     check_sounding(outputs, music, offset)
+    pages = [path for path in outputs if path.suffix.lower() == ".html"]
+    if stage and not pages:
+        raise MotionMindError(f"--stage is for the floor plan of a page: {displayed_path(outputs[0])} is none (.html)")
     if is_ensemble(source, outputs, FILMS):
         drawing = {key: value for key, value in drawing.items() if value}
         sound = read_part_of_sound(music, offset or 0.0) if music else None
-        _film_ensemble(source, outputs, home, drawing, sound, options)
+        _film_ensemble(source, outputs, home, drawing, sound, stage, options)
         return
     named = parse_movement(source, home)
     check_outputs([(path, PICTURES) for path in outputs], named.source.paths)
@@ -257,11 +270,13 @@ def render(
     with all_or_none():
         for path in outputs:
             note_licences(path, motion)
-            draw_picture(path, motion, first=frames.start, sound=sound if may_sound(path) else None, **drawing)
+            heard, edge = sound if may_sound(path) else None, stage if path in pages else None
+            draw_picture(path, motion, first=frames.start, sound=heard, stage=edge, **drawing)
     seconds = motion.times[-1] - motion.times[0]
     for path in outputs:
         kilobytes = path.stat().st_size / 1000
         click.echo(f"{displayed_path(path)}: {count(len(motion), 'frame')}, {seconds:.2f} s, {kilobytes:.0f} kB")
+    note_overstep(source, motion, stage)
 
 
 def _make_files(folder: Path, motions: Sequence[Motion], read_from: Sequence[Path]) -> list[Path]:
@@ -330,10 +345,14 @@ def _film_ensemble(
     home: Path | None,
     drawing: dict[str, Any],
     sound: Sound | None,
+    stage: tuple[float, float] | None,
     options: dict[str, Any],
 ) -> None:
     """Film an ensemble, or write the page that plays it."""
+    from motionmind.body.stage import check_stage
+
     ensemble = open_ensemble(source, outputs, FILMS, home, ["name", "start", "end", "program"], **options)
+    ensemble = replace(ensemble, stage=check_stage(stage)) if stage else ensemble
     pages = [path for path in outputs if path.suffix.lower() == ".html"]
     if pages and drawing:
         raise MotionMindError(f"{pages[0]}: --fps, --view and --size are for films, not for a page")
@@ -349,3 +368,5 @@ def _film_ensemble(
                 write_group_film(path, ensemble, sound=sound if may_sound(path) else None, **drawing)
     names = ", ".join(map(displayed_path, outputs))
     click.echo(f"{names}: " + "\n".join(describe_ensemble(ensemble)))
+    for one in ensemble.motions() if stage else ():
+        note_overstep(one.name, one, stage)

@@ -12,12 +12,12 @@ from motionmind.display import displayed
 from motionmind.ensemble.dancers import Dancer, Ensemble
 from motionmind.files import FilePath, write_atomically
 from motionmind.music.sound import Sound
-from motionmind.render.page import fill_page, player_data, sound_data
+from motionmind.render.page import fill_page, player_data, sound_data, stage_data
 from motionmind.render.palette import COLOURS, dancer_ink
 
 
 def write_group_page(path: FilePath, ensemble: Ensemble, sound: Sound | None = None) -> None:
-    """Write the page that plays an ensemble.
+    """Write the page that plays an ensemble, with the edge of its stage on the floor.
 
     Args:
         path: the file.
@@ -27,7 +27,7 @@ def write_group_page(path: FilePath, ensemble: Ensemble, sound: Sound | None = N
     Raises:
         MotionMindError: the file cannot be written, the ensemble has too many frames, or the sound is too large.
     """
-    data = _group_data(ensemble) | sound_data(ensemble.name, ensemble.seconds, sound)
+    data = _group_data(ensemble) | stage_data(ensemble.stage) | sound_data(ensemble.name, ensemble.seconds, sound)
     write_atomically(path, fill_page(ensemble.name, data, "main").encode())
 
 

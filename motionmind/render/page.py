@@ -26,6 +26,7 @@ from motionmind.body.contact import find_feet
 from motionmind.body.mirror import sides_of
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
+from motionmind.body.stage import check_stage
 from motionmind.credits.ledger import ledger_of, sections_of
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
@@ -41,19 +42,22 @@ MAX_PAGE_SOUND_BYTES = 30_000_000  # of a page, as FLAC: about five minutes of s
 _PLAYER_DIR = Path(__file__).parent / "player"
 
 
-def page(motion: Motion, first: int = 0, sound: Sound | None = None) -> str:
+def page(motion: Motion, first: int = 0, sound: Sound | None = None, stage: tuple[float, float] | None = None) -> str:
     """Build the HTML page that plays a motion.
 
     Args:
         motion: the motion, on any skeleton.
         first: number of the motion's first frame in the longer motion that it is a part of.
         sound: sound that begins with the motion; the page holds as much of it as the motion lasts.
+        stage: width and depth of the stage around the origin, metres, whose edge the floor plan shows; None for none.
 
     Raises:
-        MotionMindError: the sound is too large for a page.
+        MotionMindError: the sound is too large for a page, or the stage is out of range.
     """
     seconds = float(motion.times[-1] - motion.times[0])
-    return _fill(motion, player_data(motion, first) | sound_data(motion.name, seconds, sound), "main")
+    return _fill(
+        motion, player_data(motion, first) | stage_data(stage) | sound_data(motion.name, seconds, sound), "main"
+    )
 
 
 def page_beside(motion: Motion, folder: str, data: Mapping[str, Any]) -> str:
@@ -96,13 +100,28 @@ def fill_page(title: str, data: Mapping[str, Any], start: str, style: str = "", 
     )
 
 
-def write_page(path: FilePath, motion: Motion, first: int = 0, sound: Sound | None = None) -> None:
+def write_page(
+    path: FilePath,
+    motion: Motion,
+    first: int = 0,
+    sound: Sound | None = None,
+    stage: tuple[float, float] | None = None,
+) -> None:
     """Write the page that plays a motion; arguments as of `page`.
 
     Raises:
-        MotionMindError: the file cannot be written, or the sound is too large for it.
+        MotionMindError: the file cannot be written, the sound is too large for it, or the stage is out of range.
     """
-    write_atomically(path, page(motion, first, sound).encode())
+    write_atomically(path, page(motion, first, sound, stage).encode())
+
+
+def stage_data(stage: tuple[float, float] | None) -> dict[str, Any]:
+    """Return the width and depth of a stage as the player reads them; nothing for no stage.
+
+    Raises:
+        MotionMindError: they are out of range.
+    """
+    return {} if stage is None else {"stage": check_stage(stage)}
 
 
 def sound_data(name: str, seconds: float, sound: Sound | None) -> dict[str, str]:

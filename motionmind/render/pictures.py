@@ -7,6 +7,7 @@ from typing import Any
 
 from motionmind.arguments import check_integer, check_path, check_real, check_text, check_type
 from motionmind.body.motion import Motion
+from motionmind.body.stage import check_stage
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.music.sound import Sound
@@ -25,6 +26,7 @@ def draw_picture(
     size: int | None = None,
     first: int = 0,
     sound: Sound | None = None,
+    stage: tuple[float, float] | None = None,
 ) -> None:
     """Write a motion as a picture, a film or a page, as the file's suffix says.
 
@@ -43,6 +45,7 @@ def draw_picture(
             picture lower.
         first: number of the motion's first frame in the longer motion that it is a part of.
         sound: sound of an MP4 or a page, which begins with the first frame and lasts as long as the motion.
+        stage: width and depth of the stage around the origin, metres, whose edge the floor plan of a page shows.
 
     Raises:
         MotionMindError: the suffix is unknown, an option does not apply to it or is out of range, a film would have too
@@ -61,15 +64,16 @@ def draw_picture(
     check_integer("size", size, or_none=True)
     check_integer("first", first)
     check_type("sound", sound, Sound, or_none=True)
+    stage = None if stage is None else check_stage(stage)
     suffix = Path(path).suffix.lower()
     if suffix not in PICTURES:
         raise MotionMindError(f"{path}: suffix {suffix!r} is unknown; pictures end in {', '.join(PICTURES)}")
-    _check(path, suffix, len(motion), fps=fps, view=view, size=size, sound=sound)
+    _check(path, suffix, len(motion), fps=fps, view=view, size=size, sound=sound, stage=stage)
     options: dict[str, Any] = {key: value for key, value in (("view", view), ("size", size)) if value is not None}
     if suffix == ".html":
         from motionmind.render.page import write_page
 
-        write_page(path, motion, first, sound)
+        write_page(path, motion, first, sound, stage)
     elif suffix == ".svg":
         from motionmind.render.svg import write_svg
 
@@ -92,11 +96,14 @@ def _check(path: FilePath, suffix: str, frames: int, **options: object) -> None:
     """Refuse options that do not apply to a suffix, instead of silently ignoring them."""
     allowed = {"fps", "view", "size"} if suffix in _FILMED else set[str]()
     allowed |= {"sound"} if suffix in SOUNDING else set()
+    allowed |= {"stage"} if suffix == ".html" else set()
     if suffix == ".png" and frames == 1:
         allowed = {"view", "size"}
     for name, value in options.items():
         if value is not None and name not in allowed:
             what = "a page" if suffix == ".html" else "one posture" if frames == 1 else "a sheet of postures"
+            if name == "stage":
+                raise MotionMindError(f"{path}: stage is for the floor plan of a page (.html)")
             if name == "sound":
                 raise MotionMindError(f"{path}: sound is for {' and '.join(SOUNDING)}")
             those = f"films ({', '.join(_FILMED)})" if name == "fps" else "films and single postures"

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import msgspec
 
 MAX_INSERTION_S = 600.0
-MAX_FLOOR_POINTS = 64  # of a path, each of which can be dragged
+MAX_DRAWN_POINTS = 64  # of a path; the user can drag each
 
 Key = Annotated[str, msgspec.Meta(min_length=1, max_length=400)]  # of a movement
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
@@ -70,13 +70,13 @@ class Travel(_Struct, frozen=True):
     """A path over the floor for an insertion, or the place where it ends.
 
     Attributes:
-        points: x and z of each point, metres: to the left and ahead of the insertion's first posture. The insertion
-            ends on the last; with several, it follows the straight lines from its first posture through all of them.
+        points: x and z of each point, metres, to the left and ahead of the insertion's first posture. It ends
+            on the last; with several, it follows the straight lines from that posture through all of them.
         facing: where the body faces at the end, degrees to the left of its first posture (of the audience, if the
             corpus's dancers face it); None for where it does anyway.
     """
 
-    points: Annotated[tuple[tuple[Metres, Metres], ...], msgspec.Meta(min_length=1, max_length=MAX_FLOOR_POINTS)]
+    points: Annotated[tuple[tuple[Metres, Metres], ...], msgspec.Meta(min_length=1, max_length=MAX_DRAWN_POINTS)]
     facing: Degrees | None = None
 
 

@@ -91,7 +91,7 @@ def routes(studio: Studio) -> list[BaseRoute]:
             return saved(studio.project.path.read_bytes(), file_name(title, "motionmind"))
         if form == "html":
             music = music_for(studio, request)
-            data = await run_in_threadpool(_page, composed(studio), music)
+            data = await run_in_threadpool(_page, composed(studio), music, studio.project.state.stage)
             return saved(data, file_name(title, form))
         if form not in makers:
             raise MotionMindError(f"cannot export as {form!r:.20}{suggestion(form, ['html', *makers])}")
@@ -110,10 +110,11 @@ def music_for(studio: Studio, request: Request) -> SetMusic | None:
     return studio.project.state.music if has_sound(studio.project.state) and is_here(request) else None
 
 
-def _page(motion: Motion, music: SetMusic | None) -> bytes:
-    """Return the page that plays a movement, with its music."""
+def _page(motion: Motion, music: SetMusic | None, stage: tuple[float, float] | None) -> bytes:
+    """Return the page that plays a movement, with its music and the edge of its stage."""
     seconds = float(motion.times[-1] - motion.times[0])
-    return page(motion, sound=sound_of(music.path, music.begins, seconds) if music else None).encode()
+    sound = sound_of(music.path, music.begins, seconds) if music else None
+    return page(motion, sound=sound, stage=stage).encode()
 
 
 def bvh(motion: Motion) -> bytes:

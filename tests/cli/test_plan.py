@@ -31,6 +31,21 @@ def test_a_plan_counts_by_music(run: Run) -> None:
     assert ">counts 1" in drawn
 
 
+def test_a_page_holds_the_edge_of_the_stage_and_films_refuse_it(run: Run) -> None:
+    done = run("render", "ballet/temps-lie", "-o", "page.html", "--stage", "1x1.5")
+    assert "ballet/temps-lie leaves the stage" in done.err
+    assert '"stage":[1.0,1.5]' in Path("page.html").read_text("utf-8")
+    Path("page.html").unlink()
+    for output, stage, words in (
+        ("film.gif", "8x6", "--stage is for the floor plan of a page"),
+        ("page.html", "0x6", "1 to 200"),
+    ):
+        done = run("render", "ballet/temps-lie", "-o", output, "--stage", stage)
+        assert done.code == 2
+        assert words in done.err
+        assert not Path(output).exists()
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

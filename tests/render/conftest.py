@@ -28,13 +28,14 @@ def show(tabs: Tabs, tmp_path: Path) -> Iterator[Callable[..., Opened]]:
         ready: str = "window.motionmind",
         script: str = "",
         sound: Sound | None = None,
+        stage: tuple[float, float] | None = None,
         **options: Any,
     ) -> Opened:
         path = tmp_path / f"{len(opened)}.html"
         if isinstance(motion, Ensemble):
             write_group_page(path, motion, sound=sound)
         else:
-            write_page(path, motion, sound=sound)
+            write_page(path, motion, sound=sound, stage=stage)
         # Few pixels: drawing in software is most of a test's time. Tests that measure pictures ask for all of them.
         usual = {"viewport": SIZE, "reduced_motion": "reduce", "device_scale_factor": 0.5}
         said: list[str] = []

@@ -233,6 +233,23 @@ def test_the_floor_plan_shows_path_and_facings_from_above(show: Callable[..., Op
     np.testing.assert_allclose([one["towards"] for one in found], towards, atol=1e-3)
 
 
+@pytest.mark.long
+def test_the_floor_plan_shows_the_edge_of_the_stage_and_all_of_it(show: Callable[..., Opened]) -> None:
+    tab = show(bridged(), stage=(6.0, 4.0), **FINE)
+    line = (141, 141, 148)  # of lines.js
+    assert near(tab.picture(), line).sum() < 20
+    tab.click("plan")
+    tab.wait("motionmind.stage.edge?.parent")
+    picture = tab.picture()
+    drawn = near(picture, line)
+    rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
+    assert 0 < rows[0] < rows[-1] < drawn.shape[0] - 1
+    assert np.ptp(columns) / np.ptp(rows) == pytest.approx(6.0 / 4.0, rel=0.05)
+    tab.click("plan")
+    tab.wait("!motionmind.stage.edge")
+    assert near(tab.picture(), line).sum() < 20
+
+
 def test_dragging_turns_the_camera_and_reset_brings_it_back(show: Callable[..., Opened]) -> None:
     tab = show(still(2))
     before = tab.get("motionmind.stage.camera.position.toArray()")

@@ -58,7 +58,8 @@ function start() {
   theme.addEventListener("change", colour);
   colour();
   const sound = motion.sound && makeSound(player, motion.sound);
-  bind(player, stage, theme, sound, refresh);
+  bind(player, stage, theme, sound, refresh, data.stage);
+  if (motion.dancers) stage.area = data.stage; // they have no plan
   const ghosts = () => ({ ends: pressed("ends"), onion: pressed("onion") ? Number($("apart").value) : 0 });
   const filming = new Filming($("film"), $("filming"), stage, player, ghosts);
 
@@ -94,7 +95,7 @@ function makeSound(player, file) {
 }
 
 /** Buttons and keys. */
-function bind(player, stage, theme, sound, refresh) {
+function bind(player, stage, theme, sound, refresh, area) {
   const switched = (id) => () => {
     $(id).setAttribute("aria-pressed", String(!pressed(id)));
     refresh();
@@ -104,7 +105,7 @@ function bind(player, stage, theme, sound, refresh) {
     for (const name of VIEWS) $(name).setAttribute("aria-pressed", String(name === view));
     refresh();
   };
-  const plan = new Plan(stage);
+  const plan = new Plan(stage, area);
   const floorPlan = () => {
     plan.shown = !plan.shown;
     $("plan").setAttribute("aria-pressed", String(plan.shown));

@@ -1,17 +1,18 @@
-/** The floor plan on the floor: the pelvis's path, and where the body faces at even times. */
+/** The floor plan on the floor: the pelvis's path, where the body faces at even times, and the edge of the stage. */
 
-import { BufferGeometry, Color, DoubleSide, Float32BufferAttribute, Group, Mesh, MeshBasicMaterial, SRGBColorSpace } from "three";
+import { Group } from "three";
+import { strips } from "motionmind/lines";
 
 const MOST = 40; // arrows, as in `motionmind plan`
-const WIDTH = 0.018; // of a line, metres, for a body 1.70 m tall
-const ARROW = 0.3; // metres, for the same body
+const ARROW = 0.3; // metres, for a body 1.70 m tall
 const BARB = 0.09;
 const [PATH, FACING] = ["#7f7f86", "#2a9463"]; // seen on light paper and on dark
 
 export class Plan {
-  /** @param {Stage} stage whose movement it draws, on its floor */
-  constructor(stage) {
+  /** @param {Stage} stage whose movement it draws, on its floor @param {[number, number]} [area] width and depth, metres */
+  constructor(stage, area) {
     this.stage = stage;
+    this.area = area;
   }
 
   /** Whether it is seen. */
@@ -25,6 +26,7 @@ export class Plan {
       this.stage.layers[0].add(this.group);
     }
     if (this.group) this.group.visible = value;
+    this.stage.area = value ? this.area : undefined;
   }
 }
 
@@ -68,23 +70,4 @@ export function facings(motion) {
 
 function place(motion, frame) {
   return [motion.root[frame * 3], motion.root[frame * 3 + 2]];
-}
-
-/** Lines over the floor, each from one place to another, as wide as WIDTH. */
-function strips(lines, size, colour) {
-  const half = 0.5 * WIDTH * size;
-  const corners = lines.flatMap(([[x, z], [toX, toZ]]) => {
-    const long = Math.hypot(toX - x, toZ - z) || 1;
-    const [acrossX, acrossZ] = [(-half * (toZ - z)) / long, (half * (toX - x)) / long];
-    const [a, b] = [[x + acrossX, 0, z + acrossZ], [x - acrossX, 0, z - acrossZ]];
-    const [c, d] = [[toX + acrossX, 0, toZ + acrossZ], [toX - acrossX, 0, toZ - acrossZ]];
-    return [a, b, c, c, b, d].flat();
-  });
-  const geometry = new BufferGeometry().setAttribute("position", new Float32BufferAttribute(corners, 3));
-  const material = new MeshBasicMaterial({ color: new Color().setStyle(colour, SRGBColorSpace), side: DoubleSide });
-  Object.assign(material, { depthTest: false, depthWrite: false, toneMapped: false });
-  const mesh = new Mesh(geometry, material);
-  mesh.renderOrder = -0.5; // on the floor, under the shadow
-  mesh.frustumCulled = false;
-  return mesh;
 }

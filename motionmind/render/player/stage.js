@@ -17,6 +17,7 @@ import {
 } from "three";
 import { OrbitControls } from "three/OrbitControls";
 import { COARSE, Figures, FINE, Marks, paperUniforms, PAPERS } from "motionmind/figure";
+import { corners, edge } from "motionmind/lines";
 import { Trails } from "motionmind/trails";
 
 const FIELD = 26; // degrees from the picture's lower edge to its upper one
@@ -43,6 +44,7 @@ const VIEWS = {
 export class Stage {
   #plain = 1; // share of the pixels along each side of what moves, without a GPU
   #late = []; // milliseconds that the last moving pictures were late
+  #area; // of the floor, [width, depth] in metres
 
   /**
    * @param {HTMLCanvasElement} canvas
@@ -92,10 +94,20 @@ export class Stage {
       this.floor = floor(this.middle, this.reach, body.size, this.papers);
       this.layers[0].add(this.floor, this.figure.shadows);
     }
+    this.area = this.#area;
     Object.assign(this.camera, { near: 0.01 * this.reach, far: 100 * this.reach });
     this.camera.updateProjectionMatrix();
     this.controls.minDistance = 0.2 * this.reach;
     this.controls.maxDistance = 30 * this.reach;
+  }
+
+  /** Draw the edge of an area of the floor around the origin, [width, depth] in metres; undefined or null for none. */
+  set area(area) {
+    this.#area = area;
+    this.edge?.removeFromParent();
+    for (const part of [this.edge?.geometry, this.edge?.material]) part?.dispose();
+    this.edge = area ? edge(area, this.body.size) : undefined;
+    if (this.edge) this.layers[0].add(this.edge);
   }
 
   /** Whether the paper is dark. */
@@ -105,15 +117,16 @@ export class Stage {
     this.renderer.setClearColor(new Color().setRGB(...colours.paper, SRGBColorSpace));
   }
 
-  /** Look from "front", "side", "top" or "quarter", so that the whole path is seen. */
+  /** Look from "front", "side", "top" or "quarter", so that the whole path is seen, from the top with all of the area. */
   look(view) {
     this.view = view;
+    const around = view === "top" && this.#area ? corners(this.#area).map(([x, z]) => new Vector3(x, 0, z)) : [];
     const towards = new Vector3(...VIEWS[view]).normalize();
     const right = new Vector3(0, 1, 0).cross(towards).normalize();
     const up = towards.clone().cross(right);
     const tall = Math.tan((FIELD * Math.PI) / 360);
     const wide = tall * this.camera.aspect;
-    const [x, y, z] = [right, up, towards].map((axis) => this.cloud.map((place) => place.dot(axis)));
+    const [x, y, z] = [right, up, towards].map((axis) => [...this.cloud, ...around].map((place) => place.dot(axis)));
     const middle = [x, y].map((values) => 0.5 * (least(values) + most(values)));
     const margin = MARGIN * this.body.size;
     const far = most(

@@ -29,6 +29,8 @@ export function stageOf(canvas, motion, changed) {
 export class Viewer extends EventTarget {
   #covered = false;
   #rests = false;
+  /** @type {number[] | undefined} */
+  #area;
   #resting = 0; // the timer that lets it rest
 
   constructor() {
@@ -114,6 +116,13 @@ export class Viewer extends EventTarget {
     if (play && !matchMedia("(prefers-reduced-motion: reduce)").matches) this.player.play();
   }
 
+  /** Draw the edge of the stage on the floor, [width, depth] in metres; undefined for none. */
+  set area(/** @type {number[] | undefined} */ area) {
+    this.#area = area;
+    for (const stage of [this.stage, this.other]) if (stage) stage.area = area;
+    this.stale();
+  }
+
   /** Draw other things besides the body. @param {Partial<Viewer["ghosts"]>} change */
   besides(change) {
     Object.assign(this.ghosts, change);
@@ -188,6 +197,7 @@ export class Viewer extends EventTarget {
       this.stale();
     });
     stage.dark = this.theme.dark;
+    stage.area = this.#area;
     return stage;
   }
 

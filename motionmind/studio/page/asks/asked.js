@@ -7,21 +7,24 @@ import { selected, wish } from "../timeline/items.js";
  * @typedef {{joint: string, place: [number, number, number], at: number}} Reach a place for a joint, metres: left of, above
  *   and ahead of the floor under the first posture; and when, seconds from it
  * @typedef {(reaches: Reach[]) => Reach[]} Change
+ * @typedef {{points: [number, number][], facing: number | null}} Travel a path, x and z of each point, as above; degrees
  * @typedef {{name: string, ask: import("../timeline/items.js").Ask, begin: number, seconds: number, place: [number, number],
- *   turn: number, locked: boolean, change: (change: Change) => unknown}} Asked `begin`, `place` and `turn` say where the
- *   insertion is in the viewer's movement
+ *   turn: number, locked: boolean, change: (change: Change) => unknown,
+ *   draw: ((travel: Travel | null) => unknown) | null, off: string}} Asked `begin`, `place` and `turn` say where the
+ *   insertion is in the viewer's movement, `off` how near it keeps to its path
  */
 
 export const MAX_REACHES = 20;
+export const MAX_POINTS = 64; // of a path
 
 /** The question in the viewer; null if there is none. @param {any} studio @returns {Asked | null} */
 export function askedOf(studio) {
   const { viewer, store } = studio;
   const desk = deskOf(studio);
   if (desk.looking) {
-    const ask = { seconds: null, passing: [], pins: [], reaches: desk.reaches };
+    const ask = { seconds: null, passing: [], pins: [], reaches: desk.reaches, travel: null };
     const change = (/** @type {Change} */ make) => desk.reach(make(desk.reaches));
-    return { name: "desk", ask, begin: 0, seconds: desk.scene.end, place: [0, 0], turn: 0, locked: false, change };
+    return { name: "desk", ask, begin: 0, seconds: desk.scene.end, place: [0, 0], turn: 0, locked: false, change, draw: null, off: "" };
   }
   const alone = viewer.isHome && viewer.motion && !viewer.motion.dancers; // of several dancers, which one would reach?
   const piece = alone && store.state?.piece;
@@ -29,14 +32,27 @@ export function askedOf(studio) {
   const part = seam?.stands && piece.parts.find((/** @type {any} */ one) => one.inserted && one.at === seam.at);
   if (!part) return null;
   const { left, right, ask, at, seconds } = seam;
-  const change = (/** @type {Change} */ make) =>
+  const edit = (/** @type {(ask: any) => any} */ make) =>
     studio.act(async () => {
       await studio.api.changed; // wishes after all earlier edits
       const now = selected(store.state.piece, { seam: [left, right] })?.seam;
-      if (now) await studio.api.edit(wish(now, { reaches: make(now.ask.reaches) }));
+      if (now) await studio.api.edit(wish(now, make(now.ask)));
     });
+  const change = (/** @type {Change} */ make) => edit(({ reaches }) => ({ reaches: make(reaches) }));
+  const draw = (/** @type {Travel | null} */ travel) => edit(() => ({ travel }));
   const { place, turn } = part;
-  return { name: `${left} ${right}`, ask, begin: at, seconds, place, turn, locked: seam.decision === "locked", change };
+  const name = `${left} ${right}`;
+  return { name, ask, begin: at, seconds, place, turn, locked: seam.decision === "locked", change, draw, off: offOf(seam) };
+}
+
+/** How near an insertion keeps to its path, in words. @param {import("../timeline/items.js").Seam} seam */
+function offOf({ state, ask, alternatives, chosen }) {
+  if (!ask.travel) return "";
+  if (state !== "inserted") return "searching";
+  const words = alternatives[chosen - 1].words.split("; ");
+  const at = words.findIndex((one) => one.startsWith("travels "));
+  const off = words[at + 1]?.endsWith(" off the path") ? `; ${words[at + 1]}` : "";
+  return at < 0 ? "" : words[at] + off;
 }
 
 /** A position of the insertion in the viewer's scene. @param {Asked} asked @param {number[]} place @returns {[number, number, number]} */

@@ -1,6 +1,7 @@
 /** The middle of the page: the viewer, its caption and views, and the transport. */
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { FloorTools } from "../asks/floor.js";
 import { Asked } from "../asks/scene.js";
 import { Pane } from "../reference/pane.js";
 import { useStore } from "../store.js";
@@ -64,7 +65,7 @@ export function View({ studio }) {
             html`<button class="button quiet" title=${words} onClick=${() => viewer.look(view)}>${name}</button>`,
         )}
       </div>
-      <${Sights} studio=${studio} /><${Asked} studio=${studio} />
+      <${Sights} studio=${studio} /><${Asked} studio=${studio} /><${FloorTools} studio=${studio} />
     </div>
     ${!studio.api.looks && html`<${Pane} studio=${studio} hidden=${!beside} />`}</div>
     <${Transport} viewer=${viewer}>

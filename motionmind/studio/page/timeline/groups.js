@@ -54,7 +54,7 @@ export function copyGroup(piece, group, window) {
 function choicesAt(seam) {
   const { left, right, ask, chosen, decision } = seam;
   const edits = [];
-  if (ask.seconds !== null || ask.passing.length + ask.pins.length > 0) edits.push(wish(seam, {}));
+  if (ask.seconds !== null || ask.travel || ask.passing.length + ask.pins.length + ask.reaches.length > 0) edits.push(wish(seam, {}));
   if (chosen > 1) edits.push({ edit: "choose", left, right, alternative: chosen });
   if (decision === "discarded") edits.push({ edit: "decide", left, right, decision });
   return edits;

@@ -5,7 +5,8 @@ import { lastBefore } from "./composed.js";
 /**
  * @typedef {{posture: string, frame: number}} Passing
  * @typedef {{joint: string, hold: "start"|"end"|"throughout"|"place", begins: number, ends: number}} Pin
- * @typedef {{seconds: number|null, passing: Passing[], pins: Pin[], reaches: import("../asks/asked.js").Reach[]}} Ask
+ * @typedef {{seconds: number|null, passing: Passing[], pins: Pin[], reaches: import("../asks/asked.js").Reach[],
+ *   travel: import("../asks/asked.js").Travel | null}} Ask
  * @typedef {{id: string, source: string, first: number, last: number, mirrored: boolean, hold: number, pace: number,
  *   repeats: number, key: string, title: string, frames: number, missing: boolean, at: number, once: number,
  *   seconds: number}} Block

@@ -201,7 +201,7 @@ function OfSeam({ does, seam, sheet }) {
       </button>`}
     <${Button}
       icon="wishes"
-      words="Wishes: duration, postures, hands and feet (W)"
+      words="Wishes: duration, postures, hands and feet, path (W)"
       pressed=${sheet}
       does=${() => does.show({ sheet: !sheet })}
       test="wishes"

@@ -2,6 +2,7 @@
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { Reaches } from "../asks/reaches.js";
+import { TravelFields } from "../asks/travel.js";
 import { countOf, timeOf } from "../music/beats.js";
 import { NumberField } from "../shell/fields.js";
 import { limbName } from "./blocks.js";
@@ -143,6 +144,11 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
       <h3>Places for hands and feet</h3>
       <${Reaches} studio=${studio} reaches=${ask.reaches} seconds=${lengthOf(seam)} locked=${locked}
         onChange=${(change) => does.wish(seam, ({ reaches }) => ({ reaches: change(reaches) }))} />
+    </div>
+    <div class="stack">
+      <h3>Path over the floor</h3>
+      <${TravelFields} travel=${ask.travel} locked=${locked}
+        onChange=${(change) => does.wish(seam, ({ travel }) => ({ travel: change(travel) }))} />
     </div>
   </section>`;
 }

@@ -3,6 +3,7 @@
 import { writeLegend } from "motionmind/legend";
 import { html, useEffect, useLayoutEffect, useRef } from "../vendor/htm-preact-standalone.js";
 import { perStudio, useChange, useKeys } from "../shell/hooks.js";
+import { StageFields, useArea } from "./area.js";
 
 const KEPT = "motionmind-sights"; // its name in the browser
 const GROUP = "Viewer";
@@ -65,6 +66,7 @@ export function Sights({ studio }) {
   const sights = sightsOf(studio);
   const { trails, onion, apart, open, colours } = useChange(sights, () => sights.now);
   const motion = useChange(studio.viewer, () => studio.viewer.motion, "show");
+  useArea(studio);
   const toggle = (/** @type {"onion" | "open" | "colours"} */ name) => sights.set({ [name]: !sights.now[name] });
   useKeys(studio, [
     ...PARTS.map((part) => ({
@@ -77,6 +79,7 @@ export function Sights({ studio }) {
     { keys: ["c"], does: "legend of the colours", group: GROUP, act: () => toggle("colours") },
   ]);
   if (!motion) return null;
+  const several = Boolean(motion.dancers); // whose trails and ghosts would hide each other
   return html`<div class="sights">
     ${colours && html`<${Legend} viewer=${studio.viewer} />`}
     ${
@@ -85,11 +88,11 @@ export function Sights({ studio }) {
         <div class="row" role="group" aria-label="Trails">
           <span class="hint">Trails</span>
           ${PARTS.map((part) =>
-            button(trails.includes(part), `trail-${part}`, capital(part), `Trails (Shift ${capital(part[0])})`, () => sights.trail(part), !motion.body.trails[part].length),
+            button(trails.includes(part), `trail-${part}`, capital(part), `Trails (Shift ${capital(part[0])})`, () => sights.trail(part), several || !motion.body.trails[part].length),
           )}
         </div>
         <div class="row">
-          ${button(onion, "onion", "Onion skin", "Frames before and after (O)", () => toggle("onion"))}
+          ${button(onion, "onion", "Onion skin", "Frames before and after (O)", () => toggle("onion"), several)}
           <select
             aria-label="Frames between two ghosts"
             value=${apart}
@@ -98,11 +101,12 @@ export function Sights({ studio }) {
             ${DISTANCES.map((frames) => html`<option value=${frames}>${frames} frame${frames === 1 ? "" : "s"} apart</option>`)}
           </select>
         </div>
+        ${!studio.api.looks && html`<${StageFields} studio=${studio} />`}
       </div>`
     }
     <div class="row">
-      <button class="button quiet" data-testid="sights" disabled=${Boolean(motion.dancers)} aria-expanded=${String(open)} aria-controls=${open ? "sights" : undefined}
-        title="Trails and onion skin" onClick=${() => toggle("open")}>Show</button>
+      <button class="button quiet" data-testid="sights" aria-expanded=${String(open)} aria-controls=${open ? "sights" : undefined}
+        title="Trails, onion skin and the stage" onClick=${() => toggle("open")}>Show</button>
       <button class="button quiet" data-testid="colours" aria-expanded=${String(colours)} title="Legend of the colours (C)"
         onClick=${() => toggle("colours")}>Colours</button>
     </div>
