@@ -26,10 +26,11 @@ from motionmind.ensemble.reading import read_ensemble
 from motionmind.errors import MotionMindError, suggestion
 from motionmind.render.group_page import dancer_data, paints
 from motionmind.studio import api
-from motionmind.studio.casting_files import MAKERS, name_in
+from motionmind.studio.casting_files import MAKERS, name_in, page
 from motionmind.studio.dancers import Cast, Change, Dancer, PutDancer, RemoveDancer, SetFormations
 from motionmind.studio.edits import Arrange, Block, Several, Single
-from motionmind.studio.export import composed, file_name, saved
+from motionmind.studio.export import composed, file_name, music_for, saved
+from motionmind.studio.music import sound_of
 from motionmind.studio.piece import State
 from motionmind.studio.project import Project, RefusedError
 from motionmind.studio.settings import MAX_TEMPO, MIN_TEMPO, SetStage, SetTempo
@@ -187,10 +188,16 @@ def routes(studio: Studio) -> list[BaseRoute]:
 
     async def export(request: Request) -> Response:
         form = request.path_params["format"]
-        if form not in MAKERS:
-            raise MotionMindError(f"cannot export an ensemble as {form!r:.20}{suggestion(form, list(MAKERS))}")
-        title = Path(file_name(studio.project.state.title, form)).stem
-        return saved(await run_in_threadpool(MAKERS[form], await ensemble_of(studio), title), name_in(title, form))
+        if form != "html" and form not in MAKERS:
+            raise MotionMindError(f"cannot export an ensemble as {form!r:.20}{suggestion(form, ['html', *MAKERS])}")
+        title, ensemble = Path(file_name(studio.project.state.title, form)).stem, await ensemble_of(studio)
+        if form == "html":
+            music = music_for(studio, request)
+            sound = await run_in_threadpool(sound_of, music.path, music.begins, ensemble.seconds) if music else None
+            data = await run_in_threadpool(page, ensemble, sound)
+        else:
+            data = await run_in_threadpool(MAKERS[form], ensemble, title)
+        return saved(data, name_in(title, form))
 
     return [
         Route("/api/ensemble", show, methods=["GET"]),

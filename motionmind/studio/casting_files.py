@@ -14,14 +14,16 @@ from motionmind.ensemble.reading import check_spots
 from motionmind.ensemble.writing import format_ensemble
 from motionmind.formats import write_motion
 from motionmind.formats.glb import write_group_glb
+from motionmind.music.sound import Sound
 from motionmind.render.group_page import write_group_page
 from motionmind.studio.export import bvh, written
 
 _OLDEST = (1980, 1, 1, 0, 0, 0)  # the date of all files in an archive: the same ensemble gives the same bytes
 
 
-def _page(ensemble: Ensemble, _: str) -> bytes:
-    return written(".html", lambda path: write_group_page(path, ensemble))
+def page(ensemble: Ensemble, sound: Sound | None) -> bytes:
+    """Return the page that plays an ensemble, with its sound."""
+    return written(".html", lambda path: write_group_page(path, ensemble, sound))
 
 
 def _glb(ensemble: Ensemble, _: str) -> bytes:
@@ -53,7 +55,7 @@ def _json(piece: Motion) -> bytes:
     return written(".json", lambda path: write_motion(path, piece))
 
 
-MAKERS: Mapping[str, Callable[[Ensemble, str], bytes]] = {"html": _page, "glb": _glb, "bvh": _bvh, "toml": _toml}
+MAKERS: Mapping[str, Callable[[Ensemble, str], bytes]] = {"glb": _glb, "bvh": _bvh, "toml": _toml}
 SINGLE_FILES = ("html", "glb")  # the others are archives
 
 

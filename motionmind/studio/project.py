@@ -19,7 +19,6 @@ from motionmind.studio.journal import DamagedError, Journal
 from motionmind.studio.movements import Movements, version_of
 from motionmind.studio.neighbours import OWN, End, Pair, Seam
 from motionmind.studio.notes import COMMENTS
-from motionmind.studio.piece import State
 from motionmind.studio.placement import Marks
 from motionmind.studio.questions import question_of
 from motionmind.studio.records import Change, Corpora, EditLine, Head, RedoLine, UndoLine, decode_line
@@ -60,8 +59,8 @@ class Project:
         self._stood: dict[Pair, tuple[tuple[End, End], Found]] = {}  # insertions from before a new request
         self._subscribers: list[Callable[[], None]] = []
         self._windows: set[str] = set()  # windows seen since the project was opened
-        self._states: list[State] = []  # before the first change, and after every `_N_CHANGES_PER_STATE` changes
-        self.state = State()
+        self._states: list[piece.State] = []  # before the first change, and after every `_N_CHANGES_PER_STATE` changes
+        self.state = piece.State()
         if journal.dropped:
             self.words.append("the last edit was lost: the studio ended while writing it")
         written = self._read()
@@ -279,7 +278,7 @@ class Project:
         mine = (one for one in reversed(self._changes) if not one.undone and one.window != COMMENTS)
         return next((one for one in mine if one.window == window or one.window not in self._windows), None)
 
-    def _without_conflict(self, change: Change, *, undone: bool) -> State:
+    def _without_conflict(self, change: Change, *, undone: bool) -> piece.State:
         """Return the state with a change undone or redone; raise RefusedError if a later one depends on it."""
         place = self._changes.index(change)
         later = [one for one in self._changes[place + 1 :] if not one.undone]
@@ -300,16 +299,16 @@ class Project:
                 raise RefusedError(f"cannot {verb} “{words}”: {why}") from error
         return state
 
-    def _switch(self, change: Change, undone: bool, state: State) -> None:
+    def _switch(self, change: Change, undone: bool, state: piece.State) -> None:
         change.undone = undone
         del self._states[self._changes.index(change) // _N_CHANGES_PER_STATE + 1 :]
         self._remember(state)
 
-    def _add(self, change: Change, state: State) -> None:
+    def _add(self, change: Change, state: piece.State) -> None:
         self._changes.append(change)
         self._remember(state)
 
-    def _remember(self, state: State) -> None:
+    def _remember(self, state: piece.State) -> None:
         """Set the state, and remember the states due after every `_N_CHANGES_PER_STATE` changes."""
         self.state = state
         while len(self._states) * _N_CHANGES_PER_STATE <= len(self._changes):
@@ -328,7 +327,7 @@ class Project:
         """Read all lines, apply the edits, and return the corpora's versions on record."""
         changes: dict[int, Change] = {}
         written: dict[str, str] = {}
-        start = State()
+        start = piece.State()
         for line in self._journal.lines():
             try:
                 record = decode_line(line.data)
@@ -336,7 +335,7 @@ class Project:
                 raise DamagedError(f"is damaged: {error}", self.path, line.number) from error
             match record:
                 case Head():
-                    start = State(title=record.title, corpus=record.corpus)
+                    start = piece.State(title=record.title, corpus=record.corpus)
                     written |= record.corpora
                 case Corpora():
                     written |= record.corpora
@@ -360,7 +359,7 @@ class Project:
         self._apply_all(start)
         return written
 
-    def _apply_all(self, state: State) -> None:
+    def _apply_all(self, state: piece.State) -> None:
         self._states = [state]
         for place, one in enumerate(self._changes, start=1):
             try:
@@ -390,7 +389,7 @@ class Project:
             self.words.append(f"{names} has changed since this piece was made: its seams will be checked again")
             self._journal.append(Corpora({name: self.versions[name] for name in changed}))
 
-    def _note_versions(self, state: State) -> None:
+    def _note_versions(self, state: piece.State) -> None:
         """Record the versions of corpora that a state uses for the first time."""
         new = {name: version_of(name, self._home) for name in sorted(corpora_of(state) - self.versions.keys())}
         if new:
