@@ -73,6 +73,10 @@ SUBJECTS = {
         "transcription.transcribe",
         "transcription.Transcription",
         "transcription.Deviation",
+        "transcription.restyle",
+        "transcription.pass_through",
+        "transcription.Restyled",
+        "transcription.Link",
     ),
     "Skeletons of your own": ("own_skeleton", "retarget.to_human23", "retarget.read_joint_mapping"),
     "States": (
@@ -102,6 +106,7 @@ SUBJECTS = {
         "plots.draw_joint_graph",
         "plots.draw_attractor",
         "plots.draw_cleaning",
+        "plots.draw_deviation",
         "plots.draw_floor_plan",
         "plots.find_overstep",
         "plots.Plate",

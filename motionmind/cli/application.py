@@ -26,6 +26,7 @@ from motionmind.cli.options import group, show_help_without_command
 from motionmind.cli.pictures import render, sheet
 from motionmind.cli.plans import plan
 from motionmind.cli.printing import Notes, Warned
+from motionmind.cli.restyles import restyle
 from motionmind.cli.reviews import review
 from motionmind.cli.scores import compose, library
 from motionmind.cli.serving import serve
@@ -56,7 +57,7 @@ def app(context: click.Context) -> None:
 
 for _command in (
     *(tween, postures, posture, convert, clean, loop, corpora, explain, credit, graph, measure, sheet, render, plan),
-    *(compose, transcribe, laban, library, vary, review, attractor, studio, serve, warm, completion),
+    *(compose, transcribe, restyle, laban, library, vary, review, attractor, studio, serve, warm, completion),
 ):
     app.add_command(_command)
 corpora.add_command(gaps)

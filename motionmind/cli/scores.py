@@ -6,9 +6,11 @@ from pathlib import Path
 
 import click
 
+from motionmind.cli import completion
 from motionmind.cli.files import MOTION_SUFFIXES, check_outputs, write_all
-from motionmind.cli.options import OUTPUT_KINDS, Section, command, option, output, outputs
+from motionmind.cli.options import HOME, OUTPUT_KINDS, Section, command, option, output, outputs
 from motionmind.cli.printing import count
+from motionmind.cli.restyles import pass_through
 from motionmind.cli.types import FILE, RATE
 from motionmind.cli.words import parse_tolerances
 from motionmind.display import displayed, displayed_path
@@ -18,12 +20,34 @@ from motionmind.render import PICTURES
 @command("motionmind compose ballet/barre.score --clip tendus -o tendus.bvh")
 @click.argument("score", type=FILE)
 @outputs(f"File to write: {OUTPUT_KINDS}.")
-@option("--fps", section=Section.OUTPUT, type=RATE, help="Frames per second  [default: a frame per posture]")
+@option(
+    "--fps",
+    section=Section.OUTPUT,
+    type=RATE,
+    help="Frames per second  [default: a frame per posture; with --corpus 30]",
+)
+@option(
+    "--corpus",
+    section=Section.CORPORA,
+    metavar="NAME",
+    shell_complete=completion.corpora,
+    help="Corpus in whose style to dance from posture to posture.",
+)
 @option("--clip", section=Section.PART, metavar="NAME", help="Clip of the score  [default: its only one]")
 @option("--posture", section=Section.PART, metavar="NAME", help="Named posture of the score, instead of a clip.")
-def compose(score: Path, outputs: tuple[Path, ...], clip: str | None, posture: str | None, fps: float | None) -> None:
+@HOME
+def compose(
+    score: Path,
+    outputs: tuple[Path, ...],
+    corpus: str | None,
+    clip: str | None,
+    posture: str | None,
+    fps: float | None,
+    home: Path | None,
+) -> None:
     """Convert a score, which is movement written as text, to a motion.
 
+    With --corpus, the movement from each posture to the next is a tween in the style of a corpus, on time.
     docs/notation.md explains the language of scores.
     """
     from motionmind.names.finding import locate_score
@@ -33,6 +57,8 @@ def compose(score: Path, outputs: tuple[Path, ...], clip: str | None, posture: s
     score = locate_score(str(score))
     if clip and posture:
         raise click.UsageError("give --clip or --posture, not both")
+    if corpus and posture:
+        raise click.UsageError("--corpus is for clips, not for a posture")
     if fps and posture:
         raise click.UsageError("--fps is for clips, not for a posture")
     check_outputs([(path, MOTION_SUFFIXES + PICTURES) for path in outputs], [score])
@@ -46,7 +72,10 @@ def compose(score: Path, outputs: tuple[Path, ...], clip: str | None, posture: s
         return
     motion = notation.compose(score, clip)
     seconds = motion.times[-1]
-    motion = motion if fps is None else motion.resample(fps)
+    if corpus:
+        motion = pass_through(motion, corpus, home, fps).motion
+    elif fps:
+        motion = motion.resample(fps)
     write_all(outputs, motion)
     click.echo(
         f"{names}: {displayed(motion.name)}, {count(len(motion), 'frame')} in {seconds:.1f} s, "

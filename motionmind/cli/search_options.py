@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, get_args
@@ -308,16 +308,17 @@ SEARCH_OPTIONS = (
 )
 
 
-def searching(*, few: bool = False) -> Callable[[_Function], _Function]:
-    """Add all options of the search to a command, with their defaults.
+def searching(*, few: bool = False, only: Collection[str] = ()) -> Callable[[_Function], _Function]:
+    """Add the options of the search to a command, with their defaults.
 
     Args:
         few: whether --help lists only the most frequent ones, for a command with many options of its own.
+        only: the fields to add options for; () for all.
     """
     defaults = {field.name: field.default for field in (*fields(TweenRequest), *fields(SearchOptions))}
 
     def decorate(function: _Function) -> _Function:
-        for row in reversed(SEARCH_OPTIONS):
+        for row in reversed([row for row in SEARCH_OPTIONS if not only or row.field in only]):
             attributes = {"is_flag": True} if row.type is bool else {"type": row.type}
             function = option(
                 row.flags,

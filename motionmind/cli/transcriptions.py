@@ -53,17 +53,33 @@ COMPARISONS = (".gif", ".mp4", ".html", ".png", ".pdf")
     is_flag=True,
     help="Write all postures in one list, without phrases.",
 )
+@option(
+    "--shortest",
+    section=Section.MOTION,
+    type=Number(0.0, 3.0),
+    default=0.0,
+    metavar="S",
+    help="Least seconds from posture to posture, even where the tolerance needs more of them.",
+)
 @option("--report", section=Section.OUTPUT, type=FILE, help="File of the deviations over time, as JSON.")
+@option(
+    "--picture",
+    section=Section.OUTPUT,
+    type=FILE,
+    help="Picture of the deviations over time, with both bodies where they are worst (.svg, .png).",
+)
 @reading
 @HOME
 def transcribe(
     source: str,
     outputs: tuple[Path, ...],
     report: Path | None,
+    picture: Path | None,
     name: str | None,
     start: int,
     end: int,
     tolerance: float,
+    shortest: float,
     tempo: float | None,
     no_repeats: bool,
     home: Path | None,
@@ -76,22 +92,28 @@ def transcribe(
     'hero.glb#Dance'. The score has the fewest postures between which every frame is followed within the tolerance.
     docs/notation.md explains the language of scores.
     """
+    from motionmind.plots import draw_deviation
     from motionmind.transcription import transcribe as to_score
 
     named = parse_movement(source, home)
-    files = [(path, (SCORE, *COMPARISONS)) for path in outputs]
-    check_outputs(files + ([(report, ())] if report else []), named.source.paths)
+    files: list[tuple[Path, tuple[str, ...]]] = [(path, (SCORE, *COMPARISONS)) for path in outputs]
+    files += [(report, ())] if report else []
+    files += [(picture, (".svg", ".png"))] if picture else []
+    check_outputs(files, named.source.paths)
     whole = read_movement(named.source, name, home, **options)
     frames = select_part(named, whole, start, end)
-    found = to_score(whole.slice(frames.start, frames.stop), tolerance, tempo=tempo, repeats=not no_repeats)
+    part = whole.slice(frames.start, frames.stop)
+    found = to_score(part, tolerance, shortest=shortest, tempo=tempo, repeats=not no_repeats)
     with all_or_none():
         for path in outputs:
             _write(path, found)
         if report:
             write_atomically(report, found.report())
+        if picture:
+            draw_deviation(found).save(picture)
     for line in _lines(found):
         click.echo(line)
-    print_written([*outputs, *([report] if report else [])])
+    print_written([path for path, _ in files])
 
 
 def _write(path: Path, found: Transcription) -> None:
@@ -119,9 +141,10 @@ def _lines(found: Transcription) -> Iterator[str]:
 
     seconds = float(found.recording.times[-1] - found.recording.times[0])
     fewest = "the fewest" if len(found.keys) == found.fewest else f"{found.fewest} are the fewest"
+    apart = f" if {found.shortest:g} s apart or more" if found.shortest else ""
     yield (
         f"{count(len(found.keys), 'posture')} in {seconds:.1f} s, {fewest} within {found.tolerance:g} degrees "
-        f"and {0.5 * found.tolerance:g} cm"
+        f"and {0.5 * found.tolerance:g} cm{apart}"
     )
     if found.repeats:
         lines = len(found.keys) - sum(each.saved for each in found.repeats)

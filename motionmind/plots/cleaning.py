@@ -16,7 +16,8 @@ from motionmind.clean.cleaning import Cleaning
 from motionmind.display import displayed
 from motionmind.plots.canvas import Plate
 from motionmind.plots.marks import Line, Mark, Words
-from motionmind.plots.symbols import TEXT_PX, TICK_PX, round_numbers
+from motionmind.plots.over_time import TimeAxis
+from motionmind.plots.symbols import TEXT_PX, TICK_PX
 from motionmind.render.palette import BRIDGED, INK, PLOT, VIOLET
 
 # Of each step, whose curves are drawn in this order; the floor moves all joints alike and is told in words.
@@ -26,7 +27,6 @@ _INKS: dict[str, tuple[Colour, str]] = {
     "feet": (VIOLET, "feet locked"),
     "filter": (PLOT.piece, "jitter filtered"),
 }
-N_POINTS = 1200  # of a curve, at most: as many as the picture has columns
 
 
 @dataclass(frozen=True)
@@ -77,14 +77,12 @@ def draw_cleaning(cleaning: Cleaning) -> Plate:
         top += _PX.panel + _PX.apart
     bottom = top - _PX.apart + 10.0
     title = f"{displayed(cleaning.original.name) or 'Movement'}: how far cleaning moved joints (mm, logarithmic)"
-    frame = [*_heading(cleaning, title), *_times(cleaning.original.times, bottom)]
+    frame = [*_heading(cleaning, title), *_axis(cleaning).marks(bottom)]
     return Plate(_PX.width, ceil(bottom + _PX.bottom), title, (*frame, *marks))
 
 
-def _x(times: Floats, at: Floats) -> Floats:
-    """Return the x of some times [N] of a movement with these `times` [T], pixels."""
-    first, last = times[[0, -1]]
-    return np.asarray(_PX.left + (at - first) / (last - first) * (_PX.width - _PX.left - _PX.right))
+def _axis(cleaning: Cleaning) -> TimeAxis:
+    return TimeAxis(cleaning.original.times, _PX.width, _PX.left, _PX.right, _PX.top)
 
 
 def _panel(
@@ -97,18 +95,12 @@ def _panel(
         y = bottom - scale * np.log1p(tick)
         yield Line(np.array([[_PX.left, y], [right, y]]), PLOT.grid, 0.8)
         yield Words((_PX.left - 8.0, y), f"{tick:g}", TICK_PX, PLOT.pale, "end")
-    times = cleaning.original.times
+    axis = _axis(cleaning)
     for step, (ink, words) in _INKS.items():
         if step in moved and moved[step].max() > 0.0:
-            at, far = _thinned(times, 1000.0 * moved[step].max(axis=1).astype(np.float64))
-            points = np.stack([_x(times, at), bottom - scale * np.log1p(far)], axis=-1)
+            at, far = axis.thinned(1000.0 * moved[step].max(axis=1).astype(np.float64))
+            points = np.stack([axis.x(at), bottom - scale * np.log1p(far)], axis=-1)
             yield Line(points, ink, 1.4, title=f"{words}: {displayed(name)}, {far.max():.1f} mm at most")
-
-
-def _thinned(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return the maximum of values [T] in each of N_POINTS stretches at most, and where each begins."""
-    starts = np.arange(0, len(values), -(-len(values) // N_POINTS))
-    return times[starts], np.maximum.reduceat(values, starts)
 
 
 def _stances(cleaning: Cleaning, joints: set[int], y: float) -> Iterator[Mark]:
@@ -116,7 +108,7 @@ def _stances(cleaning: Cleaning, joints: set[int], y: float) -> Iterator[Mark]:
     times, count = cleaning.original.times, len(cleaning.original.skeleton)
     for one in cleaning.contacts:
         if one.point % count in joints and one.point < 2 * count:
-            ends = _x(times, times[[one.first, one.last]])
+            ends = _axis(cleaning).x(times[[one.first, one.last]])
             yield Line(np.stack([ends, [y, y]], axis=-1), VIOLET if one.held else PLOT.edge, 3.0, title="foot locked")
 
 
@@ -131,13 +123,3 @@ def _heading(cleaning: Cleaning, title: str) -> Iterator[Mark]:
             x += 60.0 + 7.2 * len(words)
     floor = next((step.about for step in cleaning.steps if step.step == "floor"), "left as it is")
     yield Words((_PX.right, 84.0), f"Besides, the floor: {floor}", TEXT_PX, PLOT.pale)
-
-
-def _times(times: Floats, bottom: float) -> Iterator[Mark]:
-    """Yield the axis of time, with a faint line at each round number of seconds."""
-    ticks = round_numbers(float(times[0]), float(times[-1]))
-    for tick, x in zip(ticks.tolist(), _x(times, ticks).tolist(), strict=True):
-        yield Line(np.array([[x, _PX.top], [x, bottom]]), PLOT.grid, 0.8)
-        yield Words((x, bottom + 16.0), f"{tick:g}", TICK_PX, PLOT.pale, "middle")
-    yield Line(np.array([[_PX.left, bottom], [_PX.width - _PX.right, bottom]]), PLOT.edge, 0.8)
-    yield Words((_PX.width - _PX.right, bottom + 34.0), "seconds", TEXT_PX, PLOT.pale, "end")

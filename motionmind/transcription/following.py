@@ -7,7 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Ints
+from motionmind.arguments import check_real
+from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
+from motionmind.transcription import TOLERANCE_RANGE_DEG
 from motionmind.transcription.bones import CM_PER_DEG
 from motionmind.transcription.keys import fewest_keys
 from motionmind.transcription.recorded import Recorded
@@ -15,6 +18,17 @@ from motionmind.transcription.recorded import Recorded
 LONGEST_MOVE_S = 3.0  # between two postures; a longer hold takes several lines
 SLIDE_SHARE = 0.5  # of the tolerance, beyond which a standing foot's slip is written
 N_CHUNK = 8192  # moves that are tested together
+
+
+def check_fineness(tolerance: float, shortest: float) -> None:
+    """Check the tolerance, degrees, and the least seconds from posture to posture; MotionMindError if out of range."""
+    check_real("tolerance", tolerance)
+    check_real("shortest", shortest)
+    least, most = TOLERANCE_RANGE_DEG
+    if not least <= tolerance <= most:
+        raise MotionMindError(f"a tolerance must be from {least:g} to {most:g} degrees, not {tolerance:g}")
+    if not 0.0 <= shortest <= LONGEST_MOVE_S:
+        raise MotionMindError(f"the shortest move must take from 0 to {LONGEST_MOVE_S:g} s, not {shortest:g}")
 
 
 class Poses(NamedTuple):
@@ -40,10 +54,11 @@ class Following:
         poses: its frames as they are written.
         allowed: length of the chord between two directions of a bone that the tolerance allows [B].
         metres: allowed distance of the pelvis.
-        longest: the most frames between two postures.
+        shortest: the fewest frames between two postures.
+        longest: the most.
     """
 
-    def __init__(self, recorded: Recorded, tolerance: float) -> None:
+    def __init__(self, recorded: Recorded, tolerance: float, shortest: float = 0.0) -> None:
         self.recorded = recorded
         self.directions = recorded.bones.directions(recorded.writable)
         count = len(self.directions)
@@ -51,7 +66,8 @@ class Following:
         # In radians along the chord, for the inner loop.
         self.allowed = 2.0 * np.sin(0.5 * np.radians(recorded.bones.allowed(tolerance)))
         self.metres = 0.01 * (1.0 - SLIDE_SHARE) * CM_PER_DEG * tolerance
-        self.longest = max(1, round(LONGEST_MOVE_S * recorded.motion.fps)) if count > 1 else 1
+        fps = recorded.motion.fps if count > 1 else 1.0
+        self.shortest, self.longest = (max(1, round(seconds * fps)) for seconds in (shortest, LONGEST_MOVE_S))
 
     def fewest_keys(self, start: int, stop: int) -> Ints:
         """Return the fewest frames from `start` up to `stop`, both ends among them, between which all are followed.
@@ -64,7 +80,7 @@ class Following:
         def follows(first: Ints, last: Ints, at: Ints) -> Bools:
             return self.follows(self.poses, first + start, last + start, at + start)
 
-        return start + fewest_keys(len(part), self.longest, follows, speed)
+        return start + fewest_keys(len(part), self.longest, follows, speed, self.shortest)
 
     def follows(self, poses: Poses, first: Ints, last: Ints, at: Ints) -> Bools:
         """Return whether movement from posture `first` to posture `last` of `poses` follows frame `at`, all [N]."""

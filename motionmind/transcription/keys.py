@@ -18,25 +18,29 @@ _EARLY_SHARES = (0.5, 0.25, 0.75, 0.125, 0.375, 0.625, 0.875)  # of a step: most
 Follows = Callable[[Ints, Ints, Ints], Bools]
 
 
-def fewest_keys(count: int, longest: int, follows: Follows, dear: Floats) -> Ints:
+def fewest_keys(count: int, longest: int, follows: Follows, dear: Floats, shortest: int = 1) -> Ints:
     """Return the fewest key frames, the first and the last frame among them, between which all frames are followed.
 
-    A step from a key to the next frame always follows. Of the choices with the fewest keys, the one whose keys are
-    least dear in total is returned. Both are exact: dynamic programming over the graph of all steps.
+    A step over `shortest` frames is always allowed, as is one over fewer than twice as many to the last frame; frames
+    within it may then not be followed. Of the choices with the fewest keys, the one whose keys are least dear in total
+    is returned. Both are exact: dynamic programming over the graph of all steps.
 
     Args:
         count: number of frames, at least 1.
         longest: the most frames that a step spans.
         follows: whether a step follows a frame within it.
         dear: price of each frame as a key [count], not negative.
+        shortest: the fewest frames that a step spans, unless there are fewer in all.
     """
-    steps = _steps(count, longest, follows)
+    steps = _steps(count, longest, follows, shortest)
     # total[t]: fewest keys up to t, then the least price of these; one number, for all prices together are below 1.
     price = dear / (float(dear.sum()) + 1.0)
     total, before = np.full(count, np.inf), np.zeros(count, dtype=np.int64)
     total[0] = 1.0 + price[0]
     for t in range(1, count):
         spans = steps[t]
+        if len(spans) == 0:
+            continue
         costs = total[t - spans]
         best = int(costs.argmin())
         total[t], before[t] = costs[best] + 1.0 + price[t], t - spans[best]
@@ -46,13 +50,13 @@ def fewest_keys(count: int, longest: int, follows: Follows, dear: Floats) -> Int
     return np.array(keys[::-1])
 
 
-def _steps(count: int, longest: int, follows: Follows) -> list[Ints]:
+def _steps(count: int, longest: int, follows: Follows, shortest: int) -> list[Ints]:
     """Return, for each frame, the spans of the steps that may end there."""
+    span_range = np.arange(shortest + 1, longest + 1)
     ending: list[list[int]] = [[] for _ in range(count)]
     for first in range(0, count, N_STARTS):
         starts = np.arange(first, min(first + N_STARTS, count))
-        start = np.repeat(starts, max(longest - 1, 0))
-        span = np.tile(np.arange(2, longest + 1), len(starts))
+        start, span = np.repeat(starts, len(span_range)), np.tile(span_range, len(starts))
         inside = start + span < count
         start, span = start[inside], span[inside]
         for share in _EARLY_SHARES:
@@ -67,4 +71,6 @@ def _steps(count: int, longest: int, follows: Follows) -> list[Ints]:
             start, span = start[kept], span[kept]
         for end, one in zip((start + span).tolist(), span.tolist(), strict=True):
             ending[end].append(one)
-    return [np.array([1, *spans]) for spans in ending]
+    always = [[shortest] if end >= shortest else [] for end in range(count)]
+    always[-1] = list(range(min(shortest, count - 1), min(2 * shortest, count)))
+    return [np.array([*first, *spans], dtype=np.int64) for first, spans in zip(always, ending, strict=True)]

@@ -44,6 +44,14 @@ class Recorded:
     root: Floats
 
 
+def to_even_human23(motion: Motion) -> Motion:
+    """Return a recording on human23 with its own proportions, at an even rate of at most `MAX_RATE_FPS`."""
+    moved = to_human23(motion)
+    if len(moved) > 1 and (moved.keyframed or not moved.is_even or moved.fps > MAX_RATE_FPS):
+        moved = moved.resample(MAX_RATE_FPS)
+    return moved
+
+
 def prepare(motion: Motion, tolerance: float) -> Recorded:
     """Prepare a recording of a person for transcription.
 
@@ -63,9 +71,7 @@ def prepare(motion: Motion, tolerance: float) -> Recorded:
             f"{motion.name or 'the recording'} lasts {motion.times[-1] - motion.times[0]:.0f} s, and a transcription "
             f"at most {MAX_RECORDING_S:g} s; choose a part"
         )
-    moved, body = to_human23(motion), anatomy_named("human23")
-    if len(moved) > 1 and (moved.keyframed or not moved.is_even or moved.fps > MAX_RATE_FPS):
-        moved = moved.resample(MAX_RATE_FPS)
+    moved, body = to_even_human23(motion), anatomy_named("human23")
     root = moved.root * (body.skeleton.height / moved.skeleton.height)
     moved = replace(moved, skeleton=body.skeleton, root=root)
     stands = np.zeros((len(moved), 2), dtype=np.bool_)

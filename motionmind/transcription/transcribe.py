@@ -19,9 +19,8 @@ from motionmind.ensemble.dancers import Dancer, Ensemble
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import compose
-from motionmind.transcription import TOLERANCE_RANGE_DEG
 from motionmind.transcription.bones import CM_PER_DEG, deviations
-from motionmind.transcription.following import SLIDE_SHARE, Following
+from motionmind.transcription.following import SLIDE_SHARE, Following, check_fineness
 from motionmind.transcription.moves import Move, counts_of
 from motionmind.transcription.recorded import Recorded, prepare
 from motionmind.transcription.repeats import Repeat, find_repeats, models_of
@@ -51,6 +50,7 @@ class Transcription:
     Attributes:
         text: the score.
         tolerance: the deviation between its postures that was allowed, degrees.
+        shortest: the least time from posture to posture, seconds.
         keys: its postures' frames in `recording` [K].
         fewest: the fewest postures that follow the recording; `keys` can be more, to write takes of a phrase alike.
         repeats: its phrases, with the rows that call them; row k is the posture of `keys[k]`.
@@ -61,6 +61,7 @@ class Transcription:
 
     text: str
     tolerance: float
+    shortest: float
     keys: Ints
     fewest: int
     repeats: list[Repeat]
@@ -89,7 +90,13 @@ class Transcription:
 
 
 def transcribe(
-    motion: Motion, tolerance: float = 6.0, *, tempo: float | None = None, name: str = "", repeats: bool = True
+    motion: Motion,
+    tolerance: float = 6.0,
+    *,
+    shortest: float = 0.0,
+    tempo: float | None = None,
+    name: str = "",
+    repeats: bool = True,
 ) -> Transcription:
     """Transcribe a recording into a score.
 
@@ -103,12 +110,15 @@ def transcribe(
         tolerance: greatest deviation of a bone's direction, degrees; the pelvis may be off by half as many centimetres,
             and the ends of short bones, too. The deviation of the postures themselves, as a score can write them, comes
             on top (`Deviation.unwritten`).
+        shortest: least seconds from posture to posture, at most 3; where movement cannot be followed within the
+            tolerance for so long, it is not followed.
         tempo: counts per minute; None for counts of one second.
         name: name of the score's clip; "" for the motion's.
         repeats: whether phrases that recur become phrases of the score.
 
     Raises:
-        MotionMindError: the tolerance or the tempo is out of range, or the recording lasts more than 10 minutes.
+        MotionMindError: the tolerance, the time or the tempo is out of range, or the recording lasts more than 10
+            minutes.
         SkeletonError: the movement is not of a person.
 
     >>> import numpy as np
@@ -120,28 +130,26 @@ def transcribe(
     2
     """
     check_type("motion", motion, Motion)
-    check_real("tolerance", tolerance)
     check_real("tempo", tempo, or_none=True)
     check_text("name", name)
     check_flag("repeats", repeats)
-    least, most = TOLERANCE_RANGE_DEG
-    if not least <= tolerance <= most:
-        raise MotionMindError(f"a tolerance must be from {least:g} to {most:g} degrees, not {tolerance:g}")
+    check_fineness(tolerance, shortest)
     counts = 60.0 if tempo is None else tempo  # a count is a second where no tempo is known
     if not 1.0 <= counts <= 6000.0:
         raise MotionMindError(f"a tempo must be from 1 to 6000 counts per minute, not {counts:g}")
     recorded = prepare(motion, tolerance)
-    following = Following(recorded, tolerance)
+    following = Following(recorded, tolerance, shortest)
     fewest = following.fewest_keys(0, len(recorded.root))
     choices = [(recorded, fewest)]
-    if repeats and (phrases := choose_phrases(find_takes(following, fewest), fewest, len(recorded.root))):
+    matched = repeats and not shortest  # takes are matched at frames of their own, which may be nearer to each other
+    if matched and (phrases := choose_phrases(find_takes(following, fewest), fewest, len(recorded.root))):
         choices.append(match_takes(following, fewest, phrases, tolerance))
     clip, title = _clip_name(name or motion.name), _title(motion.name)
     drafts = [_draft(*choice, tolerance, counts, clip, title, repeats) for choice in choices]
     keys, found, text = min(drafts, key=lambda draft: len(draft.keys) - sum(each.saved for each in draft.repeats))
     composed = _compose(text)
     deviation = _deviation(recorded, composed)
-    return Transcription(text, tolerance, keys, len(fewest), found, recorded.motion, composed, deviation)
+    return Transcription(text, tolerance, shortest, keys, len(fewest), found, recorded.motion, composed, deviation)
 
 
 class _Draft(NamedTuple):

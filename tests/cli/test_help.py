@@ -68,6 +68,7 @@ def test_there_are_the_commands_that_the_documents_name() -> None:
             "plan",
             "transcribe",
             "laban",
+            "restyle",
             "corpus",
             "corpus build",
             "corpus add",
@@ -168,7 +169,7 @@ def test_the_examples_run_outside_a_checkout(run: Run) -> None:
     write_motion("new/jump.bvh", ballet_clip("jump").resample(30.0))
     run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "-o", "tween.json", "--report", "report.json")
     run("vary", "ballet/jump", "-o", "variation.json")
-    assert len(EXAMPLES) == 37
+    assert len(EXAMPLES) == 38
     in_readme = {line.strip() for line in README.read_text("utf-8").splitlines() if line.startswith("    motionmind ")}
     for line in EXAMPLES:
         if line.startswith(("motionmind serve", "motionmind studio")):  # which do not end

@@ -25,12 +25,15 @@ class Table:
         assert np.all((start < at) & (at < end))
         return np.asarray(self.followed[start, end, at])
 
-    def follows(self, start: int, end: int, longest: int) -> bool:
-        if end - start == 1:
+    def follows(self, start: int, end: int, longest: int, shortest: int) -> bool:
+        """Whether a step from one key to another is allowed."""
+        last = len(self.dear) - 1
+        if end - start == min(shortest, last) or (end == last and shortest <= end - start < 2 * shortest):
             return True
-        return end - start <= longest and bool(self.followed[start, end, start + 1 : end].all())
+        followed = bool(self.followed[start, end, start + 1 : end].all())
+        return shortest <= end - start <= longest and followed
 
-    def best(self, longest: int) -> tuple[int, float]:
+    def best(self, longest: int, shortest: int) -> tuple[int, float]:
         """The fewest keys, and their least price, by trying all choices."""
         count = len(self.dear)
         choices = [
@@ -39,20 +42,26 @@ class Table:
         return min(
             (len(keys), float(self.dear[keys].sum()))
             for keys in choices
-            if all(self.follows(a, b, longest) for a, b in pairwise(keys))
+            if all(self.follows(a, b, longest, shortest) for a, b in pairwise(keys))
         )
 
 
 @settings(max_examples=150, deadline=None)
-@given(st.integers(2, 9), st.sampled_from([0.3, 0.8, 0.95, 1.0]), st.integers(1, 8), st.integers(0, 10**6))
-def test_no_choice_of_keys_is_better(count: int, share: float, longest: int, seed: int) -> None:
+@given(
+    st.integers(2, 9),
+    st.sampled_from([0.3, 0.8, 0.95, 1.0]),
+    st.integers(1, 8),
+    st.sampled_from([1, 1, 2, 3, 5]),
+    st.integers(0, 10**6),
+)
+def test_no_choice_of_keys_is_better(count: int, share: float, longest: int, shortest: int, seed: int) -> None:
     table = Table(count, share, seed)
-    keys = fewest_keys(count, longest, table, table.dear)
+    keys = fewest_keys(count, longest, table, table.dear, shortest)
     assert keys[0] == 0
     assert keys[-1] == count - 1
     assert np.all(np.diff(keys) > 0)
-    assert all(table.follows(a, b, longest) for a, b in pairwise(keys))
-    fewest, least = table.best(longest)
+    assert all(table.follows(a, b, longest, shortest) for a, b in pairwise(keys))
+    fewest, least = table.best(longest, shortest)
     assert len(keys) == fewest
     assert table.dear[keys].sum() == pytest.approx(least, abs=1e-9)
 
