@@ -11,7 +11,6 @@ import click
 
 from motionmind.cli.ensembles import is_ensemble, open_ensemble, write_ensemble, write_steps
 from motionmind.cli.files import check_outputs, note_licences, numbered
-from motionmind.cli.postures import read_end
 from motionmind.cli.printing import Interruption, print_tween, print_written
 from motionmind.cli.search_options import request_options
 from motionmind.cli.types import known_corpora
@@ -19,7 +18,7 @@ from motionmind.cli.warming import preparing
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.files import all_or_none, name_of
-from motionmind.names.spelling import PostureName, Source
+from motionmind.names.spelling import PostureName, Source, is_file
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
@@ -50,8 +49,8 @@ def are_duets(ends: Sequence[PostureName], duets: Sequence[Path]) -> bool:
 
 
 def _is_ensemble(source: Source) -> bool:
-    is_file = source.kind == "file" and not source.name and Path(source.place).is_file()
-    return is_file and is_ensemble(source.place, (), ())
+    known = source.kind == "file" and not source.name and is_file(source.place)
+    return known and is_ensemble(source.place, (), ())
 
 
 def tween_duets(
@@ -82,6 +81,7 @@ def tween_duets(
             f"Missing option '--corpus': duet postures are in files. Corpora: {known_corpora(home)}",
             click.get_current_context(),
         )
+    from motionmind.cli.postures import read_end
     from motionmind.corpus.store import locate
     from motionmind.duets.tweening import tween_duet
     from motionmind.formats import read_motion
