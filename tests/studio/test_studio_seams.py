@@ -186,7 +186,7 @@ def test_smoothing_is_stopped_and_goes_on(studio_server):
     assert still == [seam["state"] for seam in stopped["seams"]]
     assert "abrupt" in still
     studio_server.post("/api/seams", {})
-    wait_for(studio_server, lambda states: not {"abrupt", "waiting"} & set(states))
+    wait_for(studio_server, lambda states: not {"abrupt", "waiting"} & set(states), 240.0)
 
 
 def test_the_newest_seam_is_smoothed_first(studio_server):

@@ -27,9 +27,9 @@ def studio_server(tmp_path: Path) -> Iterator[Served]:
 
 
 @pytest.fixture
-def page(studio_page: Any) -> Any:
+def page(studio_server: Served, studio_page: Any) -> Any:
     """A page with that piece, all of which is seen and can be played; no search changes it meanwhile."""
-    studio_page.evaluate("studio.api.delete('/api/seams')")
+    studio_server.send("DELETE", "/api/seams")
     wait_for(
         studio_page, "piece.blocks.length === 3 && Math.abs(studio.viewer.player.motion.end - piece.seconds) < 0.01"
     )
