@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from motionmind.cli.ensembles import is_ensemble, open_ensemble, write_ensemble, write_steps
+from motionmind.cli.ensembles import describe_ensemble, is_ensemble, open_ensemble, write_ensemble, write_steps
 from motionmind.cli.files import check_outputs, note_licences, numbered
 from motionmind.cli.printing import Interruption, print_tween, print_written
 from motionmind.cli.search_options import request_options
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from motionmind.ensemble.dancers import Ensemble
 
 DUETS = (".toml", ".html", ".glb", ".bvh")  # what a duet becomes
-_WITHOUT = (
+_UNSUPPORTED = (
     *("program", "rig", "report", "details", "problem", "alternatives", "is_loop", "what_if"),
     *("reach", "via", "music", "offset", "asf"),
 )
@@ -84,6 +85,7 @@ def tween_duets(
     from motionmind.cli.postures import read_end
     from motionmind.corpus.store import locate
     from motionmind.duets.tweening import tween_duet
+    from motionmind.ensemble.dancers import Dancer, Ensemble
     from motionmind.formats import read_motion
     from motionmind.formats.floor_path import read_floor_path
     from motionmind.tween.engine import Engine
@@ -114,8 +116,12 @@ def tween_duets(
                 watch=interruption.watch,
                 **request,
             )
-    written = _write(result, outputs, [dancer.name for dancer in ensembles[ends[0].source.place].dancers])
-    _print(result, written)
+    places = [(float(one.root[0, 0]), float(one.root[0, 2])) for one in result.motions]
+    names = [dancer.name for dancer in ensembles[ends[0].source.place].dancers]
+    couple = Ensemble("", tuple(map(Dancer, names, result.motions, places)))
+    written = _write(result, couple, outputs)
+    _print(result, couple, written)
+    interruption.finish()
 
 
 def _given(body: Motion, _: Path | str) -> Motion:
@@ -125,7 +131,7 @@ def _given(body: Motion, _: Path | str) -> Motion:
 def _open(file: str, outputs: Sequence[Path], home: Path | None, reading: dict[str, Any]) -> Ensemble:
     """Read an ensemble of two dancers."""
     options = {name: value for name, value in reading.items() if name != "asf"}
-    ensemble = open_ensemble(file, outputs, DUETS, home, _WITHOUT, _nothing, **options, asf=None)
+    ensemble = open_ensemble(file, outputs, DUETS, home, _UNSUPPORTED, lambda _: _written(outputs), **options, asf=None)
     if len(ensemble.dancers) != 2:
         raise MotionMindError(f"{displayed(file)}: a duet has two dancers, not {len(ensemble.dancers)}")
     one, other = (dancer.piece.skeleton for dancer in ensemble.dancers)
@@ -133,10 +139,6 @@ def _open(file: str, outputs: Sequence[Path], home: Path | None, reading: dict[s
         names = " and ".join(displayed(dancer.name) for dancer in ensemble.dancers)
         raise MotionMindError(f"{displayed(file)}: {names} have different joints: {difference}")
     return ensemble
-
-
-def _nothing(_: int) -> Sequence[Path]:
-    return ()
 
 
 def _bodies(ensemble: Ensemble) -> tuple[Motion, Motion]:
@@ -161,18 +163,15 @@ def _own_files(path: Path) -> list[Path]:
     return [numbered(path.with_suffix(suffix), number, 2) for number in (1, 2)]
 
 
-def _write(result: DuetTween, outputs: Sequence[Path], names: Sequence[str]) -> list[Path]:
+def _write(result: DuetTween, couple: Ensemble, outputs: Sequence[Path]) -> list[Path]:
     """Write a duet to all outputs, or to none if one fails; return the files."""
-    from motionmind.ensemble.dancers import Dancer, Ensemble
     from motionmind.formats.bvh import write_bvh
     from motionmind.formats.glb import write_group_glb
     from motionmind.render.group_page import write_group_page
 
-    places = [(float(one.root[0, 0]), float(one.root[0, 2])) for one in result.motions]
-    dancers = tuple(map(Dancer, names, result.motions, places))
     with all_or_none():
         for path in outputs:
-            ensemble = Ensemble(name_of(path), dancers)
+            ensemble = replace(couple, name=name_of(path))
             for motion in result.motions:
                 note_licences(path, motion)
             match path.suffix.lower():
@@ -188,7 +187,7 @@ def _write(result: DuetTween, outputs: Sequence[Path], names: Sequence[str]) -> 
     return _written(outputs)
 
 
-def _print(result: DuetTween, files: Sequence[Path]) -> None:
+def _print(result: DuetTween, couple: Ensemble, files: Sequence[Path]) -> None:
     """Print both tweens, and how the couple keeps together."""
     near, far = result.distances
     learned = "" if result.usual is None else f"; {result.usual[0]:.2f} to {result.usual[1]:.2f} m in the duets"
@@ -203,4 +202,6 @@ def _print(result: DuetTween, files: Sequence[Path]) -> None:
     )
     if result.usual is not None:
         click.echo(f"relations {100.0 * result.path.attested:.0f}% of their moves occur in the duets")
+    for line in describe_ensemble(couple)[1:]:
+        click.echo(line)
     print_written(files)

@@ -16,11 +16,11 @@ import click
 from motionmind.cli import completion
 from motionmind.cli.files import check_outputs
 from motionmind.cli.options import HOME, JSON, Section, command, given_option, option, reading
-from motionmind.cli.printing import count
+from motionmind.cli.printing import count, note
 from motionmind.cli.sources import parse_movement, read_movements, read_part, select_part, spelled
 from motionmind.cli.types import FILE, POSITIVE, known_corpora
 from motionmind.display import displayed, displayed_path
-from motionmind.errors import MotionMindError
+from motionmind.errors import MotionMindError, enumerated
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
@@ -99,6 +99,8 @@ def measure(
         raise click.UsageError(f"{given} only for --csv FILE", context)
     if effort and everything:
         raise click.UsageError("--effort and --all exclude each other: --all has the figures of --effort, too", context)
+    if effort and as_json:
+        raise click.UsageError("--effort and --json exclude each other: --json has all figures", context)
     _compare(sources[0], corpus, report, everything, effort, as_json, home, options)
 
 
@@ -152,20 +154,29 @@ def _write_efforts(
     table: Path, sources: Sequence[str], window: float | None, home: Path | None, options: Mapping[str, Any]
 ) -> None:
     """Write the effort of all clips of all sources as a CSV table, and say so; a cell is empty where undefined."""
+    from motionmind.body.contact import CONTACT_FPS
     from motionmind.files import write_atomically
-    from motionmind.metrics.effort import EFFORT, measure_effort
+    from motionmind.metrics.effort import EFFORT, least_duration, measure_effort
 
     named = [parse_movement(source, home) for source in sources]
     check_outputs([(table, (".csv",))], [path for one in named for path in one.source.paths])
     text, n_rows = io.StringIO(), 0
     writer = csv.DictWriter(text, ["clip", "start", "end", *EFFORT], lineterminator="\n")
     writer.writeheader()
+    least, short = least_duration(window), list[str]()
     for name, motion in _clips(named, home, options):
+        if motion.times[-1] - motion.times[0] < least - 0.5 / CONTACT_FPS:
+            short.append(displayed(name))
+            continue
         for row in measure_effort(replace(motion, name=name), window=window):
             cells = {key: "" if math.isnan(value) else f"{value:.6g}" for key, value in row.items()}
             writer.writerow({"clip": name, **cells})
             n_rows += 1
+    if not n_rows:
+        raise MotionMindError(f"no clip lasts {least:.2f} s: {enumerated(short)}")
     write_atomically(table, text.getvalue().encode())
+    if short:
+        note(f"left out, shorter than {least:.2f} s: {enumerated(short)}")
     click.echo(f"wrote {displayed_path(table)}: {count(n_rows, 'row')}, {count(len(EFFORT), 'figure')} each")
 
 

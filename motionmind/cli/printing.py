@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
+from motionmind.cli.exits import ExitCode
 from motionmind.cli.noted import Noted
 from motionmind.display import displayed, displayed_path, one_line
 from motionmind.errors import MotionMindWarning, enumerated
@@ -113,6 +114,11 @@ class Interruption:
         self._stage = f"transition {done + 1} of {of}: "
         if sys.stderr.isatty():
             click.echo(f"\r\x1b[2K{self._stage}", err=True, nl=False)
+
+    def finish(self) -> None:
+        """Exit with code 130 if Ctrl-C was pressed; called when the result is written and printed."""
+        if self.is_requested:
+            click.get_current_context().exit(ExitCode.INTERRUPTED)
 
     def _request(self, *_: object) -> None:
         self.is_requested = True

@@ -11,7 +11,6 @@ import click
 
 from motionmind.cli import completion
 from motionmind.cli.delivery import Delivery, check_delivery, for_program, on_rig, rig_files
-from motionmind.cli.exits import ExitCode
 from motionmind.cli.files import MOTION_SUFFIXES, check_outputs, read_mapping
 from motionmind.cli.options import HOME, OUTPUT_KINDS, Section, command, option, outputs, reading
 from motionmind.cli.pictures import CLIP, FIRST, LAST
@@ -23,6 +22,7 @@ from motionmind.cli.warming import preparing
 from motionmind.display import displayed
 from motionmind.files import all_or_none, write_atomically
 from motionmind.render import PICTURES
+from motionmind.transcription import LONGEST_MOVE_S, TOLERANCE_RANGE_DEG
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from motionmind.names.spelling import PostureName
     from motionmind.transcription import Restyled
 
-_OF_SEARCH = ("novelty", "liveliness", "strict", "bridge_price", "guide")
+_SEARCH_FIELDS = ("novelty", "liveliness", "strict", "bridge_price", "guide")
 
 
 @command("motionmind restyle ballet/plies --corpus karate --to 8 -o plies-in-karate.bvh")
@@ -55,7 +55,7 @@ _OF_SEARCH = ("novelty", "liveliness", "strict", "bridge_price", "guide")
 @option(
     "--shortest",
     section=Section.MOTION,
-    type=Number(0.0, 3.0),
+    type=Number(0.0, LONGEST_MOVE_S),
     default=0.5,
     metavar="S",
     help="Least seconds from a kept posture to the next; a longer time leaves more to the corpus.",
@@ -63,12 +63,12 @@ _OF_SEARCH = ("novelty", "liveliness", "strict", "bridge_price", "guide")
 @option(
     "--tolerance",
     section=Section.MOTION,
-    type=Number(1.0, 90.0),
+    type=Number(*TOLERANCE_RANGE_DEG),
     default=12.0,
     metavar="DEGREES",
     help="Deviation of a bone's direction between kept postures joined evenly; a greater one keeps fewer of them.",
 )
-@searching(only=_OF_SEARCH)
+@searching(only=_SEARCH_FIELDS)
 @reading
 @HOME
 def restyle(
@@ -97,7 +97,7 @@ def restyle(
     from motionmind.transcription import restyle as to_style
     from motionmind.tween.engine import Engine
 
-    searched = {field: options.pop(field) for field in _OF_SEARCH}
+    searched = {field: options.pop(field) for field in _SEARCH_FIELDS}
     named = parse_movement(source, home)
     files = [(path, MOTION_SUFFIXES + PICTURES) for path in outputs]
     check_outputs(files + ([(report, ())] if report else []), [*named.source.paths, *rig_files(rig)])
@@ -126,12 +126,15 @@ def restyle(
     print_restyled(found, displayed(engine.corpus.name))
     print_written([*outputs, *([report] if report else [])])
     delivery.print(outputs)
-    if interruption.is_requested:
-        click.get_current_context().exit(ExitCode.INTERRUPTED)
+    interruption.finish()
 
 
-def pass_through(postures: Motion, corpus: str, home: Path | None, fps: float | None) -> Restyled:
-    """Return movement through postures at their times, in the style of a corpus, and print what is kept."""
+def pass_through(postures: Motion, corpus: str, home: Path | None, fps: float | None) -> tuple[Restyled, Interruption]:
+    """Find movement through postures at their times, in the style of a corpus, and print what is kept.
+
+    Returns:
+        The movement, and the context in which Ctrl-C ended the search.
+    """
     from motionmind.transcription import pass_through as found_through
     from motionmind.tween.engine import Engine
     from motionmind.tween.request import TweenRequest
@@ -144,7 +147,7 @@ def pass_through(postures: Motion, corpus: str, home: Path | None, fps: float | 
                 postures, engine, request, watch=interruption.watch, on_progress=interruption.on_progress
             )
     print_restyled(found, displayed(engine.corpus.name))
-    return found
+    return found, interruption
 
 
 def print_restyled(found: Restyled, corpus: str) -> None:
@@ -159,10 +162,10 @@ def _lines(found: Restyled, corpus: str) -> Iterator[str]:
     off, most = np.percentile(found.centimetres, [95.0, 100.0])
     yield (
         f"kept      {count(len(found.keys), 'posture')} in {found.motion.times[-1]:.1f} s, at their times; pelvis "
-        f"{off:.0f} cm off its path in 95 % of frames at most, {most:.0f} in all"
+        f"within {off:.0f} cm of its path in 95 % of frames, {most:.0f} cm at most"
     )
     half, off = np.percentile(found.degrees, [50.0, 95.0])
-    yield f"between   {half:.1f} degrees a joint off in half of the frames at most, {off:.1f} in 95 %"
+    yield f"between   joints within {half:.1f} degrees on average in half of the frames, {off:.1f} in 95 %"
     words = {
         "attested": ("{:.0%}", f"of the joints' transitions in {corpus}"),
         "slide": ("{:.2f}", "cm a frame of feet near the floor"),
@@ -177,7 +180,7 @@ def _lines(found: Restyled, corpus: str) -> Iterator[str]:
     if parts:
         part, _ = parts.most_common(1)[0]
         number = f"{parts.total()} of {count(len(found.links), 'tween')}"
-        yield f"faster    {number} than anything in {corpus}, mostly {displayed(part)}"
+        yield f"faster    {number} are faster than anything in {corpus}, mostly the {displayed(part.replace('_', ' '))}"
 
 
 def _find_rig(

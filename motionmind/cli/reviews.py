@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli import completion
-from motionmind.cli.exits import ExitCode
 from motionmind.cli.files import check_outputs
 from motionmind.cli.options import HOME, JSON, Section, command, given_option, option, output
 from motionmind.cli.printing import Interruption, count, note, print_written
@@ -159,8 +158,7 @@ def review(
     files += [sheet] if sheet else []
     if files and not as_json:
         print_written(files)
-    if interruption.is_requested:
-        context.exit(ExitCode.INTERRUPTED)
+    interruption.finish()
 
 
 def _check_pairs(

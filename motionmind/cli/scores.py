@@ -47,7 +47,9 @@ def compose(
 ) -> None:
     """Convert a score, which is movement written as text, to a motion.
 
-    With --corpus, the movement from each posture to the next is a tween in the style of a corpus, on time.
+    With --corpus, the movement from each posture to the next is a tween in the style of a corpus, on time. Ctrl-C ends
+    the search: the command writes the best movement found, and exits with code 130.
+
     docs/notation.md explains the language of scores.
     """
     from motionmind.names.finding import locate_score
@@ -73,7 +75,8 @@ def compose(
     motion = notation.compose(score, clip)
     seconds = motion.times[-1]
     if corpus:
-        motion = pass_through(motion, corpus, home, fps).motion
+        danced, interruption = pass_through(motion, corpus, home, fps)
+        motion = danced.motion
     elif fps:
         motion = motion.resample(fps)
     write_all(outputs, motion)
@@ -81,6 +84,8 @@ def compose(
         f"{names}: {displayed(motion.name)}, {count(len(motion), 'frame')} in {seconds:.1f} s, "
         f"{displayed(motion.skeleton.name)}"
     )
+    if corpus:
+        interruption.finish()
 
 
 @command("motionmind library karate/kata.score -o mine.toml --tolerance 12 --tolerance hip=8")

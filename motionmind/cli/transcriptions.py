@@ -16,7 +16,7 @@ from motionmind.cli.printing import count, print_written
 from motionmind.cli.sources import parse_movement, read_movement, select_part
 from motionmind.cli.types import FILE, Number
 from motionmind.files import all_or_none, write_atomically
-from motionmind.transcription import TOLERANCE_RANGE_DEG
+from motionmind.transcription import LONGEST_MOVE_S, TOLERANCE_RANGE_DEG
 from motionmind.tween.counts import TEMPO_RANGE_BPM
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ COMPARISONS = (".gif", ".mp4", ".html", ".png", ".pdf")
 @option(
     "--shortest",
     section=Section.MOTION,
-    type=Number(0.0, 3.0),
+    type=Number(0.0, LONGEST_MOVE_S),
     default=0.0,
     metavar="S",
     help="Least seconds from posture to posture, even where the tolerance needs more of them.",
@@ -152,8 +152,8 @@ def _lines(found: Transcription) -> Iterator[str]:
         yield f"{count(len(found.repeats), 'phrase')} danced {calls} times: {lines} lines"
     for part, values in found.deviation.degrees.items():
         off, most = np.percentile(values, [95.0, 100.0])
-        line = f"{part:6} {off:3.0f} degrees off in 95 % of frames at most, {most:.0f} in all"
+        line = f"{part:6} within {off:3.0f} degrees in 95 % of frames, {most:.0f} at most"
         cannot = max(found.deviation.unwritten[part])
         yield line + (f"; up to {cannot:.0f} cannot be written" if cannot > 0.5 * found.tolerance else "")
     off, most = np.percentile(found.deviation.centimetres, [95.0, 100.0])
-    yield f"pelvis {off:3.0f} cm off in 95 % of frames at most, {most:.0f} in all"
+    yield f"pelvis within {off:3.0f} cm in 95 % of frames, {most:.0f} at most"

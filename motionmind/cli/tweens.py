@@ -16,7 +16,6 @@ import click
 from motionmind.cli import completion
 from motionmind.cli.delivery import Delivery, check_delivery, find_rig, for_program, on_rig, rig_files, takes_delivery
 from motionmind.cli.duets import are_duets, tween_duets
-from motionmind.cli.exits import ExitCode
 from motionmind.cli.files import MOTION_SUFFIXES, check_outputs, numbered
 from motionmind.cli.music import in_seconds, read_counts, sound_of_counts, with_music
 from motionmind.cli.options import HOME, OUTPUT_KINDS, Section, command, option, outputs, reading
@@ -220,8 +219,7 @@ def tween(
     else:
         _print(results, written, are_alternatives=alternatives is not None, details=details)
         delivery.print(outputs)
-    if interruption.is_requested:
-        click.get_current_context().exit(ExitCode.INTERRUPTED)
+    interruption.finish()
 
 
 def _print(results: list[Tween], written: list[Path], *, are_alternatives: bool, details: bool) -> None:

@@ -323,8 +323,7 @@ def vary(
     if not as_json:
         print_written([path for path, _ in files])
     note_overstep(source, variation.motion(), arguments["stage"], may_turn=variation.piece.facing == "free")
-    if interruption.is_requested:
-        context.exit(ExitCode.INTERRUPTED)
+    interruption.finish()
 
 
 @command("motionmind attractor --of variation.json -o attractor.png")

@@ -75,17 +75,20 @@ def measure_effort(motion: Motion, *, window: float | None = None) -> list[dict[
     name = motion.name or "the movement"
     sampled = at_rate(motion)
     steps = len(sampled) - 1 if window is None else round(window * CONTACT_FPS)
-    least = max(steps + 1, MIN_EFFORT_FRAMES)
-    if len(sampled) < least:
-        raise MotionMindError(
-            f"{name} is too short: {len(sampled)} frames at {CONTACT_FPS:g} a second, and effort needs {least}"
-        )
+    if steps < MIN_EFFORT_FRAMES - 1 or steps > len(sampled) - 1:
+        seconds = (len(sampled) - 1) / CONTACT_FPS
+        raise MotionMindError(f"{name} lasts {seconds:.2f} s, and effort needs {least_duration(window):.2f} s")
     rows = []
     for start in range(0, len(sampled) - steps, steps):
         part = sampled.slice(start, start + steps + 1)
         times = part.times - motion.times[0]
         rows.append({"start": float(times[0]), "end": float(times[-1])} | effort_of(part))
     return rows
+
+
+def least_duration(window: float | None) -> float:
+    """Return how long a movement must last to have a row, seconds."""
+    return max((MIN_EFFORT_FRAMES - 1) / CONTACT_FPS, round((window or 0.0) * CONTACT_FPS) / CONTACT_FPS)
 
 
 def effort_of(motion: Motion) -> dict[str, float]:

@@ -161,10 +161,10 @@ def measure(motion: Motion, learned: LearnedCorpus, path: States | None = None) 
     check_type("path", path, np.ndarray, wanted="an array of states", or_none=True)
     corpus = learned.corpus
     motion = _map_to(corpus.skeleton, motion)
-    step = 1.0 / corpus.rate if corpus.rate else usual(learned.grammar.transitions)
+    step = usual_step(learned)
     sampled = at_rate(motion)
     if path is None:
-        path = _assign_states(motion, learned, step)
+        path = assign_states(motion, learned)
     elif path.ndim != 2 or path.shape[1] != len(corpus.chains):
         raise MotionMindError(f"a path through {corpus.name} has {len(corpus.chains)} chains, not {path.shape[1:]}")
     if len(sampled) < _MIN_FRAMES or len(path) < 2:
@@ -205,11 +205,18 @@ def _map_to(skeleton: Skeleton, motion: Motion) -> Motion:
     return motion
 
 
-def _assign_states(motion: Motion, learned: LearnedCorpus, step: float) -> States:
+def usual_step(learned: LearnedCorpus) -> float:
+    """Return the usual time between two postures of a corpus, seconds."""
+    rate = learned.corpus.rate
+    return 1.0 / rate if rate else usual(learned.grammar.transitions)
+
+
+def assign_states(motion: Motion, learned: LearnedCorpus) -> States:
     """Return the states of a movement [T + 1, L].
 
-    They are those at the times of the engine's moves, at the keyframes of keyed movement, else every `step` seconds.
+    They are those at the times of the engine's moves, at the keyframes of keyed movement, else at the corpus's rate.
     """
+    step = usual_step(learned)
     whole = [one for one in motion.insertions if one.times[0] <= motion.times[0] and one.times[-1] >= motion.times[-1]]
     postures = motion
     if whole:
@@ -232,11 +239,19 @@ def _measure_motion(motion: Motion, style: Styles | None, fastest: Floats) -> di
         out["style"] = float(style.distances(rotations)[0])
     lowest = find_floor(body, rotations, root, heels=True)
     out |= zip(MEASURES, summarise_shown(motion, fastest, lowest).tolist(), strict=True)
-    if body.height >= 1.0 and find_feet(body):  # metres: the limits of skating are for people
-        floor = find_floor(body, rotations, root)
-        out["skating"] = skating(body, rotations, root, floor)
-        out["slide"] = foot_slide(body, rotations, root, floor)
-    return out | effort_of(motion)
+    return out | measure_feet(motion) | effort_of(motion)
+
+
+def measure_feet(motion: Motion) -> dict[str, float]:
+    """Return how feet skate and slide in movement at 30 frames a second; nothing for other bodies than people's."""
+    body, rotations, root = motion.skeleton, motion.rotations, motion.root
+    if body.height < 1.0 or not find_feet(body):  # metres: the limits of skating are for people
+        return {}
+    floor = find_floor(body, rotations, root)
+    return {
+        "skating": skating(body, rotations, root, floor),
+        "slide": foot_slide(body, rotations, root, floor),
+    }
 
 
 def _measure_path(

@@ -33,6 +33,8 @@ from motionmind.notation.sources import place_of
 
 MAX_INCLUDES = 100  # scores included by one
 MAX_OPEN_WORDS = 20  # of a phrase
+RESERVED_NAMES = (*SIDES, "neutral")
+LINE_WORDS = ("start", "tempo", "sound")  # with which other lines begin, so that no phrase may have these names
 
 NAME = re.compile(r"[^\W_][\w-]*")
 
@@ -236,7 +238,7 @@ def _add_phrase(score: Score, word: str, rest: str, inner: list[Line], where: Wh
     name = name.strip()
     known = score.phrases.get(name)
     _check_name(name, (name,) if known and known.score is score else (), where)
-    if name in ("start", "tempo", "sound") or name[0].isdigit():
+    if name in LINE_WORDS or name[0].isdigit():
         raise where.error(f"{quoted(name)} cannot be a phrase's name: such lines have another meaning")
     lines, sound = _split_sound(inner) if word == "clip" else (inner, "")
     if not lines:
@@ -280,7 +282,7 @@ def _check_name(name: str, taken: Container[str], where: Where) -> str:
     """Return a new name; FormatError if it is malformed, reserved or taken."""
     if not NAME.fullmatch(name):
         raise where.error(f"{quoted(name)} cannot be a name: use letters, digits and hyphens")
-    if name in (*SIDES, "neutral"):
+    if name in RESERVED_NAMES:
         raise where.error(f"{quoted(name)} cannot be a name: it is reserved")
     if name in taken:
         raise where.error(f"{quoted(name)} is already defined")

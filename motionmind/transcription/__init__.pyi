@@ -7,5 +7,6 @@ from .transcribe import Transcription as Transcription
 from .transcribe import transcribe as transcribe
 
 TOLERANCE_RANGE_DEG: tuple[float, float]
+LONGEST_MOVE_S: float
 
 __all__ = ["Deviation", "Link", "Restyled", "Transcription", "pass_through", "restyle", "transcribe"]

@@ -10,12 +10,11 @@ from motionmind._typing import Bools, Floats, Ints
 from motionmind.arguments import check_real
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
-from motionmind.transcription import TOLERANCE_RANGE_DEG
+from motionmind.transcription import LONGEST_MOVE_S, TOLERANCE_RANGE_DEG
 from motionmind.transcription.bones import CM_PER_DEG
 from motionmind.transcription.keys import fewest_keys
 from motionmind.transcription.recorded import Recorded
 
-LONGEST_MOVE_S = 3.0  # between two postures; a longer hold takes several lines
 SLIDE_SHARE = 0.5  # of the tolerance, beyond which a standing foot's slip is written
 N_CHUNK = 8192  # moves that are tested together
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from motionmind._typing import Ints
 
+MAX_ROWS = 2_000  # in which phrases are sought: at worst 6 s
 MAX_OPEN_MOVES = 20  # that a call gives, as many as a score's phrase may have open words
 
 
@@ -71,8 +72,10 @@ def find_repeats(rows: Rows) -> list[Repeat]:
 
     Each phrase saves the most rows of all phrases in the rows that no earlier one calls; this is exact. Phrases are
     chosen one after another, since the best set of phrases is NP-hard to find (Charikar et al., "The smallest grammar
-    problem", 2005).
+    problem", 2005). More than `MAX_ROWS` rows have no phrases.
     """
+    if len(rows.cells) > MAX_ROWS:
+        return []
     cells, found = rows.cells.copy(), list[Repeat]()
     while best := best_repeat(rows._replace(cells=cells)):
         found.append(best)

@@ -17,15 +17,14 @@ import numpy as np
 
 from motionmind._typing import Floats, Ints
 from motionmind.arguments import check_function, check_type
-from motionmind.body.contact import find_feet, find_floor, foot_slide, skating
 from motionmind.body.motion import Motion
 from motionmind.body.plausibility import at_rate
 from motionmind.body.rates import FILM_FPS
 from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
 from motionmind.geometry import rotations as rot
+from motionmind.metrics.figures import assign_states, measure_feet
 from motionmind.metrics.paths import attested_share
 from motionmind.search.solve import Status, Watch
-from motionmind.synthesis.timeline import usual
 from motionmind.transcription.following import Following, check_fineness
 from motionmind.transcription.recorded import prepare, to_even_human23
 from motionmind.tween.engine import Engine
@@ -275,13 +274,5 @@ def _figures(source: Motion, motion: Motion, engine: Engine) -> dict[str, tuple[
 
 def measured(motion: Motion, engine: Engine) -> dict[str, float]:
     """Return measures of movement as `motionmind.metrics.measure` takes them, without the corpus's range."""
-    corpus, grammar = engine.corpus, engine.grammar
-    step = 1.0 / corpus.rate if corpus.rate else usual(grammar.transitions)
-    path = engine.space.assign(corpus.to_chains(motion.resample(1.0 / step).rotations))
-    out = {"attested": attested_share(path, grammar)}
-    if find_feet(motion.skeleton):
-        sampled = at_rate(motion)
-        body, rotations, root = sampled.skeleton, sampled.rotations, sampled.root
-        floor = find_floor(body, rotations, root)
-        out |= {"slide": foot_slide(body, rotations, root, floor), "skating": skating(body, rotations, root, floor)}
-    return out
+    attested = attested_share(assign_states(motion, engine), engine.grammar)
+    return {"attested": attested} | measure_feet(at_rate(motion))

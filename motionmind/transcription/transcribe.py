@@ -19,6 +19,7 @@ from motionmind.ensemble.dancers import Dancer, Ensemble
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import compose
+from motionmind.notation.read import LINE_WORDS, RESERVED_NAMES
 from motionmind.transcription.bones import CM_PER_DEG, deviations
 from motionmind.transcription.following import SLIDE_SHARE, Following, check_fineness
 from motionmind.transcription.moves import Move, counts_of
@@ -114,7 +115,7 @@ def transcribe(
             tolerance for so long, it is not followed.
         tempo: counts per minute; None for counts of one second.
         name: name of the score's clip; "" for the motion's.
-        repeats: whether phrases that recur become phrases of the score.
+        repeats: whether phrases that recur become phrases of the score, if it has up to 2,000 postures.
 
     Raises:
         MotionMindError: the tolerance, the time or the tempo is out of range, or the recording lasts more than 10
@@ -174,7 +175,8 @@ def _draft(
 def _clip_name(name: str) -> str:
     """Return a name that a score allows, from a motion's."""
     word = "".join(one if one.isalnum() else "-" for one in Path(name).name).strip("-")
-    return word if word and not word[0].isdigit() else f"clip-{word}".rstrip("-")
+    is_free = word and not word[0].isdigit() and word not in (*LINE_WORDS, *RESERVED_NAMES)
+    return word if is_free else f"clip-{word}".rstrip("-")
 
 
 def _title(name: str) -> str:

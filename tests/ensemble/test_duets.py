@@ -145,6 +145,17 @@ def test_what_is_no_duet_is_one_line(duo: Path, run: Run, words: tuple[str, ...]
     assert not list(Path().glob("t*"))
 
 
+def test_pieces_of_a_duet_are_not_overwritten(duo: Path, run: Run) -> None:
+    assert run(*TWEEN, "--duration", "1", "-o", "pas.toml").code == 0
+    before = Path("pas-1.json").read_bytes()
+    ran = run("tween", "pas.toml@0", "pas.toml@9", "--corpus", "ballet", "-o", "pas.toml")
+    assert ran.code == 2, ran
+    Path("others.toml").write_bytes(Path("pas.toml").read_bytes())
+    ran = run("tween", "others.toml@0", "others.toml@9", "--corpus", "ballet", "-o", "pas.toml")
+    assert (ran.code, "pas-1.json" in ran.err) == (2, True), ran
+    assert Path("pas-1.json").read_bytes() == before
+
+
 def test_duets_need_a_corpus(duo: Path, run: Run) -> None:
     ran = run(*TWEEN[:3])
     assert ran.code == 2

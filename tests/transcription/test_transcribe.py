@@ -66,6 +66,12 @@ def test_between_postures_every_bone_stays_within_the_tolerance(tolerance: float
     assert np.abs(played.root + apart - prepared.root).max() <= 0.005 * tolerance + 0.01
 
 
+@pytest.mark.parametrize("name", ["sound", "start", "tempo", "left", "neutral", "3rd", "###"])
+def test_any_name_gives_a_score_that_is_read(name: str) -> None:
+    found = transcribe(recorded().slice(0, 5), 12.0, name=name)
+    assert len(found.motion) > 1
+
+
 def test_a_wider_tolerance_needs_fewer_postures() -> None:
     counts = [len(transcribe(recorded(), tolerance).keys) for tolerance in (3.0, 8.0, 20.0)]
     assert counts == sorted(counts, reverse=True)
