@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import msgspec
+
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.studio.dancers import Dancer, PutDancer
+from motionmind.studio.edit_words import words_of
 from motionmind.studio.edits import Arrange, Block, Edit, Insert, SavePosture, Trim, Wish, each
 from motionmind.studio.neighbours import OWN, key_of
 from motionmind.studio.piece import State
@@ -44,6 +47,23 @@ def check_movements(state: State, edit: Edit, frames: Callable[[str], int]) -> N
                 raise MotionMindError(
                     f"{displayed(block.source)} has no frame {block.last}: its frames are 0 to {count - 1}"
                 )
+
+
+def check_bounds(edit: Edit) -> None:
+    """Check that an edit can be read again from the project's file, as edits made by this process are not checked.
+
+    Raises:
+        MotionMindError: a value is out of range, or of the wrong type.
+    """
+    for one in (*each(edit), edit):
+        try:
+            msgspec.json.decode(msgspec.json.encode(one), type=Edit)
+        except ValueError as error:  # msgspec's errors are ValueErrors
+            words, _, where = str(error).replace("`float`", "a number").partition(" - at `$.")
+            place = f"{where.rstrip('`')}: " if where else ""
+            raise MotionMindError(
+                f"cannot {displayed(words_of(one))}: {place}{words[:1].lower()}{words[1:]}"
+            ) from error
 
 
 def check_names(edit: Edit) -> None:

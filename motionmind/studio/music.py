@@ -78,7 +78,8 @@ def find_sound(path: str) -> LocalFile:
     """Return the sound file at a path; raise MotionMindError if there is none."""
     file = find_file(path, "song.mp3", _type_of)
     if not file.type or file.path.suffix.lower() not in SOUND_SUFFIXES:
-        raise MotionMindError(f"{displayed_path(file.path)}: is no sound: give {', '.join(SOUND_SUFFIXES)}")
+        *most, last = SOUND_SUFFIXES
+        raise MotionMindError(f"{displayed_path(file.path)}: not a sound file: use {', '.join(most)} or {last}")
     return file
 
 
@@ -119,6 +120,8 @@ def routes(studio: Studio) -> list[BaseRoute]:
             """Make a file the piece's music, or replace the beats of the one that is."""
             state = studio.project.state
             is_same = path == state.music.path
+            if is_same and state.music.beats and not heard.times:
+                raise MotionMindError("no beats were found near this tempo; yours are kept")
             begins = state.music.begins if is_same else heard.times[heard.first] if heard.times else 0.0
             tempo = min(max(heard.tempo or state.tempo, MIN_TEMPO), MAX_TEMPO)
             chosen = SetMusic(path, begins, heard.times, heard.first)
@@ -131,7 +134,7 @@ def routes(studio: Studio) -> list[BaseRoute]:
         if not is_here(request):
             return api.error(_NOT_HERE, 403)
         if not has_sound(studio.project.state):
-            return api.error("the piece has no music that sounds", 404)
+            return api.error("the piece has no sound, only beats", 404)
         try:
             sound = find_sound(studio.project.state.music.path)
         except MotionMindError as error:

@@ -11,7 +11,7 @@ from typing import Self
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError, enumerated
 from motionmind.studio import piece
-from motionmind.studio.checks import check_movements, check_names, corpora_of, missing_in
+from motionmind.studio.checks import check_bounds, check_movements, check_names, corpora_of, missing_in
 from motionmind.studio.edit_words import words_of
 from motionmind.studio.edits import Edit, Wish, touched
 from motionmind.studio.findings import Finding, Found
@@ -205,6 +205,7 @@ class Project:
         """
         self.greet(window)
         try:
+            check_bounds(edit)
             check_names(edit)
             state = piece.apply(self.state, edit)
             check_movements(state, edit, self.marks.length)
@@ -212,11 +213,9 @@ class Project:
             raise RefusedError(str(error)) from error
         self._note_versions(state)
         line = self._journal.append(EditLine(edit, self.sequence, window))
-        asked: tuple[Seam, ...] = ()
+        asked = self.state.seams if isinstance(edit, SetCorpus) else ()
         if isinstance(edit, Wish):
             asked = (self.state.seam(edit.left, edit.right),)
-        elif isinstance(edit, SetCorpus):
-            asked = self.state.seams
         for seam in asked:
             if found := chosen_at(seam, self.finding(seam)):
                 self._stood[seam.pair] = seam.ends, found

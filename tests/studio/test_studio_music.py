@@ -98,6 +98,25 @@ def test_sound_without_beats_is_taken(studio_server: Served, tmp_path: Path) -> 
     assert (state["music"]["beats"], state["tempo"]) == ([], 120.0)
 
 
+def test_beats_are_kept_if_none_are_found_anew(studio_server: Served, tmp_path: Path) -> None:
+    path = tmp_path / "silence.wav"
+    path.write_bytes(Sound(np.zeros((44_100, 1), np.float32), 44_100).encode("WAV"))
+    music = choose(studio_server, path)["music"] | {"beats": [0.1, 0.6, 1.1]}  # tapped
+    before = studio_server.edit(edit="music", **music)
+    job = studio_server.wait_for(studio_server.post("/api/music", {"window": "w1", "path": str(path)})["job"])
+    assert (job["state"], job["words"]) == ("failed", "no beats were found near this tempo; yours are kept")
+    assert studio_server.project()["music"] == music
+    assert studio_server.project()["sequence"] == before["sequence"]
+
+
+def test_beats_in_milliseconds_are_refused(studio_server: Served, tmp_path: Path) -> None:
+    (tmp_path / "beats.txt").write_text("\n".join(str(500 * number) for number in range(1, 100)))
+    job = studio_server.post("/api/music", {"window": "w1", "path": str(tmp_path / "beats.txt")})["job"]
+    done = studio_server.wait_for(job)
+    assert done["state"] == "failed"
+    assert "beats[72]: expected a number <= 36000.0" in done["words"]
+
+
 def test_what_is_no_music_is_refused_in_a_line(studio_server: Served, tmp_path: Path) -> None:
     (tmp_path / "notes.wav").write_text("hunter2, hunter2, hunter2")
     (tmp_path / "cut.flac").write_bytes(b"fLaC\0\0")

@@ -10,11 +10,12 @@ from studio_server import Served
 
 from motionmind.errors import MotionMindError
 from motionmind.studio import piece
-from motionmind.studio.edits import Decide, Delete, Insert, Mirror, Move, Trim
+from motionmind.studio.dancers import Change, Dancer, PutDancer, SetFormations
+from motionmind.studio.edits import Decide, Delete, Edit, Insert, Mirror, Move, Several, Trim
 from motionmind.studio.findings import Finding, Found
 from motionmind.studio.journal import OpenElsewhereError
 from motionmind.studio.project import Project, RefusedError
-from motionmind.studio.settings import SetCorpus
+from motionmind.studio.settings import SetCorpus, SetMusic, SetTempo
 from motionmind.studio.view import chosen_at
 
 Make = Callable[..., Project]
@@ -48,6 +49,36 @@ def test_a_project_opens_as_it_was_closed(make_project: Make) -> None:
     for _ in range(3):
         again.redo("w1")
     assert len(again.state.blocks) == 40
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        (
+            SetMusic("/beats.txt", 0.0, (500.0, 41_000.0)),
+            "cannot change the music: beats[1]: expected a number <= 36000.0",
+        ),
+        (SetMusic(begins=float("nan")), "cannot change the music: begins: expected a number"),
+        (
+            Several((SetTempo(90.0), PutDancer(Dancer("d1", "Anna", entry=118_001.0)))),
+            "cannot change the dancer Anna: dancer.entry: expected a number <= 100000.0",
+        ),
+        (
+            SetFormations((Change(1.0, 0.0, "line"),)),
+            "cannot change the formations: changes[0].counts: expected a number > 0.0",
+        ),
+    ],
+)
+def test_an_edit_that_the_file_cannot_hold_is_refused_and_loses_nothing(
+    make_project: Make, edit: Edit, words: str
+) -> None:
+    project = make_project()
+    with pytest.raises(RefusedError) as refused:
+        project.edit("w1", edit)
+    assert str(refused.value).startswith(words)
+    project.edit("w1", block(1))
+    project.close()
+    assert make_project().state == project.state
 
 
 def test_undo_takes_back_this_windows_edit_and_no_other(make_project: Make) -> None:
