@@ -13,8 +13,7 @@ from motionmind.ensemble.dancers import Dancer, Way
 
 def whereabouts(dancers: Sequence[Dancer], seconds: float) -> Floats:
     """Return the places x, z [N, 2] of dancers at a time, metres."""
-    times = np.array([seconds])
-    return np.array([dancer.at(times).root[0, [0, 2]] for dancer in dancers])
+    return np.array([dancer.where(seconds) for dancer in dancers])
 
 
 def assigned(places: Floats, new: Floats) -> Floats:

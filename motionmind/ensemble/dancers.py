@@ -88,13 +88,26 @@ class Dancer:
         placed = self.placed()
         own, frames = np.unique(placed.times[0] + self.own(times), return_inverse=True)
         danced = placed.at(own)
-        root = danced.root[frames]
-        for way in self.ways:
-            share = smoothstep((times - way.start) / (way.end - way.start))
-            root += share[:, None] * [way.shift[0], 0.0, way.shift[1]]
+        root = danced.root[frames] + self._carried(times)
         insertions = tuple(replace(one, times=self.clock(one.times - placed.times[0])) for one in placed.insertions)
         rotations = danced.rotations[frames]
         return replace(danced, rotations=rotations, root=root, times=times, insertions=insertions)
+
+    def where(self, seconds: float) -> Floats:
+        """Return the place of the root at a time of the ensemble, x and z [2], metres."""
+        times = np.array([seconds])
+        begin = self.piece.times[0]
+        sampled = self.piece.at(np.unique([begin, begin + self.own(times)[0]]))  # a place is relative to the first
+        short = replace(self, piece=replace(sampled, insertions=()))
+        return np.asarray(short.placed().root[-1, [0, 2]] + self._carried(times)[0, [0, 2]])
+
+    def _carried(self, times: Floats) -> Floats:
+        """Return how far its ways have carried the dancer at times [T], metres [T, 3]."""
+        carried = np.zeros((len(times), 3))
+        for way in self.ways:
+            share = smoothstep((times - way.start) / (way.end - way.start))
+            carried += share[:, None] * [way.shift[0], 0.0, way.shift[1]]
+        return carried
 
     def placed(self) -> Motion:
         """Return the piece at the dancer's place, turned and mirrored, on a clock that begins with its entry."""
@@ -134,12 +147,20 @@ class Ensemble:
         """Time until the last dancer comes to rest, seconds."""
         return max(dancer.end for dancer in self.dancers)
 
+    @property
+    def rate(self) -> float:
+        """Frames a second: the greatest rate of a piece, from 25 on."""
+        return max(LEAST_RATE_HZ, *(dancer.piece.fps for dancer in self.dancers if len(dancer.piece) > 1), 0.0)
+
+    def count_frames(self, fps: float | None = None) -> int:
+        """Return the number of frames, by default at `rate`; however many, two at least."""
+        return max(1, round(self.seconds * (fps or self.rate))) + 1
+
     def times(self, fps: float | None = None) -> Floats:
-        """Return the frames' times [T], seconds, by default at the greatest rate of a piece, from 25 on."""
-        rate = fps or max(LEAST_RATE_HZ, *(dancer.piece.fps for dancer in self.dancers if len(dancer.piece) > 1), 0.0)
-        steps = max(1, round(self.seconds * rate))
-        check_size(len(self.dancers) * (steps + 1.0), len(self.dancers[0].piece.skeleton), self.name)
-        return np.arange(steps + 1) / rate
+        """Return the frames' times [T], seconds, by default at `rate`; MotionMindError if there are too many."""
+        count = self.count_frames(fps)
+        check_size(len(self.dancers) * float(count), len(self.dancers[0].piece.skeleton), self.name)
+        return np.arange(count) / (fps or self.rate)
 
     def motions(self, times: Floats | None = None) -> list[Motion]:
         """Return each dancer's movement on one clock: before the entry and after the end it stands still."""

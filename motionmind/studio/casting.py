@@ -16,6 +16,7 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from motionmind.body.motion import Motion
+from motionmind.body.rates import MAX_POSITIONS
 from motionmind.clip_names import split_clip
 from motionmind.display import displayed
 from motionmind.ensemble import NEAR_M, dancers
@@ -161,7 +162,11 @@ async def ensemble_of(studio: Studio) -> Ensemble:
     state = studio.project.state
     if not state.cast.dancers:
         raise MotionMindError("the piece has no dancers: add one first")
-    return await run_in_threadpool(staged, state.cast, composed(studio), studio.movements.get, state.tempo, state.stage)
+
+    def stage() -> Ensemble:
+        return staged(state.cast, composed(studio), studio.movements.get, state.tempo, state.stage)
+
+    return await run_in_threadpool(stage)
 
 
 def routes(studio: Studio) -> list[BaseRoute]:
@@ -209,19 +214,24 @@ def routes(studio: Studio) -> list[BaseRoute]:
 
 def _view(ensemble: Ensemble, cast: Cast) -> dict[str, Any]:
     """Return an ensemble as the page plays it, with the data of group_page and the dancers' ids."""
-    times = ensemble.times()
     own = [
         dancer_data(number, one)
         | {"id": member.id, "source": member.source, "mirrored": member.mirrored}
         | {"end": one.end}
         for number, (one, member) in enumerate(zip(ensemble.dancers, cast.dancers, strict=True))
     ]
-    rate = 1.0 / float(times[1] - times[0])
-    return {"dancers": own, "paints": paints(len(own)), "frames": len(times), "rate": rate, "seconds": ensemble.seconds}
+    times = {"frames": ensemble.count_frames(), "rate": ensemble.rate, "seconds": ensemble.seconds}
+    return {"dancers": own, "paints": paints(len(own)), **times}
 
 
 def _near(ensemble: Ensemble) -> list[dict[str, Any]]:
-    """Return the pairs of dancers who come nearer than an arm's length, closest first, and when."""
+    """Return the pairs of dancers who come nearer than an arm's length, closest first, and when.
+
+    Long pieces of many dancers are sampled at the rate at which they can be made at once.
+    """
+    joints = len(ensemble.dancers) * len(ensemble.dancers[0].piece.skeleton)
+    most = (MAX_POSITIONS / joints - 2.0) / max(ensemble.seconds, 1.0)
+    motions = ensemble.motions(ensemble.times(min(ensemble.rate, most)))
     return [
         {
             "names": one.names,
@@ -229,7 +239,7 @@ def _near(ensemble: Ensemble) -> list[dict[str, Any]]:
             "seconds": one.seconds,
             "count": seconds_to_count(one.seconds, ensemble.tempo or State().tempo),
         }
-        for one in find_approaches(ensemble.motions())
+        for one in find_approaches(motions)
         if one.metres < NEAR_M
     ]
 

@@ -7,9 +7,10 @@ from math import hypot
 from typing import Annotated, Literal, NamedTuple, TypeAlias
 
 import msgspec
+from msgspec.structs import replace
 
 from motionmind.display import displayed
-from motionmind.ensemble.reading import MAX_CHANGES, MAX_DANCERS, SAME_SPOT_M, SPACING_M
+from motionmind.ensemble.reading import MAX_CHANGES, MAX_DANCERS, SAME_SPOT_M, SLACK_COUNTS, SPACING_M
 from motionmind.errors import MotionMindError
 
 DancerId = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.-]{1,40}\Z")]
@@ -73,7 +74,7 @@ class PutDancer(_Edit, frozen=True, tag="dancer"):
 
 
 class RemoveDancer(_Edit, frozen=True, tag="dismiss"):
-    """Remove a dancer."""
+    """Remove a dancer and its places in changes of formation; without dancers, there are no changes."""
 
     dancer: DancerId
 
@@ -118,11 +119,12 @@ def recast(cast: Cast, edit: CastEdit) -> Cast:
         case RemoveDancer(name):
             if all(one.id != name for one in cast.dancers):
                 raise MotionMindError("this dancer is no longer there")
-            return cast._replace(dancers=tuple(one for one in cast.dancers if one.id != name))
+            left = tuple(one for one in cast.dancers if one.id != name)
+            return Cast(left, tuple(_without(name, change) for change in cast.changes) if left else ())
         case SetFormations(changes):
             last = 1.0
             for number, change in enumerate(changes, start=1):
-                if change.at < last:
+                if change.at < last - SLACK_COUNTS:
                     raise MotionMindError(
                         f"change {number} of formation begins at count {change.at:g}, before the last one has ended, "
                         f"at {last:g}"
@@ -157,6 +159,11 @@ def cast_differences(before: Cast, now: Cast) -> list[str]:
     count = sum(old.get(name) != new.get(name) for name in {*old, *new})
     words = [f"{count} dancer{'s' * (count != 1)} changed"] * bool(count)
     return words + ["formations changed"] * (before[1:] != now[1:])
+
+
+def _without(dancer: str, change: Change) -> Change:
+    """Return a change of formation without the place of a dancer."""
+    return replace(change, places={name: place for name, place in change.places.items() if name != dancer})
 
 
 def _checked(dancers: tuple[Dancer, ...]) -> tuple[Dancer, ...]:

@@ -149,6 +149,7 @@ class Movements:
         self._kept: dict[str, tuple[str, int, int]] = {}  # title, first byte and length of its line
         self._held: OrderedDict[str, Motion] = OrderedDict()
         self._size = 0
+        self._holding = Lock()  # several threads may ask
         self._collections: dict[str, _Corpus] = {}
         self.saved: Callable[[str], str] = _no_posture
 
@@ -162,9 +163,10 @@ class Movements:
 
     def get(self, key: str) -> Motion:
         """Return the movement of a key; raise MotionMindError if there is none."""
-        if (known := self._held.get(key)) is not None:
-            self._held.move_to_end(key)
-            return known
+        with self._holding:
+            if (known := self._held.get(key)) is not None:
+                self._held.move_to_end(key)
+                return known
         if key.lstrip(MIRRORED).startswith(OWN):  # not cached: the name may be saved anew
             motion = self.get(self.saved(key.lstrip(MIRRORED).partition("/")[2]))
             return mirrored(motion) if key.startswith(MIRRORED) else motion
@@ -222,8 +224,9 @@ class Movements:
     def forget(self, corpus: str) -> None:
         """Drop cached data of a corpus that has changed."""
         self._collections.pop(corpus, None)
-        for key in [key for key in self._held if key.lstrip(MIRRORED).startswith(f"{corpus}/")]:
-            self._size -= _bytes(self._held.pop(key))
+        with self._holding:
+            for key in [key for key in self._held if key.lstrip(MIRRORED).startswith(f"{corpus}/")]:
+                self._size -= _bytes(self._held.pop(key))
 
     def _read(self, key: str) -> Motion:
         title, start, length = self._kept[key]
@@ -250,10 +253,13 @@ class Movements:
         return self._collections[name]
 
     def _hold(self, key: str, motion: Motion) -> None:
-        self._held[key] = motion
-        self._size += _bytes(motion)
-        while self._size > 64 * 2**20 and len(self._held) > 1:
-            self._size -= _bytes(self._held.popitem(last=False)[1])
+        with self._holding:
+            if (known := self._held.pop(key, None)) is not None:  # another thread was faster
+                self._size -= _bytes(known)
+            self._held[key] = motion
+            self._size += _bytes(motion)
+            while self._size > 64 * 2**20 and len(self._held) > 1:
+                self._size -= _bytes(self._held.popitem(last=False)[1])
 
 
 class _Corpus:

@@ -123,12 +123,13 @@ class Marks:
 
     def _count(self, key: str) -> int:
         """Return the number of frames of a movement; 0 if there is none."""
-        if key not in self._lengths:
+        if (known := self._lengths.get(key)) is None:
             try:
-                self._lengths[key] = len(self._movement(key))
+                known = len(self._movement(key))
             except MotionMindError:
-                self._lengths[key] = 0
-        return self._lengths[key]
+                known = 0
+            self._lengths[key] = known
+        return known
 
     def step(self, key: str, frame: int) -> float:
         """Return the seconds from a frame to the next one; the last frame lasts as long as the one before it."""

@@ -182,6 +182,15 @@ def test_pieces_are_stretched_to_the_tempo(tmp_path: Path) -> None:
 CHANGE = 'piece = "p"\ntempo = 60\ncanon = 2\nspacing = 1.6\n' + 6 * "[[dancer]]\n"
 
 
+def test_a_change_may_begin_as_the_last_one_ends_up_to_rounding(tmp_path: Path) -> None:
+    change = '[[change]]\nat = {}\ncounts = 0.1\nformation = "line"\n'
+    assert 1.1 + 0.1 > 1.2
+    text = 'piece = "ballet/plies"\ntempo = 60\n[[dancer]]\n[[dancer]]\n'
+    assert len(read_text(tmp_path, text + change.format(1.1) + change.format(1.2)).dancers[0].ways) == 2
+    with pytest.raises(FormatError, match="change 2 begins at count 1.19, before the last one has ended at 1.2"):
+        read_text(tmp_path, text + change.format(1.1) + change.format(1.19))
+
+
 def test_a_change_ends_in_its_formation_and_the_piece_waits(tmp_path: Path) -> None:
     plain = read_text(tmp_path, CHANGE)
     changed = read_text(tmp_path, CHANGE + '[[change]]\nat = 6\ncounts = 4\nformation = "circle"\nspacing = 1.8\n')

@@ -7,8 +7,10 @@ import json
 import zipfile
 from math import degrees
 from pathlib import Path
+from threading import Barrier, Thread
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,6 +18,7 @@ from hypothesis import strategies as st
 from studio_server import Served, running, serving
 
 from motionmind import read_motion
+from motionmind.body.rates import MAX_POSITIONS
 from motionmind.ensemble.dancers import Ensemble
 from motionmind.ensemble.reading import read_ensemble
 from motionmind.errors import MotionMindError
@@ -140,6 +143,36 @@ def test_an_edit_that_cannot_be_is_refused_in_one_line(edit: Any, words: str) ->
         recast(Cast((Dancer("d1", "Anna"),)), edit)
 
 
+@settings(max_examples=40, deadline=None)
+@given(casts(), st.floats(20.0, 300.0), st.floats(0.0, 1.0))
+def test_a_cast_that_was_an_ensemble_is_a_cast_again(adagio: Any, cast: Cast, tempo: float, shift: float) -> None:
+    at, changes = 1.0 + shift, []
+    for change in cast.changes:  # each begins as the last one ends
+        changes.append(msgspec.structs.replace(change, at=at, counts=change.counts / 3.0))
+        at = changes[-1].at + changes[-1].counts
+    ensemble = staged(cast._replace(changes=tuple(changes)), adagio, lambda key: adagio, tempo)
+    again = cast_of(ensemble, [""] * len(cast.dancers))
+    assert recast(Cast(), SetFormations(again.changes)).changes == again.changes
+
+
+@settings(max_examples=40, deadline=None)
+@given(casts(), st.lists(st.floats(0.0, 40.0), min_size=1, max_size=4))
+def test_a_dancer_is_where_its_movement_is(adagio: Any, cast: Cast, times: list[float]) -> None:
+    for one in staged(cast, adagio, lambda key: adagio, 108.0).dancers:
+        for time in times:
+            assert one.where(time) == pytest.approx(one.at(np.array([time])).root[0, [0, 2]], abs=1e-9)
+
+
+@given(casts(), st.integers(0, 3))
+def test_a_removed_dancer_leaves_no_places(cast: Cast, which: int) -> None:
+    gone = cast.dancers[which % len(cast.dancers)].id
+    left = recast(cast, RemoveDancer(gone))
+    assert all(set(one.places) <= {dancer.id for dancer in left.dancers} for one in left.changes)
+    for one in left.dancers:
+        left = recast(left, RemoveDancer(one.id))
+    assert left == Cast()
+
+
 def put(server: Served, name: str, **fields: Any) -> Any:
     return server.edit(edit="dancer", dancer={"id": name, "name": name, **fields})
 
@@ -183,6 +216,29 @@ def test_editing_the_piece_changes_all_dancers(canon: Served) -> None:
     shorter = [one["end"] - other["end"] for one, other in zip(before, after, strict=True)]
     assert shorter[0] > 1.0
     assert shorter[0] == pytest.approx(shorter[1])
+
+
+def test_a_long_piece_is_viewed_and_its_dancers_looked_at(canon: Served) -> None:
+    put(canon, "ben", place=[0.2, 0.0], entry=9001.0)  # 4500 s later: more frames than are made at once
+    found = canon.get("/api/ensemble")
+    assert found["frames"] == round(found["seconds"] * found["rate"]) + 1
+    assert found["frames"] * 2 * 22 > MAX_POSITIONS
+    (near,) = canon.get("/api/ensemble/near")
+    assert near["names"] == ["anna", "ben"]
+
+
+def test_movements_asked_for_by_two_threads_are_held_once(canon: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    movements, together = canon.studio.movements, Barrier(2)
+    read = movements._split
+    monkeypatch.setattr(movements, "_split", lambda key: (together.wait(30.0), read(key))[1])
+    threads = [Thread(target=movements.get, args=("ballet/plies",)) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert movements._size == sum(
+        one.rotations.nbytes + one.root.nbytes + one.times.nbytes for one in movements._held.values()
+    )
 
 
 def test_who_comes_too_near_is_told_with_the_count(canon: Served) -> None:
