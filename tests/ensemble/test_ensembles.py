@@ -187,7 +187,7 @@ def test_a_change_may_begin_as_the_last_one_ends_up_to_rounding(tmp_path: Path) 
     assert 1.1 + 0.1 > 1.2
     text = 'piece = "ballet/plies"\ntempo = 60\n[[dancer]]\n[[dancer]]\n'
     assert len(read_text(tmp_path, text + change.format(1.1) + change.format(1.2)).dancers[0].ways) == 2
-    with pytest.raises(FormatError, match="change 2 begins at count 1.19, before the last one has ended at 1.2"):
+    with pytest.raises(FormatError, match=r"change 2 begins at count 1\.19, before the last one has ended at 1\.2"):
         read_text(tmp_path, text + change.format(1.1) + change.format(1.19))
 
 

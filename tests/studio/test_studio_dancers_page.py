@@ -72,13 +72,14 @@ def test_dancers_are_added_dragged_hidden_and_removed_by_mouse(page: Any) -> Non
     page.get_by_test_id("add-dancer").click()
     wait_for_dancers(page, 2)
     one, other = cast(page)
+    first, second = one["id"], other["id"]
     assert (one["entry"], other["entry"], other["mirrored"], other["place"]) == (1.0, 5.0, True, [1.5, 0.0])
     assert page.evaluate("studio.viewer.player.motion.end") == pytest.approx(
         page.evaluate("studio.store.state.piece.seconds") + 2.0, abs=0.05
     )
     # Drag the second one's lane by three counts.
-    lane = page.get_by_test_id("lane-d2").bounding_box()
-    width = lane["x"] - page.get_by_test_id("lane-d1").bounding_box()["x"]
+    lane = page.get_by_test_id(f"lane-{second}").bounding_box()
+    width = lane["x"] - page.get_by_test_id(f"lane-{first}").bounding_box()["x"]
     count = width / 4.0  # pixels
     x, y = lane["x"] + 0.8 * lane["width"], lane["y"] + 0.5 * lane["height"]
     page.mouse.move(x, y)
@@ -86,20 +87,28 @@ def test_dancers_are_added_dragged_hidden_and_removed_by_mouse(page: Any) -> Non
     page.mouse.move(x + 1.5 * count, y, steps=4)
     page.mouse.move(x + 3.1 * count, y, steps=4)
     page.mouse.up()
-    wait_for_entry(page, "d2", 8.0)
+    wait_for_entry(page, second, 8.0)
     # A click without a drag shows the moment.
-    box = page.get_by_test_id("lane-d1").bounding_box()
+    box = page.get_by_test_id(f"lane-{first}").bounding_box()
     page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
     until(page, "studio.viewer.player.time > 1")
-    page.get_by_test_id("show-d1").click()
+    page.get_by_test_id(f"show-{first}").click()
     assert page.evaluate("studio.viewer.motion.dancers.map(({ shown }) => shown)") == [False, True]
-    page.get_by_test_id("shown-d1").click()
+    page.get_by_test_id(f"shown-{first}").click()
     assert page.evaluate("studio.viewer.motion.dancers.map(({ shown }) => shown)") == [True, True]
-    page.get_by_test_id("remove-d2").click()
+    page.get_by_test_id(f"remove-{second}").click()
     wait_for_dancers(page, 1)
     page.get_by_test_id("undo").click()
     wait_for_dancers(page, 2)
-    assert entry(page, "d2") == 8.0
+    assert entry(page, second) == 8.0
+    # A new dancer is another one, and shown.
+    page.get_by_test_id(f"shown-{second}").click()
+    page.get_by_test_id(f"remove-{second}").click()
+    wait_for_dancers(page, 1)
+    page.get_by_test_id("add-dancer").click()
+    wait_for_dancers(page, 2)
+    assert cast(page)[1]["id"] != second
+    assert page.evaluate("studio.viewer.motion.dancers.map(({ shown }) => shown)") == [True, True]
 
 
 def test_lanes_are_reached_and_moved_by_keys_alone(page: Any, studio_server: Served) -> None:

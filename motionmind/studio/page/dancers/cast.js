@@ -1,6 +1,7 @@
 /** The dancers as the page knows them: how they play together, who is hidden, who comes too near. It draws nothing. */
 
 import { perStudio } from "../shell/hooks.js";
+import { newId } from "../timeline/items.js";
 import { gather } from "./troupe.js";
 
 export const NOBODY = { dancers: [], changes: [] };
@@ -150,10 +151,11 @@ class Cast extends EventTarget {
   /** Add a dancer; the first one comes with it. @param {{canon: number, mirrored: boolean, place: [number, number], facing: number}} how */
   add({ canon, mirrored, place, facing }) {
     return this.edit(() => {
+      const { window } = this.studio;
       const { dancers } = this.now;
-      const all = dancers.length ? dancers : [made(dancers, {})];
+      const all = dancers.length ? dancers : [made(window, dancers, {})];
       const last = all[all.length - 1];
-      const added = made(all, { mirrored, place, facing, entry: last.entry + canon });
+      const added = made(window, all, { mirrored, place, facing, entry: last.entry + canon });
       const edits = [...(dancers.length ? [] : all), added].map((dancer) => ({ edit: "dancer", dancer }));
       return { edit: "several", edits, words: `add ${added.name}` };
     });
@@ -170,14 +172,9 @@ class Cast extends EventTarget {
   }
 }
 
-/** A new dancer. @param {Dancer[]} others @param {Partial<Dancer>} fields @returns {Dancer} */
-function made(others, fields) {
-  const free = (/** @type {(n: number) => string} */ name, /** @type {string[]} */ taken) => {
-    let number = others.length + 1;
-    while (taken.includes(name(number))) number += 1;
-    return name(number);
-  };
-  const id = free((n) => `d${n}`, others.map((one) => one.id));
-  const name = free((n) => `Dancer ${n}`, others.map((one) => one.name));
-  return { id, name, place: [0, 0], facing: 0, entry: 1, mirrored: false, source: "", ...fields };
+/** A new dancer. @param {string} window this window's name @param {Dancer[]} others @param {Partial<Dancer>} fields @returns {Dancer} */
+function made(window, others, fields) {
+  let number = others.length + 1;
+  while (others.some(({ name }) => name === `Dancer ${number}`)) number += 1;
+  return { id: newId(window), name: `Dancer ${number}`, place: [0, 0], facing: 0, entry: 1, mirrored: false, source: "", ...fields };
 }

@@ -99,7 +99,7 @@ function Add({ cast }) {
   };
   return html`<form class="card member" onSubmit=${add} data-testid="add">
     <h3>Add a dancer</h3>
-    <p class="hint">The same piece, later: in canon.</p>
+    <p class="hint">The same piece, later: in canon. Dancers count evenly by the tempo, not by the music's beats.</p>
     <div class="row fields">
       ${field("Counts later", "add-canon", canon, 0, 10_000, "any", setCanon)}
       ${placeFields(wanted, "add-place", (make) => setPlace(make(wanted)))}
@@ -122,6 +122,7 @@ function Open({ studio }) {
     try {
       await studio.api.changed;
       studio.api.taken(await studio.api.upload(`/api/ensemble?window=${studio.window}`, file, file.name));
+      castOf(studio).hidden.clear(); // they are others, with the same ids
       studio.viewer.back();
     } catch (error) {
       setWrong(error instanceof Error ? error.message : String(error));
