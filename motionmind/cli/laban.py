@@ -10,7 +10,7 @@ import click
 
 from motionmind.cli.files import check_outputs
 from motionmind.cli.options import Section, command, option, outputs
-from motionmind.cli.printing import count, print_written
+from motionmind.cli.printing import count, note, print_written
 from motionmind.cli.types import FILE
 from motionmind.display import displayed
 from motionmind.files import all_or_none, write_atomically
@@ -58,7 +58,9 @@ def laban(source: Path, outputs: tuple[Path, ...], clip: str | None, bar: int | 
         staff = read_staff(source)
     else:
         score = read_score(source)
-        staff, offs = notate(score, find_clip(score, clip), bar or 4)
+        staff, offs, is_steady = notate(score, find_clip(score, clip), bar or 4)
+        if not is_steady:
+            note(f"the tempo changes in this clip; the signs state its mean, {staff.tempo:.1f} counts a minute")
     contents = {path: _contents(path, staff) for path in outputs}
     if report:
         import msgspec

@@ -63,12 +63,14 @@ class Notated(NamedTuple):
     """A score as signs.
 
     Attributes:
-        staff: the signs.
+        staff: the signs; their tempo is the clip's mean.
         offs: how far each is from the movement.
+        is_steady: whether the clip keeps to one tempo.
     """
 
     staff: Staff
     offs: list[Off]
+    is_steady: bool
 
 
 def notate(score: Score, clip: Clip, bar: int) -> Notated:
@@ -85,8 +87,10 @@ def notate(score: Score, clip: Clip, bar: int) -> Notated:
     """
     ((rows, motion),) = played(score, [clip])
     measured = measure(score.body, rows, motion)
-    seconds = np.cumsum([0.0, *(row.seconds or 0.0 for row in rows[1:])])
-    counts = np.round(seconds * score.tempo / 60.0, N_DECIMALS)
+    whole = np.cumsum([0.0, *(row.counts for row in rows[1:])])
+    counts = np.round(whole, N_DECIMALS)
+    seconds = sum(row.seconds or 0.0 for row in rows[1:])
+    tempo = 60.0 * float(whole[-1]) / seconds if seconds else score.tempo
     start: dict[str, Value] = {}
     signs: list[Sign] = []
     offs: list[Off] = []
@@ -102,13 +106,14 @@ def notate(score: Score, clip: Clip, bar: int) -> Notated:
     staff = Staff(
         title,
         score.body.skeleton.name,
-        round(score.tempo, N_DECIMALS),
+        round(tempo, N_DECIMALS),
         bar,
         float(counts[-1]),
         start,
         tuple(signs),
     )
-    return Notated(staff, [off for off in offs if off.degrees or off.most or off.bend])
+    beats = {round((row.seconds or 0.0) / row.counts, 9) for row in rows[1:]}
+    return Notated(staff, [off for off in offs if off.degrees or off.most or off.bend], len(beats) < 2)
 
 
 def _column(column: str, measured: Measured, supported: Supported, counts: Floats) -> list[tuple[Sign | Value, Off]]:

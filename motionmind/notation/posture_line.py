@@ -34,6 +34,7 @@ class Row(NamedTuple):
         faced: whether this line, or an earlier one of its phrase, sets an absolute facing; else the facing is relative
             to the one before the phrase.
         line: number of the line of the clip, or of the phrase that is played, which is the posture or calls it.
+        counts: duration of the move; 0 for a start posture.
     """
 
     where: Where
@@ -45,6 +46,7 @@ class Row(NamedTuple):
     go: tuple[float, float] = (0.0, 0.0)
     faced: bool = False
     line: int = 0
+    counts: float = 0.0
 
     def same_posture(self, other: Row) -> bool:
         """Return whether the postures are the same, regardless of the moves that lead to them."""
@@ -106,6 +108,7 @@ def read_row(score: Score, line: Line, before: Row | None, beat: float, work: Wo
         None if first.counts is None else first.counts * beat,
         first.go,
         first.faced or (before is not None and before.faced),
+        counts=first.counts or 0.0,
     )
 
 

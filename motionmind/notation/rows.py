@@ -244,10 +244,10 @@ def _play_to_face(run: _Player, before: Row | None) -> list[Row]:
 def _backwards(rows: list[Row]) -> list[Row]:
     """Reverse the rows, beginning with the last posture."""
     back = [
-        row._replace(seconds=after.seconds, go=_go_back(after, row))
+        row._replace(seconds=after.seconds, counts=after.counts, go=_go_back(after, row))
         for row, after in zip(rows[-2::-1], rows[:0:-1], strict=True)
     ]
-    return [rows[-1]._replace(seconds=None, go=(0.0, 0.0)), *back]
+    return [rows[-1]._replace(seconds=None, counts=0.0, go=(0.0, 0.0)), *back]
 
 
 def _go_back(there: Row, row: Row) -> tuple[float, float]:

@@ -46,7 +46,15 @@ def test_a_score_is_drawn_and_written_as_signs_at_once(run: Run) -> None:
 def test_a_clip_of_a_corpus_says_how_far_its_signs_are_off(run: Run) -> None:
     done = run("laban", "ballet/centre.score", "--clip", "pirouettes", "-o", "a.svg")
     assert done.code == 0
-    assert "left arm      22 degrees off at most: forward high bent, at 25.8 counts; bent by" in done.out
+    assert "220 signs in 64 counts" in done.out  # at a tempo of its own
+    assert "left arm      22 degrees off at most: forward high bent, at 43 counts; bent by" in done.out
+
+
+def test_a_change_of_tempo_is_noted(run: Run) -> None:
+    Path("bends.score").write_text(BENDS + "  tempo 120\n  4 | bend\n")
+    done = run("laban", "bends.score", "-o", "a.svg")
+    assert "the signs state its mean, 90.0 counts a minute" in done.err
+    assert "in 6 counts" in done.out
 
 
 def test_signs_are_drawn_and_become_a_score_that_can_be_composed(run: Run) -> None:

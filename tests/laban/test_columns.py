@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from itertools import groupby, pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scores import BENDS
 from staves import danced
 
 from motionmind import MotionMindError, read_score
@@ -136,6 +138,37 @@ def test_steps_jumps_turns_and_holds(tmp_path: Path) -> None:
     assert [(sign.begin, str(sign.value)) for sign in staff.column("path")] == [(5.0, "left")]
     assert [(sign.begin, str(sign.value)) for sign in staff.column("turn")] == [(6.0, "turn 90 left")]
     assert [(sign.begin, str(sign.value)) for sign in staff.column("right arm")] == [(6.0, "right middle")]
+
+
+def test_a_clip_has_the_same_signs_at_any_tempo(tmp_path: Path) -> None:
+    def staff_at(tempo: str) -> Notated:
+        path = tmp_path / "steps.score"
+        opening, first, rest = STEPS.partition("  1     | on / off")
+        lines = [
+            opening + tempo,
+            first.replace("1  ", "1/3"),
+            rest,
+            "  fall, backwards\n",
+            "phrase fall\n  1/3 | low\n  2 | low\n",
+        ]
+        path.write_text("".join(lines), encoding="utf-8")
+        score = read_score(path)
+        return notate(score, score.clips[0], 4)
+
+    plain, fast = staff_at(""), staff_at("  tempo 90\n")
+    assert fast.staff == replace(plain.staff, tempo=90.0)
+    assert plain.is_steady
+    assert fast.is_steady
+
+
+def test_a_change_of_tempo_keeps_the_counts(tmp_path: Path) -> None:
+    path = tmp_path / "bends.score"
+    path.write_text(BENDS + "  tempo 120\n  4 | bend\n", encoding="utf-8")
+    score = read_score(path)
+    notated = notate(score, score.clips[0], 4)
+    assert not notated.is_steady
+    assert notated.staff.counts == 6.0
+    assert notated.staff.tempo == 90.0  # 2 counts in 2 seconds, then 4 in 2
 
 
 def test_a_movement_ends_where_the_limb_is_nearest_to_the_sign(tmp_path: Path) -> None:
