@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -15,7 +16,7 @@ from motionmind.cli.types import FILE, Number
 from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError
 from motionmind.render import SOUNDING, may_sound
-from motionmind.tween.counts import parse_time
+from motionmind.tween.counts import SAME_TIME_S, parse_time
 
 if TYPE_CHECKING:
     from motionmind.music import Beats, Sound
@@ -72,7 +73,7 @@ def in_seconds(request: dict[str, Any], beats: Beats | None) -> dict[str, Any]:
     """Return the options of a tween with counts as seconds, by the beats of music, if any, in place of a tempo."""
     if beats is None:
         return request
-    counts, vias, accents = request["counts"], [], []
+    counts, vias = request["counts"], []
     if counts is not None and request["duration"] is not None:
         raise MotionMindError("--counts takes the place of --duration; give one of them")
     for via in request["via"]:
@@ -80,12 +81,21 @@ def in_seconds(request: dict[str, Any], beats: Beats | None) -> dict[str, Any]:
         if isinstance(place, str) and place.startswith("count"):
             place = f"{beats.seconds(1.0 + parse_time('--via', place, 60.0)):.6f}s"
         vias.append(via if place is None else (posture, place))
-    for accent in request.get("accent") or ():
-        if accent < 1.0:
-            raise MotionMindError(f"--accent: counts begin with 1, which is A, not with {accent:g}")
-        accents.append(f"{beats.seconds(accent):.6f}s")
     duration = request["duration"] if counts is None else beats.seconds(1.0 + counts)
+    accents = _accents(request.get("accent") or (), beats, duration)
     return request | {"tempo": None, "counts": None, "duration": duration, "via": vias, "accent": accents}
+
+
+def _accents(counts: Sequence[float], beats: Beats, duration: float | None) -> list[str]:
+    """Return accents on counts of music as times; MotionMindError if they do not lie in order between A and B."""
+    for count in counts:
+        if count < 1.0:
+            raise MotionMindError(f"--accent: counts begin with 1, which is A, not with {count:g}")
+        if duration is not None and beats.seconds(count) > duration + SAME_TIME_S:
+            raise MotionMindError(f"--accent: count {count:g} is after B, which is at count {beats.count(duration):g}")
+    if any(after <= before for before, after in pairwise(counts)):
+        raise MotionMindError(f"--accent: the counts {', '.join(f'{count:g}' for count in counts)} must increase")
+    return [f"{beats.seconds(count):.6f}s" for count in counts]
 
 
 def read_part_of_sound(path: Path, start: float) -> Sound:

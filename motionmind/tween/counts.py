@@ -9,6 +9,7 @@ from motionmind.errors import MotionMindError
 
 TEMPO_RANGE_BPM = (1.0, 6000.0)  # counts a minute, as in scores
 COUNTS_RANGE = (1e-3, 1e5)
+SAME_TIME_S = 1e-6  # the last digit of a time in words: times no farther apart count as equal
 _TIME = re.compile(r"(?:count ?(?P<count>\d{1,6}(?:\.\d{1,6})?)|(?P<seconds>\d{1,6}(?:\.\d{1,6})?) ?s)\Z", re.ASCII)
 
 

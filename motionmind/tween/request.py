@@ -13,7 +13,7 @@ from motionmind.errors import MotionMindError
 from motionmind.footing.corrections import Correction
 from motionmind.grammar.schemes import Scheme, Weights
 from motionmind.synthesis.accent_times import AccentKind, Accents
-from motionmind.tween.counts import counts_to_seconds, parse_time, seconds_to_count
+from motionmind.tween.counts import SAME_TIME_S, counts_to_seconds, parse_time, seconds_to_count
 from motionmind.tween.options import OPTIONS, ReachOption, SearchOptions, StayOption, check_time, is_timed, take_options
 
 if TYPE_CHECKING:
@@ -221,7 +221,7 @@ class TweenRequest:
             raise MotionMindError("accents on counts need a tempo, a duration or counts, and no number of moves")
         times = [self._seconds_of_accent(one) for one in self.accent]
         for one, seconds in zip(self.accent, times, strict=True):
-            if not -1e-9 <= seconds <= self.length + 1e-9:
+            if not 0.0 <= seconds <= self.length + SAME_TIME_S:
                 if isinstance(one, str):
                     raise MotionMindError(f"accent: {displayed(one)} is not between A, 0 s, and B, {self.length:g} s")
                 assert self.tempo is not None

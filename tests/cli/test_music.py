@@ -13,8 +13,9 @@ from bundled_clips import ballet_clip
 from click_tracks import at_tempo, clicks, onsets
 from command_line import Run
 
-from motionmind import read_motion, write_motion
-from motionmind.music import Sound, read_sound
+from motionmind import TweenRequest, read_motion, write_motion
+from motionmind.cli.music import in_seconds
+from motionmind.music import Beats, Sound, read_sound
 
 BEATS = [0.4, 1.0, 1.7, 2.2, 2.7, 3.5, 4.1, 4.6, 5.1, 5.6]  # seconds: uneven, with an upbeat
 
@@ -57,6 +58,20 @@ def test_accents_come_at_the_counts_of_music(run: Run, tmp_path: Path) -> None:
     early = run(*words, "--accent", "0.5")
     assert (early.code, early.out) == (2, "")
     assert "--accent: counts begin with 1, which is A, not with 0.5" in early.err
+    late = run(*words, "--accent", "2,7.5")
+    assert "--accent: count 7.5 is after B, which is at count 7\n" in late.err
+    unordered = run(*words, "--accent", "3,2")
+    assert "--accent: the counts 3, 2 must increase" in unordered.err
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_last_count_of_music_can_have_an_accent(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    beats = Beats(np.cumsum(rng.uniform(0.3, 0.9, 12)))
+    given = {"counts": 8.0, "duration": None, "via": [], "accent": [3.0, 9.0]}
+    request = TweenRequest(**in_seconds(given, beats))
+    assert request.accents is not None
+    assert request.accents.seconds == pytest.approx([beats.seconds(3), beats.seconds(9)], abs=1e-6)
 
 
 @pytest.mark.long
