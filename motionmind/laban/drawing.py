@@ -12,13 +12,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from math import ceil, floor
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
-from motionmind.files import FilePath, write_atomically
 from motionmind.laban.shapes import SIGN_EDGE_PX, Box, draw_sign
 from motionmind.laban.signs import (
     COLUMNS,
@@ -41,8 +40,12 @@ from motionmind.render.markup import xml_text
 from motionmind.render.palette import INK, SHEET
 from motionmind.render.print_sheet import PAGE_HEIGHT_PX, PAGE_WIDTH_PX, pdf
 
+if TYPE_CHECKING:
+    from PIL import Image
+
 DRAWINGS = (".svg", ".png", ".pdf")
 MAX_PAGES = 100
+_MAX_PAINTED_PAGES = {".png": 10, ".pdf": 20}  # a page takes 17 MB
 _PRINT_SCALE = 2  # pixels of a printed page for each of a drawing
 _COLUMN_PX = 22.0
 _EDGES = {  # of columns, in widths of a column right of the centre line
@@ -82,37 +85,31 @@ class Drawing:
     """A staff, drawn.
 
     Attributes:
-        pages: its pages, one after the other.
+        pages: its pages, one after the other, of one size.
     """
 
     pages: tuple[Plate, ...]
 
-    def save(self, path: FilePath) -> None:
-        """Write it; MotionMindError if the suffix is unknown, or the file cannot be written."""
-        suffix = Path(path).suffix.lower()
-        if suffix not in DRAWINGS:
-            raise MotionMindError(f"{path}: suffix {suffix!r} is unknown; drawings end in {', '.join(DRAWINGS)}")
-        write_atomically(path, self.encode(suffix))
-
     def encode(self, suffix: str) -> bytes:
-        """Return the contents of a file with one of the suffixes `DRAWINGS`; pages stand below each other or follow."""
+        """Return the contents of a file with one of the suffixes `DRAWINGS`; pages stand below each other or follow.
+
+        Raises:
+            MotionMindError: it has more pages than such a file may.
+        """
         if suffix == ".svg":
             return self._svg().encode()
+        first, count, most = self.pages[0], len(self.pages), _MAX_PAINTED_PAGES[suffix]
+        if count > most:
+            others = " or ".join(one for one in DRAWINGS if count <= _MAX_PAINTED_PAGES.get(one, MAX_PAGES))
+            raise MotionMindError(f"{count} pages, and at most {most} are drawn as {suffix}; write {others}")
         from PIL import Image
 
-        pictures = []
-        for page in self.pages:
-            brush = Brush(page.width, page.height)
-            for mark in (*page.marks, *page.headings):
-                mark.paint(brush)
-            pictures.append(brush.picture(_PRINT_SCALE))
+        pictures = (_painted(page) for page in self.pages)
         if suffix == ".pdf":
-            return pdf(pictures, self.pages[0].title)
-        whole = Image.new("RGB", (pictures[0].width, sum(picture.height for picture in pictures)))
-        top = 0
-        for picture in pictures:
-            whole.paste(picture, (0, top))
-            top += picture.height
+            return pdf([*pictures], first.title)
+        whole = Image.new("RGB", (_PRINT_SCALE * first.width, _PRINT_SCALE * first.height * count))
+        for number, picture in enumerate(pictures):
+            whole.paste(picture, (0, number * picture.height))
         data = BytesIO()
         whole.save(data, "PNG")
         return data.getvalue()
@@ -128,6 +125,14 @@ class Drawing:
         for number, page in enumerate(self.pages):
             lines += [f'<g transform="translate(0 {number * height})">', svg(page).rstrip(), "</g>"]
         return "\n".join([*lines, "</svg>"]) + "\n"
+
+
+def _painted(page: Plate) -> Image.Image:
+    """Return a page as pixels."""
+    brush = Brush(page.width, page.height)
+    for mark in (*page.marks, *page.headings):
+        mark.paint(brush)
+    return brush.picture(_PRINT_SCALE)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from staves import random_staff, staff_of
 
 from motionmind import MotionMindError, read_motion, read_score
 from motionmind.laban.columns import notate
-from motionmind.laban.drawing import draw_staff
+from motionmind.laban.drawing import Drawing, draw_staff
 from motionmind.laban.shapes import Box, draw_sign, outline, stripes
 from motionmind.laban.signs import AROUND, PLACE, Direction, Hold, Sign, Staff, Turn
 from motionmind.plots.marks import Dot, Line, Polygon
@@ -183,6 +183,14 @@ def test_a_score_that_is_too_long_is_refused() -> None:
         draw_staff(staff)
 
 
-def test_a_suffix_that_is_unknown_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(MotionMindError, match=r"drawings end in \.svg, \.png, \.pdf"):
-        draw_staff(random_staff(1)).save(tmp_path / "a.gif")
+@pytest.mark.parametrize(("suffix", "most", "others"), [(".png", 10, ".svg or .pdf"), (".pdf", 20, ".svg")])
+def test_pixels_of_many_pages_are_refused(suffix: str, most: int, others: str) -> None:
+    def drawing(counts: float) -> Drawing:
+        return draw_staff(Staff("Long", "human23", 60.0, 4, counts, {}, (Sign("turn", 0.0, 1.0, Turn(90)),)))
+
+    a_page = next(counts for counts in range(4, 999, 4) if len(drawing(float(counts)).pages) == 2) - 4
+    with pytest.raises(
+        MotionMindError, match=rf"^{most + 1} pages, and at most {most} are drawn as {suffix}; write {others}$"
+    ):
+        drawing(float(most * a_page + 4)).encode(suffix)
+    assert drawing(float(most * a_page + 4)).encode(".svg")
