@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from piece_page import piece, until, wait_for
+from studio_server import Served
 
 pytestmark = pytest.mark.long
 
@@ -124,3 +125,43 @@ def test_a_stretch_is_changed_alone_and_another_change_makes_the_text_stale(stud
     studio_server.edit(edit="delete", block=piece(page)["blocks"][1]["id"])
     page.wait_for_selector("[data-testid=score-error]", timeout=60_000)
     assert "write it as a score again" in page.get_by_test_id("score-error").inner_text()
+
+
+def test_notes_and_wishes_stay_in_place_and_a_comment_changes_nothing(studio_server: Served, written: Any) -> None:
+    page = written
+    for number, (block, frame) in enumerate((("b1", 4), ("b2", 3))):
+        note = {"id": f"n{number}", "kind": "note", "text": "softer", "block": block, "frame": frame}
+        studio_server.edit(edit="note", note=note)
+    wait_for(page, "piece.notes.length === 2")
+    before = [note["at"] for note in piece(page)["notes"]]
+    text = page.evaluate(f"{TEXT}.value")
+    # Only a comment: the piece stays, and the lines are known anew.
+    page.get_by_test_id("score-text").fill("# for the evening\n" + text)
+    page.get_by_test_id("score-apply").click()
+    until(page, "document.querySelector('[data-testid=score]').getAttribute('aria-busy') === 'false'")
+    until(page, "document.querySelector('[data-testid=score-apply]').disabled")
+    assert page.get_by_test_id("score-error").count() == 0
+    assert [block["id"] for block in piece(page)["blocks"]] == ["b1", "b2"]
+    # All of the piece: notes keep their times.
+    page.get_by_test_id("score-text").fill(text.replace("tempo   120", "tempo   110"))
+    page.get_by_test_id("score-apply").click()
+    wait_for(page, "piece.blocks.length === 1")
+    assert [note["at"] for note in piece(page)["notes"]] == pytest.approx(before, abs=0.01)
+    studio_server.post("/api/undo", {"window": page.evaluate("studio.window")})
+    wait_for(page, "piece.blocks.length === 2")
+    assert [note["block"] for note in piece(page)["notes"]] == ["b1", "b2"]
+    # A stretch: its seam keeps its wish, its note its time, the other note its block.
+    studio_server.edit(edit="ask", left="b1", right="b2", seconds=0.8)
+    page.get_by_test_id("score-close").click()
+    until(page, f"!{TEXT}")
+    page.evaluate("studio.store.set({ selection: { block: 'b2' } })")
+    page.get_by_test_id("score-block").click()
+    page.wait_for_selector("[data-testid=score-text]", timeout=120_000)
+    text = page.evaluate(f"{TEXT}.value")
+    own = "piece.notes[1].at - piece.blocks[1].at"
+    before = page.evaluate(f"(({{ piece }}) => {own})(studio.store.state)")
+    page.get_by_test_id("score-text").fill(text.replace("tempo   120", "tempo   110"))
+    page.get_by_test_id("score-apply").click()
+    wait_for(page, f"piece.blocks[1].id !== 'b2' && Math.abs({own} - {before}) < 0.01")
+    assert piece(page)["seams"][0]["ask"]["seconds"] == 0.8
+    assert [note["block"] for note in piece(page)["notes"]] == [block["id"] for block in piece(page)["blocks"]]

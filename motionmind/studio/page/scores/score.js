@@ -1,11 +1,14 @@
 /** The piece, or a stretch of it, as a score that can be edited. It knows no views. */
 
+import { choicesAt } from "../timeline/groups.js";
 import { newId } from "../timeline/items.js";
+import { anchorOf } from "../timeline/notes.js";
 
 const SLACK_S = 1e-3;
 const END_S = 0.1; // a score may end a frame before its movement
 const STALE = "The piece has changed: write it as a score again.";
 const FIELDS = ["id", "source", "first", "last", "mirrored", "hold", "pace", "repeats"];
+const MAX_MOVED_NOTES = 1990; // in one edit, besides its blocks and the wishes at two seams
 const WHOLE = { mirrored: false, hold: 0, pace: 1, repeats: 1 };
 
 /**
@@ -96,20 +99,44 @@ export class Score extends EventTarget {
     try {
       const { key, frames, lines, calls, times, error } = await this.api.post("/api/score/compose", { job, text });
       if (error) throw new Error(error);
+      const found = this.#found();
+      if (!found) throw new Error(STALE);
+      if (bare(text) === bare(this.#versions.get(found)?.text ?? "")) {
+        this.#versions.set(found, { text, lines, calls, times });
+        return; // it is the same movement
+      }
       const block = { id: newId(this.window), source: key, first: 0, last: frames - 1, ...WHOLE };
-      const old = this.#found();
-      if (!old) throw new Error(STALE);
       at = keyOf([block]);
       this.#versions.set(at, { text, lines, calls, times });
-      const blocks = this.#whole ? [block] : this.#blocks.map((one) => (keyOf([one]) === old ? block : only(one)));
-      await this.api.edit({ edit: "arrange", blocks, about: { words: "edit the score" } });
+      await this.api.edit({ edit: "several", edits: this.#edits(found, block, times), words: "edit the score" });
     } catch (error) {
       this.#versions.delete(at);
       const { message } = /** @type {Error} */ (error);
       this.#set({ error: message, wrong: Number(/^score:(\d+):/.exec(message)?.[1] ?? 0) });
     } finally {
       this.#set({ busy: "" });
+      this.#follow();
     }
+  }
+
+  /**
+   * The edits that put a block in place of the version of a key; notes keep their times, and seams their wishes.
+   * @param {string} found @param {any} block @param {number[]} times of its movement
+   */
+  #edits(found, block, times) {
+    const { notes, seams } = this.store.state.piece;
+    const old = this.#whole ? undefined : this.#blocks.find((one) => keyOf([one]) === found);
+    const blocks = old ? this.#blocks.map((one) => (one === old ? block : only(one))) : [block];
+    const placed = { ...block, at: old?.at ?? 0 };
+    const moved = notes.filter((/** @type {any} */ note) => !old || note.block === old.id).slice(0, MAX_MOVED_NOTES);
+    const noted = moved.map((/** @type {any} */ { id, kind, text, author, at }) => {
+      const anchor = anchorOf({ blocks: [placed] }, Math.min(at, placed.at + times[times.length - 1]), () => Float64Array.from(times));
+      return { edit: "note", note: { id, kind, text, author, ...anchor } };
+    });
+    const renamed = (/** @type {string} */ id) => (id === old?.id ? block.id : id);
+    const beside = seams.filter((/** @type {any} */ { left, right }) => old && left !== right && [left, right].includes(old.id));
+    const wishes = beside.flatMap((/** @type {any} */ seam) => choicesAt({ ...seam, left: renamed(seam.left), right: renamed(seam.right), chosen: 1 }));
+    return [{ edit: "arrange", blocks, about: { words: "edit the score" } }, ...noted, ...wishes];
   }
 
   /** The lines of the posture at a time of the piece; null outside of the score. @param {number} time */
@@ -182,6 +209,12 @@ export class Score extends EventTarget {
     this.version += 1;
     this.dispatchEvent(new Event("change"));
   }
+}
+
+/** A text without its comments and empty lines. @param {string} text */
+function bare(text) {
+  const lines = text.split("\n").map((line) => line.replace(/#.*/, "").replace(/\s+/g, " ").trimEnd());
+  return lines.filter(Boolean).join("\n");
 }
 
 /** The fields of a block that an edit has. @param {Block} block */

@@ -51,7 +51,7 @@ export function copyGroup(piece, group, window) {
 }
 
 /** Edits that repeat the wishes and the choice at a seam. @param {import("./items.js").Seam} seam */
-function choicesAt(seam) {
+export function choicesAt(seam) {
   const { left, right, ask, chosen, decision } = seam;
   const edits = [];
   if (ask.seconds !== null || ask.travel || ask.passing.length + ask.pins.length + ask.reaches.length > 0) edits.push(wish(seam, {}));
