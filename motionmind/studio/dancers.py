@@ -10,7 +10,7 @@ import msgspec
 from msgspec.structs import replace
 
 from motionmind.display import displayed
-from motionmind.ensemble.reading import MAX_CHANGES, MAX_DANCERS, SAME_SPOT_M, MAX_SLACK_COUNTS, SPACING_M
+from motionmind.ensemble.reading import MAX_CHANGES, MAX_DANCERS, MAX_SLACK_COUNTS, SAME_SPOT_M, SPACING_M
 from motionmind.errors import MotionMindError
 
 DancerId = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.-]{1,40}\Z")]
