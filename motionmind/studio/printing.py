@@ -27,7 +27,6 @@ from motionmind.studio.view import layout_of, noted
 if TYPE_CHECKING:
     from motionmind.studio.studio import Studio
 
-_N_COUNTS = 8  # in a phrase: dancers count eights
 _TIME_SLACK_S = 1e-3
 _SILENCE = SetMusic()
 
@@ -62,16 +61,22 @@ class Spacing(msgspec.Struct, forbid_unknown_fields=True):
             return time / self.seconds
         return (beats.count(time + music.begins - beats.start) - 1.0) / self.every
 
-    def caption(self, time: float, music: SetMusic) -> str:
-        """Return the count at a time, as "2·1" for the first count of the second eight, or "" without counts."""
+    def caption(self, time: float, music: SetMusic, counts: int) -> str:
+        """Return the count at a time, as "2·1" for the first count of the second phrase, or "" without counts.
+
+        Args:
+            time: the time, seconds.
+            music: the music.
+            counts: how many counts a phrase has.
+        """
         if self.unit == "seconds":
             return ""
         count = floor(self.number(time, music) * self.every + 1e-6)
-        return f"{count // _N_COUNTS + 1}·{count % _N_COUNTS + 1}"
+        return f"{count // counts + 1}·{count % counts + 1}"
 
 
 def postures_at(
-    spacing: Spacing, seconds: float, notes: Sequence[dict[str, Any]], music: SetMusic = _SILENCE
+    spacing: Spacing, seconds: float, notes: Sequence[dict[str, Any]], music: SetMusic = _SILENCE, counts: int = 8
 ) -> dict[float, PrintPosture]:
     """Choose the postures of a sheet, by time.
 
@@ -82,6 +87,7 @@ def postures_at(
         seconds: duration of the piece.
         notes: its notes, as `view.noted` returns them.
         music: the music that it plays with.
+        counts: how many counts a phrase has: dancers count eights.
 
     Raises:
         MotionMindError: there would be too many postures.
@@ -107,7 +113,7 @@ def postures_at(
             texts.setdefault(place, []).append(words)
     return {
         time: PrintPosture(
-            spacing.caption(time, music), f"{time:.2f} s", headings.get(place, ""), tuple(texts.get(place, ()))
+            spacing.caption(time, music, counts), f"{time:.2f} s", headings.get(place, ""), tuple(texts.get(place, ()))
         )
         for place, time in enumerate(times)
     }
@@ -136,7 +142,8 @@ def routes(studio: Studio) -> list[BaseRoute]:
         notes = noted(
             project.state, layout_of(project.state, project.finding, project.marks, project.standing), project.marks
         )
-        postures = postures_at(spacing, float(motion.times[-1] - motion.times[0]), notes, project.state.music)
+        seconds = float(motion.times[-1] - motion.times[0])
+        postures = postures_at(spacing, seconds, notes, project.state.music, project.state.counts)
         title = project.state.title or "piece"
         data = await run_in_threadpool(draw, replace(motion, name=title), postures, title, form)
         return saved(data, file_name(project.state.title, form))

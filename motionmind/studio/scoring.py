@@ -24,7 +24,6 @@ from motionmind.studio.edits import Id
 from motionmind.studio.export import composed
 from motionmind.studio.reading import Order, lines_of, load_clip, load_lines
 from motionmind.studio.room import Room
-from motionmind.studio.uploads import read_apart
 
 if TYPE_CHECKING:
     from motionmind.studio.studio import Studio
@@ -101,7 +100,7 @@ def routes(studio: Studio) -> list[BaseRoute]:
         folder.mkdir()
         try:
             (folder / _FILE).write_text(given.text, encoding="utf-8")
-            answer = await read_apart(folder, Order(_FILE, "score"))
+            answer = await studio.uploads.read_apart(folder, Order(_FILE, "score"))
             if answer.facts is None:
                 return json(_REFUSED | {"error": answer.error})
             if (clips := len(answer.facts.clips)) != 1:

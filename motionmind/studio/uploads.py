@@ -168,14 +168,18 @@ class Uploads:
             scores = {one.name: str(self._place(one.id) / "upload.score") for one in self.list() if one.kind == "score"}
             others = scores if own.kind == "score" else {}
             order = Order(f"upload.{own.kind}", own.name, choices.unit, choices.fps, asf, others)
-            async with self._reading:
-                answer = await read_apart(folder, order)
+            answer = await self.read_apart(folder, order)
         facts = answer.facts
         error = answer.error if facts is None else ""
         new = msgspec.structs.replace(own, choices=choices, facts=facts, error=error)
         if upload in self._uploads:  # unless it was deleted meanwhile
             self._uploads[upload] = new
         return new
+
+    async def read_apart(self, folder: Path, order: Order) -> Answer:
+        """Let a child process read a file in a folder, within the time limit; two at most run at once."""
+        async with self._reading:
+            return await _read_apart(folder, order)
 
     def motion(self, upload: str, clip: int) -> Motion:
         """Return a clip of an upload, without the frames to leave out.
@@ -211,8 +215,7 @@ class Uploads:
         return self._room.folder / upload
 
 
-async def read_apart(folder: Path, order: Order) -> Answer:
-    """Let a child process read a file in a folder, within the time limit."""
+async def _read_apart(folder: Path, order: Order) -> Answer:
     shown = displayed(order.name)
     (folder / FACTS_FILE).unlink(missing_ok=True)
     (folder / ORDER_FILE).write_bytes(msgspec.json.encode(order))

@@ -79,7 +79,8 @@ def test_music_is_kept_with_its_beats_and_undone(studio_server: Served, song: Pa
 def test_beats_of_text_and_midi_are_taken_without_sound(studio_server: Served, beats: Path, tmp_path: Path) -> None:
     music = choose(studio_server, beats)["music"]
     assert (len(music["beats"]), music["first"], music["begins"]) == (20, 1, music["beats"][1])
-    assert studio_server.send("GET", "/api/music").status == 404
+    answer = studio_server.send("GET", "/api/music")
+    assert (answer.status, answer.value["error"]) == (404, "the piece has no sound, only beats")
     mido = pytest.importorskip("mido")
     file = mido.MidiFile(ticks_per_beat=480)
     file.tracks.append(

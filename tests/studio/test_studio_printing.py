@@ -27,6 +27,7 @@ from motionmind.render.print_sheet import (
     print_picture,
 )
 from motionmind.render.sheet import tiles
+from motionmind.studio import printing
 from motionmind.studio.printing import Spacing, postures_at
 from motionmind.studio.settings import SetMusic
 
@@ -58,6 +59,16 @@ def test_every_note_is_on_the_sheet_once_and_sections_begin_with_a_posture(secon
         else:
             before = max(time for time in found if time <= one["at"] + 1.1e-3)
             assert one["text"] in found[before].notes
+
+
+def test_captions_count_the_phrases_of_the_project(studio_server: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    printed: list[PrintPosture] = []
+    monkeypatch.setattr(printing, "print_pages", lambda pictures, postures, title: printed.extend(postures) or [])
+    monkeypatch.setattr(printing, "pdf", lambda *_: b"")
+    studio_server.insert("b1", "ballet/adagio", 0, 20)
+    studio_server.edit(edit="tempo", tempo=120, counts=3)
+    assert studio_server.send("GET", "/api/sheet/pdf").status == 200
+    assert [one.count for one in printed[:4]] == ["1·1", "1·2", "1·3", "2·1"]
 
 
 def test_captions_count_eights():

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,9 @@ import pytest
 from scores import BENDS
 from studio_server import Served, serving
 
+from motionmind.studio import uploads
 from motionmind.studio.project import Project
+from motionmind.studio.reading import Answer
 
 
 @pytest.fixture
@@ -94,6 +98,25 @@ def test_a_wrong_text_is_refused_with_its_line(served: Served, change: Any, word
     assert answer["key"] == ""
     assert re.search(words, answer["error"]), answer
     assert served.project()["piece"]["blocks"] == blocks
+
+
+def test_scores_are_composed_two_at_a_time(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    job, found = written(served, block="b1", tolerance=20)
+    running, counts = [0], []
+
+    async def read(*_: Any) -> Answer:
+        running[0] += 1
+        counts.append(running[0])
+        await asyncio.sleep(0.5)
+        running[0] -= 1
+        return Answer(error="no score")
+
+    monkeypatch.setattr(uploads, "_read_apart", read)
+    wanted = {"job": job, "text": found["text"]}
+    with ThreadPoolExecutor(5) as pool:
+        answers = [*pool.map(lambda _: served.post("/api/score/compose", wanted), range(5))]
+    assert {one["error"] for one in answers} == {"no score"}
+    assert (len(counts), max(counts)) == (5, 2)
 
 
 def test_what_cannot_be_written_is_said(served: Served) -> None:
