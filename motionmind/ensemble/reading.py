@@ -24,7 +24,7 @@ from motionmind.tween.counts import TEMPO_RANGE_BPM, counts_to_seconds
 SPACING_M = 1.5  # between neighbours in a formation, unless the file says otherwise
 MAX_DANCERS = 100
 MAX_CHANGES = 100  # of formation
-MAX_SLACK_COUNTS = 1e-6  # by which a change may begin before the last one has ended: rounding
+COUNT_TOLERANCE = 1e-6  # by which a change may begin before the last one has ended: rounding
 SAME_SPOT_M = 0.05  # two dancers who begin closer than this stand on one spot
 
 _Metres = Annotated[float, msgspec.Meta(ge=-1000.0, le=1000.0)]
@@ -148,7 +148,7 @@ def _sent(path: Path, file: _File, dancers: Sequence[Dancer]) -> tuple[Dancer, .
         where = f"{path}: change {number}"
         if (change.places is None) == (change.formation is None):
             raise FormatError(f"{where} needs a formation, or places, and not both")
-        if change.at < last - MAX_SLACK_COUNTS:
+        if change.at < last - COUNT_TOLERANCE:
             raise FormatError(f"{where} begins at count {change.at:g}, before the last one has ended at {last:g}")
         last = change.at + change.counts
         start, end = (counts_to_seconds(count - 1.0, file.tempo or 60.0) for count in (change.at, last))

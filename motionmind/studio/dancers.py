@@ -10,7 +10,7 @@ import msgspec
 from msgspec.structs import replace
 
 from motionmind.display import displayed
-from motionmind.ensemble.reading import MAX_CHANGES, MAX_DANCERS, MAX_SLACK_COUNTS, SAME_SPOT_M, SPACING_M
+from motionmind.ensemble.reading import COUNT_TOLERANCE, MAX_CHANGES, MAX_DANCERS, SAME_SPOT_M, SPACING_M
 from motionmind.errors import MotionMindError
 
 DancerId = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.-]{1,40}\Z")]
@@ -124,7 +124,7 @@ def recast(cast: Cast, edit: CastEdit) -> Cast:
         case SetFormations(changes):
             last = 1.0
             for number, change in enumerate(changes, start=1):
-                if change.at < last - MAX_SLACK_COUNTS:
+                if change.at < last - COUNT_TOLERANCE:
                     raise MotionMindError(
                         f"change {number} of formation begins at count {change.at:g}, before the last one has ended, "
                         f"at {last:g}"
