@@ -7,6 +7,8 @@ from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
+from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +24,7 @@ from motionmind.laban.signs import (
     BEND_STEP_DEG,
     GESTURES,
     LEGS,
+    N_DECIMALS,
     PATH,
     PLACE,
     SUPPORTS,
@@ -37,7 +40,10 @@ from motionmind.laban.signs import (
     vector_of,
 )
 from motionmind.laban.text import number_text
-from motionmind.notation.compose import compose
+from motionmind.notation.compose import motions
+from motionmind.notation.posture_line import MOVE_RANGE_COUNTS
+from motionmind.notation.read import read_score
+from motionmind.notation.rows import play_phrase
 from motionmind.transcription.text import Vocabulary
 from motionmind.transcription.words import angle_terms, limb_word
 
@@ -81,13 +87,13 @@ def score_text(staff: Staff, name: str = "notated") -> str:
         name: name of the score's clip.
 
     Raises:
-        MotionMindError: the body is unknown.
+        MotionMindError: the body is unknown, or moves follow each other too fast for a score.
     """
     if staff.body not in BODIES:
         raise MotionMindError(f"no body {quoted(staff.body)}; there are {enumerated(BODIES, 9)}")
     body = anatomy_named(staff.body)
     check_body(body)
-    times = sorted({0.0, staff.counts, *(t for sign in staff.signs for t in (sign.begin, sign.end))})
+    times = _times(staff)
     vocabulary = {layer: Vocabulary() for layer in ("legs", "arms", "torso", "head")}
     table: list[list[str]] = []
     before = [""] * len(vocabulary)
@@ -105,6 +111,24 @@ def score_text(staff: Staff, name: str = "notated") -> str:
         lines += ["", layer, *(f"  {word.ljust(width)} = {terms}" for terms, word in known.names.items())]
     lines += ["", f"clip {name}: {staff.title}".rstrip(" :"), *_columns(table)]
     return "\n".join(lines) + "\n"
+
+
+def _times(staff: Staff) -> list[float]:
+    """Return the counts of a score's postures: where signs begin or end, and between them if a move is too long.
+
+    Raises:
+        MotionMindError: two are too near each other.
+    """
+    least, most = MOVE_RANGE_COUNTS
+    ends = sorted({0.0, staff.counts, *(t for sign in staff.signs for t in (sign.begin, sign.end))})
+    times = ends[:1]
+    for first, last in pairwise(ends):
+        if round(last - first, N_DECIMALS) < least:
+            near = f"{number_text(first)} and {number_text(last)}"
+            raise MotionMindError(f"signs begin or end at counts {near}: a score needs {least:g} between")
+        parts = ceil((last - first) / most)
+        times += [round(first + (last - first) * part / parts, N_DECIMALS) for part in range(1, parts)] + [last]
+    return times
 
 
 def _columns(table: list[list[str]]) -> Iterator[str]:
@@ -291,7 +315,11 @@ def _move(staff: Staff, times: Sequence[float], row: int, *, was_in_air: bool, i
             continue
         if column == PATH or _steps(staff, sign):
             go = _go(sign.value.around)
-    moves = max(1, int(np.ceil(abs(turn) / _MAX_TURN_DEG)))
+    moves = max(1, ceil(abs(turn) / _MAX_TURN_DEG))
+    if (last - first) / moves < MOVE_RANGE_COUNTS[0]:
+        raise MotionMindError(
+            f"a turn of {abs(turn):g} degrees from count {first:g} to {last:g} is too fast for a score"
+        )
     counts = number_text(last - first) if moves == 1 else str(Fraction(number_text(last - first)) / moves)
     turned = round(turn / moves, 2) + 0.0
     words = counts + (f" turn {abs(turned):g} {'left' if turned > 0 else 'right'}" if turned else "")
@@ -321,14 +349,19 @@ def checked_score(staff: Staff) -> str:
     """Return a score of a staff, as `score_text`.
 
     Raises:
-        MotionMindError: the body cannot follow the signs; says why.
+        MotionMindError: as `score_text`; or the body's joints cannot follow the signs; says why.
     """
     text = score_text(staff)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "notated.score"
         path.write_text(text, encoding="utf-8")
+        at_fault = "the signs cannot be written as a score"
         try:
-            compose(path)
+            score = read_score(path)
+            for clip in score.clips:
+                play_phrase(clip)
+            at_fault = "the body cannot follow the signs"
+            motions(score)
         except FormatError as error:
-            raise MotionMindError(f"the body cannot follow the signs: {str(error).partition(': ')[2]}") from None
+            raise MotionMindError(f"{at_fault}: {str(error).partition(': ')[2]}") from None
     return text

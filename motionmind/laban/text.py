@@ -37,6 +37,7 @@ from motionmind.laban.signs import (
     Value,
     allowed,
 )
+from motionmind.notation.posture_line import MOVE_RANGE_COUNTS
 from motionmind.notation.score import Where
 from motionmind.notation.score import tempo as parse_tempo
 
@@ -142,8 +143,12 @@ def _sign(column: str, text: str, where: Where) -> Sign | Value:
     if len(words) != 2:
         raise where.error(f"{quoted(when)}: write the count where the sign begins, and its counts")
     begin, counts = (round(to_number(word, where.path, where.line), N_DECIMALS) for word in words)
-    if begin < 0.0 or counts <= 0.0 or begin + counts > MAX_STAFF_COUNTS:
-        raise where.error(f"{when}: a sign begins at count 0 or later, lasts, and ends by {MAX_STAFF_COUNTS:g}")
+    least = MOVE_RANGE_COUNTS[0]
+    if begin < 0.0 or counts < least or begin + counts > MAX_STAFF_COUNTS:
+        raise where.error(
+            f"{when}: a sign begins at count 0 or later, lasts {least:g} counts or more, and ends by "
+            f"{MAX_STAFF_COUNTS:g}"
+        )
     return Sign(column, begin, counts, value)
 
 

@@ -17,6 +17,7 @@ from motionmind.notation.work import Work
 _DIRECTIONS = {"left": (1.0, 0.0), "right": (-1.0, 0.0), "ahead": (0.0, 1.0), "back": (0.0, -1.0)}
 _NO_SETTINGS: tuple[Setting, Setting] = ({}, {})
 _NEUTRAL = "neutral", "neutral"
+MOVE_RANGE_COUNTS = (0.01, 1000.0)
 
 
 class Row(NamedTuple):
@@ -197,6 +198,7 @@ def _counts(word: str, where: Where) -> float:
         counts = float(Fraction(word)) if NUMBER.fullmatch(word) or "/" in word else 0.0
     except (ValueError, ZeroDivisionError, OverflowError):
         counts = 0.0
-    if not 0.01 <= counts <= 1000.0:
-        raise where.error(f"{quoted(word)} is not a number of counts from 0.01 to 1000")
+    least, most = MOVE_RANGE_COUNTS
+    if not least <= counts <= most:
+        raise where.error(f"{quoted(word)} is not a number of counts from {least:g} to {most:g}")
     return counts

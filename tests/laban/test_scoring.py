@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from staves import ALL_DIRECTIONS, danced, staff_of
 
@@ -11,6 +14,7 @@ from motionmind import compose
 from motionmind.errors import MotionMindError
 from motionmind.laban.scoring import checked_score, score_text
 from motionmind.laban.signs import AROUND, LEVELS, PATH, PLACE, Direction, Hold, Sign, Staff, Turn, Value, allowed
+from motionmind.notation import rows
 
 # What the joints' limits do not allow; of the left limb, the right one's are their mirror images.
 BEYOND = {
@@ -127,6 +131,42 @@ def test_a_score_that_the_body_cannot_follow_is_refused_in_a_line() -> None:
         MotionMindError, match=r"the body cannot follow the signs: the left fingers would be \d+ cm under"
     ):
         checked_score(staff)
+
+
+def test_rests_and_signs_of_any_length_become_a_score(tmp_path: Path) -> None:
+    # A rest of 2,500 counts, a sign of 3,000, and a rest to the end.
+    raises = Sign("left arm", 2500.0, 3000.0, Direction("left", "high"))
+    staff = replace(staff_of([raises]), counts=100_000.0)
+    path = tmp_path / "long.score"
+    path.write_text(checked_score(staff), encoding="utf-8")
+    motion = compose(path)
+    assert motion.times[-1] == pytest.approx(100_000.0)  # at 60 counts a minute
+    wrist = motion.skeleton.index("left_wrist")
+    rises = motion.skeleton.positions(motion.rotations, motion.root)[:, wrist, 1]
+    rising = (motion.times[1:] > 2500.0) & (motion.times[1:] <= 5500.0)
+    assert np.array_equal(np.diff(rises) > 1e-4, rising)
+
+
+@pytest.mark.parametrize(
+    ("signs", "says"),
+    [
+        (
+            [Sign("left arm", 0.0, 1.0, Direction("left", "low")), Sign("head", 0.0, 1.005, Direction("left", "high"))],
+            "signs begin or end at counts 1 and 1.005: a score needs 0.01 between",
+        ),
+        ([Sign("turn", 0.0, 0.1, Turn(3600))], "a turn of 3600 degrees from count 0 to 0.1 is too fast for a score"),
+    ],
+)
+def test_limits_of_scores_are_not_the_bodys(signs: list[Sign], says: str) -> None:
+    with pytest.raises(MotionMindError, match=f"^{re.escape(says)}"):
+        checked_score(staff_of(signs))
+
+
+def test_the_length_of_a_score_is_not_the_bodys_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rows, "MAX_CLIP_POSTURES", 3)
+    signs = [Sign("left arm", float(i), 1.0, Direction("left", LEVELS[i % 3])) for i in range(4)]
+    with pytest.raises(MotionMindError, match=r"^the signs cannot be written as a score: more than 3 postures"):
+        checked_score(staff_of(signs))
 
 
 def test_who_has_no_signs_for_legs_stands(tmp_path: Path) -> None:

@@ -130,6 +130,7 @@ def test_random_staves_are_read_from_their_text(tmp_path_factory: pytest.TempPat
         (WHOLE.replace("0 1 |", "0 |"), 8, "write the count where the sign begins"),
         (WHOLE.replace("0 1 |", "0 x |"), 8, "'x' where a number was expected"),
         (WHOLE.replace("0 1 |", "0 0 |"), 8, "a sign begins at count 0 or later, lasts"),
+        (WHOLE.replace("0 1 |", "0 0.0099 |"), 8, "lasts 0.01 counts or more, and ends by 100000"),
         (WHOLE.replace("0 1 |", "-1 1 |"), 8, "a sign begins at count 0 or later, lasts"),
         (WHOLE + "  0.5 1 | left low\n", 9, "begins at count 0.5, before the sign below it ends, at 1"),
         (WHOLE + "  start | left low\n", 9, "start must be a column's first line"),
