@@ -44,13 +44,21 @@ def with_music(section: Section, text: str, offset: str, *, advanced: bool = Fal
 def read_counts(music: Path | None, offset: float | None, tempo: float | None) -> Beats | None:
     """Read the beats of --music, with count 1 at the first beat from --offset on, or else at the first downbeat.
 
-    Return None without --music; usage error for an --offset without it.
+    Return None without --music; usage error for an --offset without it, or for a tempo beside beats in a file.
+
+    Args:
+        music: the file.
+        offset: seconds of the music before count 1.
+        tempo: about how many counts a minute, for sound.
     """
     if music is None:
         check_offset(music, offset)
         return None
     from motionmind.music import read_beats
+    from motionmind.music.reading import MIDI_SUFFIXES, TEXT_SUFFIXES
 
+    if tempo is not None and music.suffix.lower() in (*TEXT_SUFFIXES, *MIDI_SUFFIXES):
+        raise click.UsageError(f"{displayed_path(music)} says when its beats come; leave out --tempo")
     beats = read_beats(music, tempo)
     if offset is not None:
         try:

@@ -43,11 +43,11 @@ PLANS = (".svg", ".png")
     section=Section.DRAW,
     type=Number(*TEMPO_RANGE_BPM),
     metavar="BPM",
-    help="Counts per minute, to write counts instead of seconds.",
+    help="Counts per minute, to write counts instead of seconds; with sound as --music, about its tempo.",
 )
 @with_music(
     Section.DRAW,
-    "Music whose beats are the counts (sound, .txt, .mid), in place of --tempo.",
+    "Music whose beats are the counts: .txt, .mid, or sound, of about --tempo if given.",
     "Seconds of the music before count 1, the next beat  [default: to the first downbeat]",
 )
 @option(

@@ -119,7 +119,7 @@ if TYPE_CHECKING:
 @searching()
 @with_music(
     Section.SEARCH,
-    "Music whose beats are the counts (sound, .txt, .mid), in place of --tempo; sound of an .mp4 or .html.",
+    "Music whose beats are the counts: .txt, .mid, or sound, of about --tempo if given; sound of an .mp4 or .html.",
     "Seconds of the music before count 1, the next beat  [default: to the first downbeat]",
     advanced=True,
 )

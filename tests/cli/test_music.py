@@ -110,6 +110,11 @@ def test_faulty_music_is_refused_in_a_line(run: Run, tmp_path: Path) -> None:
         ([*tween, "--music", music, "--offset", 60], "the last beat comes at 5.60 s, before 60 s"),
         ([*tween, "--music", music, "--duration", 2], "--counts takes the place of --duration"),
         ([*tween, "--music", music, "--tempo", 0], "tempo"),
+        ([*tween, "--music", music, "--tempo", 100], "beats.txt says when its beats come; leave out --tempo"),
+        (
+            ["plan", "ballet/adagio", "-o", tmp_path / "a.svg", "--music", "song.mid", "--tempo", 100],
+            "song.mid says when its beats come",
+        ),
         ([*tween, "--offset", 1], "--offset needs --music"),
         ([*render, "--music", tmp_path / "noise.wav"], "cannot be read as sound"),
         ([*render, "--music", music], "is no sound file"),
