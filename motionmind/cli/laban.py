@@ -14,23 +14,23 @@ from motionmind.cli.printing import count, note, print_written
 from motionmind.cli.types import FILE
 from motionmind.display import displayed
 from motionmind.files import all_or_none, write_atomically
+from motionmind.laban import DRAWINGS, LABAN_SUFFIX, MAX_BAR_COUNTS
 
 if TYPE_CHECKING:
-    from motionmind.laban.columns import Off
+    from motionmind.laban.columns import Deviation
     from motionmind.laban.signs import Staff
 
-DRAWN = (".svg", ".png", ".pdf")
-SIGNS, SCORE = ".laban", ".score"
+SCORE = ".score"
 
 
 @command("motionmind laban ballet/centre.score --clip pirouettes -o pirouettes.svg")
 @click.argument("source", type=FILE)
-@outputs(f"Drawing ({', '.join(DRAWN)}), signs as text ({SIGNS}), or a score of the signs ({SCORE}).")
+@outputs(f"Drawing ({', '.join(DRAWINGS)}), signs as text ({LABAN_SUFFIX}), or a score of the signs ({SCORE}).")
 @option("--clip", section=Section.PART, metavar="NAME", help="Clip of the score  [default: its only one]")
 @option(
     "--bar",
     section=Section.DRAW,
-    type=click.IntRange(1, 64),
+    type=click.IntRange(1, MAX_BAR_COUNTS),
     metavar="COUNTS",
     help="Counts in a bar  [default: 4, or as the text of signs says]",
 )
@@ -47,30 +47,33 @@ def laban(source: Path, outputs: tuple[Path, ...], clip: str | None, bar: int | 
     from motionmind.notation.compose import find_clip
     from motionmind.notation.read import read_score
 
-    is_signs = source.suffix.lower() == SIGNS
+    is_signs = source.suffix.lower() == LABAN_SUFFIX
     if is_signs and (clip or bar or report):
         raise click.UsageError("--clip, --bar and --report are for a score")
     source = source if is_signs else locate_score(str(source))
-    files = [(path, (*DRAWN, SIGNS, SCORE)) for path in outputs]
+    files = [(path, (*DRAWINGS, LABAN_SUFFIX, SCORE)) for path in outputs]
     check_outputs(files + ([(report, ())] if report else []), [source])
-    offs: Sequence[Off] = ()
+    deviations: Sequence[Deviation] = ()
     if is_signs:
         staff = read_staff(source)
+        name = displayed(staff.title) or "Movement"
     else:
         score = read_score(source)
-        staff, offs, is_steady = notate(score, find_clip(score, clip), bar or 4)
+        found = find_clip(score, clip)
+        name = found.name
+        staff, deviations, is_steady = notate(score, found, bar or 4)
         if not is_steady:
             note(f"the tempo changes in this clip; the signs state its mean, {staff.tempo:.1f} counts a minute")
     contents = {path: _contents(path, staff) for path in outputs}
     if report:
         import msgspec
 
-        contents[report] = msgspec.json.encode(offs)
+        contents[report] = msgspec.json.encode(deviations)
     with all_or_none():
         for path, data in contents.items():
             write_atomically(path, data)
-    click.echo(f"{displayed(staff.title) or 'Movement'}: {count(len(staff.signs), 'sign')} in {staff.counts:g} counts")
-    for line in _lines(offs):
+    click.echo(f"{name}: {count(len(staff.signs), 'sign')} in {staff.counts:g} counts")
+    for line in _lines(deviations):
         click.echo(line)
     print_written([*contents])
 
@@ -82,19 +85,19 @@ def _contents(path: Path, staff: Staff) -> bytes:
     from motionmind.laban.text import staff_text
 
     suffix = path.suffix.lower()
-    if suffix in DRAWN:
+    if suffix in DRAWINGS:
         return draw_staff(staff).encode(suffix)
-    if suffix == SIGNS:
+    if suffix == LABAN_SUFFIX:
         return staff_text(staff).encode()
     return checked_score(staff).encode()
 
 
-def _lines(offs: Sequence[Off]) -> Iterator[str]:
+def _lines(deviations: Sequence[Deviation]) -> Iterator[str]:
     """Format how far the signs of each column are off at most, and where."""
-    for column in dict.fromkeys(off.column for off in offs):
-        own = [off for off in offs if off.column == column]
-        worst = max(own, key=lambda off: off.degrees)
-        bent = max(own, key=lambda off: off.bend)
+    for column in dict.fromkeys(one.column for one in deviations):
+        own = [one for one in deviations if one.column == column]
+        worst = max(own, key=lambda one: one.degrees)
+        bent = max(own, key=lambda one: one.bend)
         line = f"{column:13} {worst.degrees:2.0f} degrees off at most: {worst.sign}, at {worst.count:g} counts"
         if bent.bend:
             line += f"; bent by {bent.bend:.0f} degrees more or less at {bent.count:g}"

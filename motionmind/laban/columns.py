@@ -39,7 +39,7 @@ from motionmind.notation.score import Clip, Score
 STILL_DEG = 1.0  # a part that turns or bends by less in a move is still
 
 
-class Off(msgspec.Struct, frozen=True):
+class Deviation(msgspec.Struct, frozen=True):
     """Deviation of a sign from the movement that it stands for.
 
     Attributes:
@@ -64,12 +64,12 @@ class Notated(NamedTuple):
 
     Attributes:
         staff: the signs; their tempo is the clip's mean.
-        offs: how far each is from the movement.
+        deviations: how far each is from the movement.
         is_steady: whether the clip keeps to one tempo.
     """
 
     staff: Staff
-    offs: list[Off]
+    deviations: list[Deviation]
     is_steady: bool
 
 
@@ -93,11 +93,11 @@ def notate(score: Score, clip: Clip, bar: int) -> Notated:
     tempo = 60.0 * float(whole[-1]) / seconds if seconds else score.tempo
     start: dict[str, Value] = {}
     signs: list[Sign] = []
-    offs: list[Off] = []
+    deviations: list[Deviation] = []
     supported = support_signs(measured)
     for column in COLUMNS:
-        for sign, off in _column(column, measured, supported, counts):
-            offs.append(off)
+        for sign, deviation in _column(column, measured, supported, counts):
+            deviations.append(deviation)
             if isinstance(sign, Sign):
                 signs.append(sign)
             else:
@@ -113,10 +113,12 @@ def notate(score: Score, clip: Clip, bar: int) -> Notated:
         tuple(signs),
     )
     beats = {round((row.seconds or 0.0) / row.counts, 9) for row in rows[1:]}
-    return Notated(staff, [off for off in offs if off.degrees or off.most or off.bend], len(beats) < 2)
+    return Notated(staff, [one for one in deviations if one.degrees or one.most or one.bend], len(beats) < 2)
 
 
-def _column(column: str, measured: Measured, supported: Supported, counts: Floats) -> list[tuple[Sign | Value, Off]]:
+def _column(
+    column: str, measured: Measured, supported: Supported, counts: Floats
+) -> list[tuple[Sign | Value, Deviation]]:
     """Return a column's starting position if it has one, then its signs, each with how far it is off."""
     if column in (*SUPPORTS, PATH):
         return [*_events(column, supported, counts)]
@@ -127,7 +129,7 @@ def _column(column: str, measured: Measured, supported: Supported, counts: Float
     return [*_turns(measured.facing, supported, counts)]
 
 
-def _events(column: str, supported: Supported, counts: Floats) -> Iterator[tuple[Sign | Value, Off]]:
+def _events(column: str, supported: Supported, counts: Floats) -> Iterator[tuple[Sign | Value, Deviation]]:
     """Yield the signs of supports and paths, each for one move, and the holds between them."""
     side = SUPPORTS.index(column) if column in SUPPORTS else -1
     held = -1  # the row where a hold begins
@@ -137,14 +139,17 @@ def _events(column: str, supported: Supported, counts: Floats) -> Iterator[tuple
         if keeps and held < 0:
             held = row - 1
         if held >= 0 and not keeps:
-            yield _made(column, Hold(), counts, held, row - 1), _off(column, counts[row - 1], Hold(), 0.0, 0.0, 0.0)
+            yield (
+                _made(column, Hold(), counts, held, row - 1),
+                _deviation(column, counts[row - 1], Hold(), 0.0, 0.0, 0.0),
+            )
             held = -1
         if value is not None:
             sign = value if row == 0 else _made(column, value, counts, row - 1, row)
-            yield sign, _off(column, counts[row], value, degrees, degrees, 0.0)
+            yield sign, _deviation(column, counts[row], value, degrees, degrees, 0.0)
 
 
-def _gestures(column: str, measured: Measured, counts: Floats) -> Iterator[tuple[Sign | Value, Off]]:
+def _gestures(column: str, measured: Measured, counts: Floats) -> Iterator[tuple[Sign | Value, Deviation]]:
     """Yield the direction signs of a part of the body; none while a leg bears weight."""
     along, bends = measured.directions[column], measured.bends.get(column)
     states: list[Direction | None] = []
@@ -167,10 +172,10 @@ def _gestures(column: str, measured: Measured, counts: Floats) -> Iterator[tuple
         assert value is not None  # as of every run
         sign = value if run.begin < 0 else _made(column, value, counts, run.begin, run.end)
         most = float(angles[run.end : run.last + 1].max())
-        yield sign, _off(column, counts[run.end], value, angles[run.end], most, bent[run.end])
+        yield sign, _deviation(column, counts[run.end], value, angles[run.end], most, bent[run.end])
 
 
-def _twists(column: str, degrees: Floats, counts: Floats) -> Iterator[tuple[Sign | Value, Off]]:
+def _twists(column: str, degrees: Floats, counts: Floats) -> Iterator[tuple[Sign | Value, Deviation]]:
     """Yield the turn signs of the torso or the head: where it faces, against the front of the body."""
     states = [nearest_turn(angle) for angle in degrees.tolist()]
     angles = np.abs(degrees - states)
@@ -179,10 +184,10 @@ def _twists(column: str, degrees: Floats, counts: Floats) -> Iterator[tuple[Sign
         sign = value if run.begin < 0 else _made(column, value, counts, run.begin, run.end)
         most = float(angles[run.end : run.last + 1].max())
         if run.begin >= 0 or value.left:
-            yield sign, _off(column, counts[run.end], value, angles[run.end], most, 0.0)
+            yield sign, _deviation(column, counts[run.end], value, angles[run.end], most, 0.0)
 
 
-def _turns(facing: Floats, supported: Supported, counts: Floats) -> Iterator[tuple[Sign | Value, Off]]:
+def _turns(facing: Floats, supported: Supported, counts: Floats) -> Iterator[tuple[Sign | Value, Deviation]]:
     """Yield the turn signs of the body: how far it turns without rest to one side, until it steps."""
     turned = facing - facing[0]
     states = [nearest_turn(angle) for angle in turned.tolist()]
@@ -205,7 +210,7 @@ def _turns(facing: Floats, supported: Supported, counts: Floats) -> Iterator[tup
         value = Turn(states[run.end] - states[before.end])
         most = float(angles[run.end : run.last + 1].max())
         sign = _made(TURN, value, counts, run.begin, run.end)
-        yield sign, _off(TURN, counts[run.end], value, angles[run.end], most, 0.0)
+        yield sign, _deviation(TURN, counts[run.end], value, angles[run.end], most, 0.0)
 
 
 def _made(column: str, value: Value, counts: Floats, first: int, last: int) -> Sign:
@@ -214,8 +219,8 @@ def _made(column: str, value: Value, counts: Floats, first: int, last: int) -> S
     return Sign(column, begin, round(float(counts[last]) - begin, N_DECIMALS), value)
 
 
-def _off(column: str, count: float, value: Value, degrees: float, most: float, bend: float) -> Off:
-    return Off(column, float(count), str(value), *(round(float(one), 1) for one in (degrees, most, bend)))
+def _deviation(column: str, count: float, value: Value, degrees: float, most: float, bend: float) -> Deviation:
+    return Deviation(column, float(count), str(value), *(round(float(one), 1) for one in (degrees, most, bend)))
 
 
 class _Run(NamedTuple):
@@ -231,7 +236,7 @@ class _Run(NamedTuple):
     last: int
 
 
-def _runs(states: Sequence[object], off: Floats, moves: Bools) -> Iterator[_Run]:
+def _runs(states: Sequence[object], degrees: Floats, moves: Bools) -> Iterator[_Run]:
     """Yield the runs of rows whose state is the same, and not None.
 
     A movement begins when the part starts to move, or when the movement before it ends. It ends in the row where the
@@ -239,7 +244,7 @@ def _runs(states: Sequence[object], off: Floats, moves: Bools) -> Iterator[_Run]
 
     Args:
         states: of each row [T].
-        off: how far each row is from its sign [T].
+        degrees: deviation of each row from its sign [T].
         moves: whether the part moves between one row and the next [T - 1].
     """
     first, arrived = 0, 0
@@ -258,7 +263,7 @@ def _runs(states: Sequence[object], off: Floats, moves: Bools) -> Iterator[_Run]
             rests = first
             while rests < last and moves[rests]:
                 rests += 1
-            arrived = first + int(np.argmin(np.round(off[first : rests + 1], 6)))
+            arrived = first + int(np.argmin(np.round(degrees[first : rests + 1], 6)))
             yield _Run(begin, arrived, last)
         first = last + 1
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
+from motionmind.laban import DRAWINGS
 from motionmind.laban.shapes import SIGN_EDGE_PX, Box, draw_sign
 from motionmind.laban.signs import (
     COLUMNS,
@@ -43,7 +44,6 @@ from motionmind.render.print_sheet import PAGE_HEIGHT_PX, PAGE_WIDTH_PX, pdf
 if TYPE_CHECKING:
     from PIL import Image
 
-DRAWINGS = (".svg", ".png", ".pdf")
 MAX_PAGES = 100
 _MAX_PAINTED_PAGES = {".png": 10, ".pdf": 20}  # a page takes 17 MB
 _PRINT_SCALE = 2  # pixels of a printed page for each of a drawing

@@ -20,6 +20,7 @@ from motionmind.display import printable
 from motionmind.errors import FormatError, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath
 from motionmind.formats.text import read_lines, to_number
+from motionmind.laban import MAX_BAR_COUNTS
 from motionmind.laban.signs import (
     AROUND,
     BENDS,
@@ -41,9 +42,7 @@ from motionmind.notation.posture_line import MOVE_RANGE_COUNTS
 from motionmind.notation.score import Where
 from motionmind.notation.score import tempo as parse_tempo
 
-SUFFIX = ".laban"
 LABAN_VERSION = 1
-MAX_BAR_COUNTS = 64
 MAX_STAFF_COUNTS = 100_000.0
 MAX_SIGNS = 20_000
 _FIELDS = ("laban", "title", "body", "tempo", "bar", "counts")

@@ -97,7 +97,7 @@ def test_a_leg_gestures_only_while_it_bears_no_weight(name: str, clip: str) -> N
 def test_no_sign_is_further_off_than_its_sector(name: str, clip: str) -> None:
     # The corner of a sector: 22.5 degrees up and to the side.
     corner = np.degrees(np.arccos(np.cos(np.radians(22.5)) ** 2)) + 0.1
-    for off in notated(name, clip).offs:
+    for off in notated(name, clip).deviations:
         assert off.degrees <= (corner if "support" not in off.column else 22.6)
         assert off.degrees <= off.most
         assert off.bend <= 30.1
