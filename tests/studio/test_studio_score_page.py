@@ -77,6 +77,26 @@ def test_a_click_on_a_line_goes_to_its_time(written: Any) -> None:
     until(page, f"{TIME} > 1")
 
 
+def test_a_score_follows_the_first_dancer_who_enters_late(studio_server: Served, written: Any) -> None:
+    page = written
+    studio_server.edit(edit="dancer", dancer={"id": "anna", "name": "anna", "entry": 9})
+    until(page, "studio.viewer.motion?.dancers?.length === 1")
+    late = page.evaluate("studio.viewer.motion.clock(1) - 1")
+    assert late == pytest.approx(4.0)
+    said = []
+    for time in (1.0, 1.0 + late):  # of the player: she waits, and then dances
+        page.evaluate("time => studio.viewer.player.seek(time)", time)
+        words = f"{page.evaluate('studio.viewer.own'):.2f} s"
+        until(page, f"{AT}.textContent.endsWith('{words}')")
+        said.append(page.get_by_test_id("score-at").inner_text())
+    assert said[0] != said[1]
+    line = int(said[1].split(",")[0].removeprefix("line "))
+    page.evaluate("studio.viewer.player.seek(0)")
+    to_line(page, line - 1)
+    page.keyboard.press("ArrowDown")
+    until(page, f"Math.abs({TIME} - {1.0 + late}) < 0.5")
+
+
 def test_a_changed_text_changes_the_piece_and_undo_takes_it_back(written: Any) -> None:
     page = written
     seconds, text = piece(page)["seconds"], page.evaluate(f"{TEXT}.value")

@@ -150,6 +150,16 @@ export class Viewer extends EventTarget {
     return motion.key ? { key: motion.key, frame: player.frame } : null;
   }
 
+  /** The time of what is danced: of several dancers, the first one's. */
+  get own() {
+    return this.motion?.own?.(this.player.time) ?? this.player.time;
+  }
+
+  /** The player's time at a time of what is danced: when the first of several dancers is there. @param {number} own */
+  clock(own) {
+    return this.motion?.clock?.(own) ?? own;
+  }
+
   /** @param {any} motion @param {{time?: number, beside?: any, title: string, look: boolean, home: boolean}} how */
   #take(motion, { time, beside, title, look, home }) {
     Object.assign(this, { motion, beside, title, isHome: home });

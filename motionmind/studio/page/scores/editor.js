@@ -26,13 +26,13 @@ function Editor({ studio, score }) {
   useEffect(() => {
     let shown = 0;
     const update = () => {
-      const at = viewer.isHome ? score.linesAt(player.time) : null;
+      const at = viewer.isHome ? score.linesAt(viewer.own) : null;
       for (const [name, line] of Object.entries({ line: at?.line ?? 0, call: at?.call ?? 0, wrong: score.wrong })) {
         const mark = marks.current.querySelector(`.${name}`);
         mark.hidden = line === 0;
         mark.style.transform = `translateY(${PAD_PX + (line - 1) * LINE_PX - field.current.scrollTop}px)`;
       }
-      const words = at ? `line ${at.line}, ${clock(player.time)} s` : "";
+      const words = at ? `line ${at.line}, ${clock(viewer.own)} s` : "";
       if (told.current.textContent !== words) told.current.textContent = words;
       if (at && at.line !== shown && document.activeElement !== field.current) reveal(field.current, at.call);
       shown = at?.line ?? 0;
@@ -46,11 +46,11 @@ function Editor({ studio, score }) {
     };
   }, [score]);
   const go = () => {
-    const time = score.timeOf(lineAt(field.current), player.time);
+    const time = score.timeOf(lineAt(field.current), viewer.own);
     if (time === null) return;
     viewer.back();
     player.pause();
-    player.seek(time);
+    player.seek(viewer.clock(time));
   };
   const apply = () => score.apply();
   const key = (/** @type {KeyboardEvent} */ event) => {

@@ -56,7 +56,7 @@ export class Actions {
     this.listeners = new Set();
     const follow = () => {
       const { viewer } = studio;
-      if (viewer.isHome && viewer.player) this.#pass(viewer.motion?.own?.(viewer.player.time) ?? viewer.player.time, viewer.player.playing);
+      if (viewer.isHome && viewer.player) this.#pass(viewer.own, viewer.player.playing);
     };
     studio.viewer.addEventListener("show", follow);
     studio.viewer.player.addEventListener("change", follow);
@@ -216,7 +216,7 @@ export class Actions {
     this.look();
     const { player } = this.studio.viewer;
     player.pause();
-    player.seek(this.studio.viewer.motion?.clock?.(time) ?? time); // when the first of several dancers is there
+    player.seek(this.studio.viewer.clock(time));
   }
 
   moveBy(by) {
