@@ -259,6 +259,24 @@ def test_the_time_line_follows_the_first_dancer_who_waits(page: Any, studio_serv
     until(page, "Math.abs(studio.viewer.player.time - 5) < 0.1")
 
 
+def test_the_edge_of_the_stage_is_the_same_with_and_without_dancers(page: Any, studio_server: Served) -> None:
+    def wait_for_edge(stands: bool) -> None:
+        until(page, f"Boolean(studio.viewer.stage?.edge?.parent) === {str(stands).lower()}")
+
+    put(studio_server, "anna")
+    wait_for_dancers(page, 1)
+    studio_server.edit(edit="stage", size=[8.0, 6.0])
+    wait_for_edge(True)
+    studio_server.edit(edit="dismiss", dancer="anna")
+    until(page, "studio.viewer.motion && !studio.viewer.motion.dancers")
+    wait_for_edge(True)
+    studio_server.edit(edit="stage", size=None)
+    wait_for_edge(False)
+    put(studio_server, "ben")
+    wait_for_dancers(page, 1)
+    wait_for_edge(False)
+
+
 def test_an_insertion_of_several_dancers_is_selected_and_flipped(page: Any, studio_server: Served) -> None:
     studio_server.send("POST", "/api/seams")
     studio_server.insert("b2", "ballet/plies", 0, 20)

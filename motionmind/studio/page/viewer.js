@@ -119,7 +119,7 @@ export class Viewer extends EventTarget {
   /** Draw the edge of the stage on the floor, [width, depth] in metres; undefined for none. */
   set area(/** @type {number[] | undefined} */ area) {
     this.#area = area;
-    for (const stage of [this.stage, this.other]) if (stage) stage.area = area;
+    for (const stage of [...this.kept.values(), this.other]) if (stage) stage.area = area;
     this.stale();
   }
 
