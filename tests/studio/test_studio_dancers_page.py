@@ -277,6 +277,30 @@ def test_the_edge_of_the_stage_is_the_same_with_and_without_dancers(page: Any, s
     wait_for_edge(False)
 
 
+def test_music_is_among_the_lanes_whose_clock_it_follows(
+    page: Any, studio_server: Served, tmp_path: Path, axe_faults: Callable[[Any], list[str]]
+) -> None:
+    path = tmp_path / "beats.txt"
+    path.write_text("\n".join(str(0.5 * number) for number in range(40)))
+    job = studio_server.post("/api/music", {"window": "w1", "path": str(path)})["job"]
+    assert studio_server.wait_for(job)["state"] == "done"
+    page.get_by_test_id("music-lane").wait_for()
+    put(studio_server, "anna", entry=41.0)
+    wait_for_dancers(page, 1)
+    until(page, "document.querySelector('.lanes [data-testid=music-lane]')")
+    assert page.get_by_test_id("music-lane").count() == 1
+    assert axe_faults(page) == []
+    # While she waits, the time line follows the clock of all.
+    for _ in range(14):
+        page.get_by_test_id("zoom-in").click()
+    until(page, "document.querySelector('.timeline .tracks').scrollLeft === 0")
+    page.evaluate("studio.viewer.player.play()")
+    until(page, "document.querySelector('.timeline .tracks').scrollLeft > 0 && studio.viewer.player.time < 20")
+    page.evaluate("studio.viewer.player.pause()")
+    studio_server.edit(edit="dismiss", dancer="anna")
+    until(page, "document.querySelector('[data-testid=music-lane]') && !document.querySelector('.lanes')")
+
+
 def test_an_insertion_of_several_dancers_is_selected_and_flipped(page: Any, studio_server: Served) -> None:
     studio_server.send("POST", "/api/seams")
     studio_server.insert("b2", "ballet/plies", 0, 20)

@@ -13,8 +13,8 @@ const ROWS = [
   { shown: ["Enter"], does: "hide or show the dancer", group: "Dancers" },
 ];
 
-/** @param {{does: any, sight: any}} props */
-export function Lanes({ does, sight }) {
+/** Children are lanes on the same clock. @param {{does: any, sight: any, children?: any}} props */
+export function Lanes({ does, sight, children }) {
   const { studio } = does;
   const cast = castOf(studio);
   useChange(cast, () => cast.version);
@@ -94,6 +94,7 @@ export function Lanes({ does, sight }) {
   });
   return html`<div class="lanes" ref=${element} role="group" aria-label="Dancers" data-testid="lanes" onKeyDown=${key}
     onPointerDown=${down} onPointerMove=${moved} onPointerUp=${up} onPointerCancel=${cancel}>
+    ${children}
     ${
       changes.length > 0 &&
       html`<div class="track lane formations">

@@ -56,7 +56,7 @@ export class Actions {
     this.listeners = new Set();
     const follow = () => {
       const { viewer } = studio;
-      if (viewer.isHome && viewer.player) this.#pass(viewer.own, viewer.player.playing);
+      if (viewer.isHome && viewer.player) this.#pass(viewer.own, viewer.player);
     };
     studio.viewer.addEventListener("show", follow);
     studio.viewer.player.addEventListener("change", follow);
@@ -69,13 +69,14 @@ export class Actions {
     return () => this.listeners.delete(listener);
   }
 
-  #pass(time, playing) {
-    if (time === this.time) return;
-    this.time = time;
-    for (const listener of this.listeners) listener(time);
+  #pass(time, player) {
+    if (time !== this.time) {
+      this.time = time;
+      for (const listener of this.listeners) listener(time);
+    }
     const { scale, left, width } = this.sight;
-    const x = time * scale - left;
-    if (playing && (x < 0 || x > width)) this.show({ left: Math.max(time * scale - width / 8, 0) });
+    const x = player.time * scale; // of all dancers: theirs goes on while the piece waits
+    if (player.playing && (x < left || x > left + width)) this.show({ left: Math.max(x - width / 8, 0) });
   }
 
   /** @returns {import("./items.js").Piece} */

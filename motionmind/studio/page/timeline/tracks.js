@@ -2,8 +2,10 @@
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { dropped, POSTURE_TYPE } from "../between/desk.js";
+import { castOf } from "../dancers/cast.js";
 import { Lanes } from "../dancers/lanes.js";
 import { MusicLane } from "../music/lane.js";
+import { useChange } from "../shell/hooks.js";
 import { Seams, Stretches, Wishes } from "./blocks.js";
 import { Drag } from "./gestures.js";
 import { groupOf, reaching } from "./groups.js";
@@ -117,6 +119,9 @@ export function Tracks({ does, piece, whole, sight, selection, meter, thumbnail 
       does.insert(posture, placeAt(piece, x / sight.scale));
     }
   };
+  const cast = castOf(does.studio);
+  const danced = useChange(cast, () => cast.data !== null);
+  const music = html`<${MusicLane} does=${does} sight=${sight} meter=${meter} />`;
   return html`<div
     class=${over ? "tracks dropping" : "tracks"}
     ref=${scroller}
@@ -127,7 +132,7 @@ export function Tracks({ does, piece, whole, sight, selection, meter, thumbnail 
   >
     <div class="inner" style=${{ width: `${Math.max(whole * sight.scale + END_PX, sight.width)}px` }}>
       <${Ruler} does=${does} sight=${sight} seconds=${piece.seconds} meter=${meter} />
-      <${MusicLane} does=${does} sight=${sight} meter=${meter} />
+      ${!danced && music}
       <${Notes} does=${does} notes=${piece.notes} sight=${sight} />
       <div
         onPointerDown=${down}
@@ -154,7 +159,7 @@ export function Tracks({ does, piece, whole, sight, selection, meter, thumbnail 
         />
       </div>
       <${Playhead} does=${does} scale=${sight.scale} />
-      <${Lanes} does=${does} sight=${sight} />
+      ${danced && html`<${Lanes} does=${does} sight=${sight}>${music}<//>`}
     </div>
   </div>`;
 }
