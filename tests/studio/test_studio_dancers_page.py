@@ -24,6 +24,12 @@ _POSED = """(time) => studio.viewer.motion.dancers.map((dancer) => {
 })"""
 
 
+_DRAWN = """new Promise((drawn) => {
+  studio.viewer.addEventListener('draw', drawn, { once: true });
+  studio.viewer.stale();
+})"""
+
+
 @pytest.fixture
 def page(studio_server: Served, studio_page: Any) -> Any:
     """A page with a piece of one stretch, in which nothing is sought; the panel of dancers is open."""
@@ -299,6 +305,20 @@ def test_music_is_among_the_lanes_whose_clock_it_follows(
     page.evaluate("studio.viewer.player.pause()")
     studio_server.edit(edit="dismiss", dancer="anna")
     until(page, "document.querySelector('[data-testid=music-lane]') && !document.querySelector('.lanes')")
+
+
+def test_edits_with_dancers_leave_nothing_with_the_gpu(page: Any, studio_server: Served) -> None:
+    held = "studio.viewer.stage.renderer.info.memory.geometries"
+    put(studio_server, "anna")
+    wait_for_dancers(page, 1)
+    found = []
+    for turn in (10.0, 20.0, 30.0):
+        put(studio_server, "anna", facing=turn)
+        until(page, "(turn) => Math.abs(studio.viewer.motion.data.dancers[0].facing - turn) < 1e-6", np.radians(turn))
+        page.evaluate(_DRAWN)
+        found.append(page.evaluate(held))
+    assert found[0] > 0
+    assert found == found[:1] * 3
 
 
 def test_an_insertion_of_several_dancers_is_selected_and_flipped(page: Any, studio_server: Served) -> None:

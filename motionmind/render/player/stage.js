@@ -85,7 +85,12 @@ export class Stage {
   take(motion, body, colours) {
     const same = this.body === body && this.colours === colours;
     Object.assign(this, { motion, body, colours, ghostsShown: "" });
-    if (!same) this.embody();
+    if (!same) {
+      for (const layer of this.layers ?? []) {
+        layer.traverse((thing) => [thing.geometry, thing.material].forEach((part) => part?.dispose()));
+      }
+      this.embody();
+    }
     this.trails?.forget(); // of a movement that may have grown
     this.#measure();
     this.floor?.traverse((thing) => [thing.geometry, thing.material].forEach((part) => part?.dispose()));
@@ -193,9 +198,6 @@ export class Stage {
   /** Make what draws the body, its ghosts and its bridges. */
   embody() {
     const { body, colours, motion } = this;
-    for (const layer of this.layers ?? []) {
-      layer.traverse((thing) => [thing.geometry, thing.material].forEach((part) => part?.dispose()));
-    }
     this.rotations = new Float64Array(motion.joints.length * 4);
     this.root = new Float64Array(3);
     this.figure = new Figures(body, 1, FINE, colours, this.papers);
