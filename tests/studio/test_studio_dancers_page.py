@@ -321,6 +321,15 @@ def test_edits_with_dancers_leave_nothing_with_the_gpu(page: Any, studio_server:
     assert found == found[:1] * 3
 
 
+def test_an_emptied_piece_has_no_lanes(page: Any, studio_server: Served) -> None:
+    put(studio_server, "anna")
+    wait_for_dancers(page, 1)
+    studio_server.edit(edit="delete", block="b1")
+    until(page, "studio.store.state.piece.blocks.length === 0 && !document.querySelector('.lanes')")
+    studio_server.insert("b2", "ballet/adagio", 0, 10)
+    wait_for_dancers(page, 1)
+
+
 def test_an_insertion_of_several_dancers_is_selected_and_flipped(page: Any, studio_server: Served) -> None:
     studio_server.send("POST", "/api/seams")
     studio_server.insert("b2", "ballet/plies", 0, 20)

@@ -53,11 +53,11 @@ class Cast extends EventTarget {
 
   /** The piece as all dancers dance it; as it is, if there are none. @param {any} piece a Composed */
   async gather(piece) {
-    const request = ++this.requests;
     if (this.now.dancers.length === 0) {
-      this.#set({ data: null, near: [], error: "", troupe: null });
+      this.clear();
       return piece;
     }
+    const request = ++this.requests;
     try {
       const data = await this.studio.api.get("/api/ensemble");
       const troupe = await gather(piece, data);
@@ -71,6 +71,12 @@ class Cast extends EventTarget {
       if (request === this.requests) this.#set({ data: null, near: [], troupe: null, error: /** @type {Error} */ (error).message });
       return piece;
     }
+  }
+
+  /** Forget how they play: nobody dances, or the piece is empty. */
+  clear() {
+    this.requests += 1; // what is under way sets nothing
+    this.#set({ data: null, near: [], error: "", troupe: null });
   }
 
   /** Find who comes too near. @param {number} request */

@@ -124,6 +124,7 @@ export function usePlayed(studio, movements, { parts }) {
   useEffect(() => {
     if (parts.length === 0) {
       studio.viewer.clear();
+      castOf(studio).clear();
       return undefined;
     }
     let stale = false;
