@@ -495,3 +495,8 @@ def test_the_link_plays_all_dancers(served: Served, open_page: Callable[..., Any
     page = open_page(link_of(served))
     until(page, "studio.viewer.motion.dancers?.length === 2")
     until(page, "studio.viewer.motion.dancers.every(({ piece }) => piece.times.length > 1)")
+    # A moment is the first dancer's, who enters after two seconds.
+    served.edit(edit="dancer", dancer={"id": "d0", "name": "0", "entry": 5})
+    until(page, "studio.viewer.motion.clock(0) === 2")
+    page.evaluate("studio.viewer.player.seek(2.5)")
+    until(page, "document.querySelector('[data-testid=comment-moment]').textContent === '0.50 s'")

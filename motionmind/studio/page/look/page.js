@@ -63,7 +63,7 @@ function Form({ studio, piece, movements }) {
   const field = useRef(/** @type {any} */ (null));
   const moment = useRef(/** @type {any} */ (null));
   useEffect(() => {
-    const follow = () => (moment.current.textContent = `${clock(player.time)} s`);
+    const follow = () => (moment.current.textContent = `${clock(studio.viewer.own)} s`);
     follow();
     player.addEventListener("change", follow);
     return () => player.removeEventListener("change", follow);
@@ -72,8 +72,7 @@ function Form({ studio, piece, movements }) {
   const send = (/** @type {Event} */ event) => {
     event.preventDefault();
     studio.once("comment", async () => {
-      const { motion } = studio.viewer;
-      const place = anchorOf(piece, motion?.own?.(player.time) ?? player.time, (block) => movements.at(block.key)?.times);
+      const place = anchorOf(piece, studio.viewer.own, (block) => movements.at(block.key)?.times);
       studio.store.take(await studio.api.post("/api/comments", { author, text, ...place }));
       localStorage.setItem(NAME, author);
       setText("");
@@ -101,12 +100,12 @@ function Notes({ studio, piece }) {
   const go = (/** @type {any} */ note) => {
     if (!note) return;
     if (player.playing) player.pause();
-    player.seek(studio.viewer.motion?.clock?.(note.at) ?? note.at);
+    player.seek(studio.viewer.clock(note.at));
     list.current?.querySelector(`[data-note="${note.id}"]`)?.scrollIntoView({ block: "nearest" });
   };
   useKeys(studio, [
-    { keys: ["["], does: "go to the note before", group: "Comments", act: () => go(noteFrom(piece.notes, player.time, -1)) },
-    { keys: ["]"], does: "go to the note after", group: "Comments", act: () => go(noteFrom(piece.notes, player.time, 1)) },
+    { keys: ["["], does: "go to the note before", group: "Comments", act: () => go(noteFrom(piece.notes, studio.viewer.own, -1)) },
+    { keys: ["]"], does: "go to the note after", group: "Comments", act: () => go(noteFrom(piece.notes, studio.viewer.own, 1)) },
   ]);
   const blocks = new Map(piece.blocks.map((/** @type {any} */ block) => [block.id, block]));
   return html`<ul class="notes" ref=${list}>
