@@ -378,6 +378,10 @@ def test_edges_insertions_and_the_playhead_snap_to_beats(open_page: Callable[...
     page = open_page()
     open_music(page, beats)
     assert page.get_by_test_id("music-lane").get_attribute("data-beats") == "20"
+    page.get_by_test_id("ruler").focus()
+    for key in ("PageUp", "PageUp", "PageUp", "PageDown"):  # from beat to beat, also without snapping
+        page.keyboard.press(key)
+        assert counted(page, page.evaluate(TIME)) < 1e-6
     page.get_by_test_id("snap").click()
     ruler = page.get_by_test_id("ruler").bounding_box()
     for share in (0.11, 0.29, 0.43):

@@ -27,10 +27,9 @@ export function Ruler({ does, sight, seconds, meter }) {
   };
   const key = (event) => {
     if (event.altKey || event.ctrlKey || event.metaKey) return;
-    const beat = 60 / meter.tempo;
     const steps = { ArrowLeft: -1, ArrowRight: 1, ArrowDown: -1, ArrowUp: 1 };
-    const by = { PageUp: beat, PageDown: -beat };
-    let to_ = { Home: 0, End: seconds }[event.key] ?? (event.key in by ? does.time + by[event.key] : null);
+    const counts = { PageUp: 1, PageDown: -1 };
+    let to_ = { Home: 0, End: seconds }[event.key] ?? (event.key in counts ? countFrom(does.time, counts[event.key], meter) : null);
     if (event.key in steps) to_ = does.sight.snaps ? countFrom(does.time, steps[event.key], meter) : does.time + steps[event.key] * KEY_STEP_S;
     if (to_ === null) return;
     event.preventDefault();
