@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -191,6 +192,27 @@ def test_a_path_is_made_moved_and_removed_by_keys_and_fields(
     wait_for(page, f"{TRAVEL}.facing === null")
     page.get_by_test_id("travel-clear").click()
     wait_for(page, f"!{TRAVEL}")
+
+
+@pytest.mark.parametrize("studio_page", [SMALL], ids=["small"], indirect=True)
+def test_a_point_that_keys_moved_is_kept_when_something_else_is_selected(
+    studio_server: Served, studio_page: Any
+) -> None:
+    page = studio_page
+    _insertion(page, studio_server)
+    page.get_by_test_id("floor-draw").focus()
+    page.keyboard.press("Enter")
+    wait_for(page, f"{TRAVEL} && {INSERTED}")
+    (first,) = _travel(page)["points"]
+    page.get_by_test_id("floor-point-1").focus()
+    page.evaluate(
+        """() => {
+          const key = new KeyboardEvent("keydown", { key: "ArrowRight", bubbles: true });
+          document.querySelector("[data-testid=floor-point-1]").dispatchEvent(key);
+          studio.store.set({ selection: { block: "b3" } });
+        }"""
+    )
+    wait_for(page, f"JSON.stringify({TRAVEL}.points[0]) !== '{json.dumps(first, separators=(',', ':'))}'")
 
 
 @pytest.mark.parametrize("studio_page", [LARGE], ids=["large"], indirect=True)

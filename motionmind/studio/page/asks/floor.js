@@ -102,6 +102,7 @@ class Floor extends EventTarget {
   /** Ask for the points that have changed. */
   async commit() {
     clearTimeout(this.pause);
+    this.pause = 0;
     const { asked, draft } = this;
     if (!asked?.draw || !draft) return;
     const points = draft.map((place) => fromScene(asked, place)).map(([x, , z]) => [millimetre(x), millimetre(z)]);
@@ -123,6 +124,7 @@ class Floor extends EventTarget {
     const asked = askedOf(this.studio);
     const usable = asked?.draw && !asked.locked ? asked : null;
     if (usable?.name !== this.asked?.name) {
+      if (this.pause) this.commit(); // what keys moved last
       this.draft = null;
       if (this.drawing) this.#mode(false);
     }
