@@ -1,11 +1,10 @@
 /** Where the dancers begin: a spot on the floor for each, in the viewer, which is dragged or moved by keys. */
 
-import { Vector3 } from "three";
+import { groundUnder } from "../asks/ground.js";
 import { pixelOf } from "../view/pointing.js";
 
 const STEP_M = 0.1; // places are multiples of this; a key moves by one
 const CLICK_SLACK_PX = 4;
-const SMALLEST_FALL = 1e-3; // of a ray that meets the floor: a flatter one meets it too far away
 const KEYS = /** @type {Record<string, [number, number]>} */ ({ ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] });
 
 /** @typedef {[number, number]} Place */
@@ -84,10 +83,10 @@ export class Spots {
     const { held } = this;
     if (!held) return;
     held.moves ||= Math.hypot(event.clientX - held.x, event.clientY - held.y) >= CLICK_SLACK_PX;
-    const place = held.moves && floorUnder(event, this.viewer.overlay, this.viewer.stage.camera);
-    if (!place) return;
-    held.place = place;
-    this.#show(held.id, place);
+    const under = held.moves && groundUnder(event, this.viewer.overlay, this.viewer.stage);
+    if (!under) return;
+    held.place = [rounded(under[0]), rounded(under[2])];
+    this.#show(held.id, held.place);
   }
 
   #put() {
@@ -127,17 +126,6 @@ export class Spots {
     if (dancer) dancer.place = place;
     this.viewer.stale();
   }
-}
-
-/** The place on the floor under the pointer, to ten centimetres; null above the horizon. @param {PointerEvent} event @param {Element} element covers the view @param {any} camera @returns {Place | null} */
-function floorUnder(event, element, camera) {
-  const { left, top, width, height } = element.getBoundingClientRect();
-  const x = (2 * (event.clientX - left)) / width - 1;
-  const y = 1 - (2 * (event.clientY - top)) / height;
-  const ray = new Vector3(x, y, 0.5).unproject(camera).sub(camera.position).normalize();
-  if (ray.y > -SMALLEST_FALL) return null;
-  const met = ray.multiplyScalar(-camera.position.y / ray.y).add(camera.position);
-  return [rounded(met.x), rounded(met.z)];
 }
 
 /** @param {number} metres */
