@@ -40,8 +40,8 @@ function Near({ cast }) {
   const { near } = cast;
   if (near === null) return html`<p class="hint" role="status">Looking for dancers who come too near…</p>`;
   if (near.length === 0) return html`<p class="hint" role="status" data-testid="near-none">Nobody comes nearer than an arm's length.</p>`;
-  return html`<section class="card near" data-testid="near" aria-label="Nearer than an arm's length" role="status">
-    <h3 class="said warning">Nearer than an arm's length</h3>
+  return html`<section class="card near" data-testid="near" aria-label="Nearer than an arm's length">
+    <h3 class="said warning"><span role="status">Nearer than an arm's length</span></h3>
     <ul>
       ${near.slice(0, MAX_SHOWN_NEAR).map(
         (/** @type {any} */ { names, metres, seconds, count }) => html`<li><button class="button quiet" title="Show this moment" onClick=${() => cast.seek(seconds)}>
