@@ -3,7 +3,7 @@
 const CLICK_SLACK_PX = 4;
 
 /** How many counts a key moves an entry; Infinity is to the first count. */
-export const STEPS = /** @type {Record<string, number>} */ ({ ArrowLeft: -1, ArrowRight: 1, PageUp: 8, PageDown: -8, Home: -Infinity });
+export const STEPS = /** @type {Record<string, number>} */ ({ ArrowLeft: -1, ArrowRight: 1, ArrowDown: -1, ArrowUp: 1, PageUp: 8, PageDown: -8, Home: -Infinity });
 
 /** An entry moved by some counts; between counts, to the one before or after. @param {number} entry @param {number} by */
 export function movedEntry(entry, by) {

@@ -7,9 +7,8 @@ import { Drag, movedEntry, retimed, STEPS } from "./entries.js";
 
 const BORDER_PX = 5; // of a lane's bar, at its left, as in dancers.css
 const ROWS = [
-  { shown: ["←", "→"], does: "enter, or change formation, a count earlier or later (or drag)", group: "Dancers" },
+  { shown: ["←", "→", "↓", "↑"], does: "enter, or change formation, a count earlier or later (or drag)", group: "Dancers" },
   { shown: ["Page ↑", "Page ↓"], does: "eight counts", group: "Dancers" },
-  { shown: ["↑", "↓"], does: "the dancer above or below", group: "Dancers" },
   { shown: ["Enter"], does: "hide or show the dancer", group: "Dancers" },
 ];
 
@@ -21,16 +20,12 @@ export function Lanes({ does, sight, children }) {
   const { data } = cast;
   const dancers = data?.dancers ?? [];
   const { changes } = cast.now;
-  const element = useRef(/** @type {any} */ (null));
   const drag = useRef(/** @type {Drag | null} */ (null));
   const [draft, setDraft] = useState(/** @type {{name: string, count: number} | null} */ (null));
-  const [stop, setStop] = useState("");
   useEffect(() => studio.keys.add(ROWS), [studio]);
   if (!data || dancers.length === 0) return null;
 
   const x = (/** @type {number} */ time) => time * sight.scale;
-  const names = [...changes.map((_, i) => `/${i}`), ...dancers.map(({ id }) => id)];
-  const chosen = names.includes(stop) ? stop : dancers[0].id;
   /** What is at a name: its count, and the edit that moves it there. @param {string} name */
   const item = (name) => {
     const change = name.startsWith("/") ? changes[Number(name.slice(1))] : undefined;
@@ -43,7 +38,6 @@ export function Lanes({ does, sight, children }) {
     const name = nameOf(event);
     if (event.button !== 0 || event.target.closest("button")) return;
     if (!name) return;
-    setStop(name);
     event.currentTarget.setPointerCapture(event.pointerId);
     drag.current = new Drag(name, item(name).count, event.clientX);
   };
@@ -67,32 +61,26 @@ export function Lanes({ does, sight, children }) {
     const name = nameOf(event);
     if (!name || event.altKey || event.ctrlKey || event.metaKey) return;
     if (event.key === "Escape") return cancel();
-    const by = { ArrowUp: -1, ArrowDown: 1 }[event.key];
-    const next = by && names[names.indexOf(name) + by];
     const step = STEPS[event.key];
-    if (next) {
-      setStop(next);
-      element.current.querySelector(`[data-lane="${next}"]`)?.focus();
-    } else if (step !== undefined) {
+    if (step !== undefined) {
       if (name.startsWith("/")) cast.form((all) => retimed(all, Number(name.slice(1)), movedEntry(all[Number(name.slice(1))].at, step)));
       else cast.change(name, ({ entry }) => ({ entry: movedEntry(entry, step) }));
     } else if (event.key === "Enter" && !name.startsWith("/")) cast.toggle(name);
-    else if (!by) return;
+    else return;
     event.preventDefault();
     event.stopPropagation();
   };
   const slider = (/** @type {string} */ name, /** @type {string} */ label, /** @type {number} */ count) => ({
     role: "slider",
-    tabindex: name === chosen ? 0 : -1,
+    tabindex: 0,
     "data-lane": name,
     "aria-label": label,
     "aria-valuemin": 1,
     "aria-valuemax": 100000,
     "aria-valuenow": count,
     "aria-valuetext": `count ${rounded(count)}`,
-    onFocus: () => setStop(name),
   });
-  return html`<div class="lanes" ref=${element} role="group" aria-label="Dancers" data-testid="lanes" onKeyDown=${key}
+  return html`<div class="lanes" role="group" aria-label="Dancers" data-testid="lanes" onKeyDown=${key}
     onPointerDown=${down} onPointerMove=${moved} onPointerUp=${up} onPointerCancel=${cancel}>
     ${children}
     ${
