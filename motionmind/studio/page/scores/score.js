@@ -34,6 +34,8 @@ export class Score extends EventTarget {
   #versions = new Map();
   #at = ""; // the present one
   #whole = true;
+  /** @type {any} that was followed last */
+  #piece = null;
 
   /** @param {any} studio */
   constructor({ api, store, window }) {
@@ -41,7 +43,7 @@ export class Score extends EventTarget {
     this.api = api;
     this.store = store;
     this.window = window;
-    store.addEventListener("change", () => this.#follow());
+    store.addEventListener("change", () => store.state?.piece !== this.#piece && this.#follow());
   }
 
   get isOpen() {
@@ -176,6 +178,7 @@ export class Score extends EventTarget {
 
   /** Follow the piece: an undone change of the text is undone here, too. */
   #follow() {
+    this.#piece = this.store.state?.piece;
     if (!this.isOpen) return;
     const at = this.#found();
     const stale = !at && this.busy !== "composing" ? STALE : "";
