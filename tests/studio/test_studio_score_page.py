@@ -63,8 +63,14 @@ def test_a_line_and_the_playhead_follow_each_other(written: Any, axe_faults: Any
     page.evaluate("document.activeElement.blur()")
     page.evaluate("studio.viewer.player.seek(0)")
     page.evaluate("studio.viewer.player.seek(studio.viewer.piece.end - 0.01)")
-    mark, sheet = (page.locator(f".score .{name}").bounding_box() for name in ("mark.line", "sheet"))
-    assert sheet["y"] <= mark["y"] <= sheet["y"] + sheet["height"] - 20  # scrolled into sight
+    until(
+        page,
+        """(() => {
+          const [mark, sheet] = ["mark.line", "sheet"]
+            .map((name) => document.querySelector(`.score .${name}`).getBoundingClientRect());
+          return sheet.top <= mark.top && mark.top <= sheet.bottom - 20;
+        })()""",
+    )  # scrolled into sight
     assert axe_faults(page) == []
 
 

@@ -320,6 +320,8 @@ def test_smoothing_tells_how_far_it_is_and_can_be_stopped(page: Any) -> None:
 def test_the_ruler_counts_and_the_piece_is_zoomed(page: Any) -> None:
     page.get_by_test_id("tempo").fill("60")
     page.get_by_test_id("tempo").press("Enter")
+    wait_for(page, "studio.store.state.tempo === 60")
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")  # it is drawn
     ruler = page.get_by_test_id("ruler")
     ruler.focus()
     page.keyboard.press("Home")
