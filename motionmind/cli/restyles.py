@@ -180,7 +180,7 @@ def _lines(found: Restyled, corpus: str) -> Iterator[str]:
     if parts:
         part, _ = parts.most_common(1)[0]
         number = f"{parts.total()} of {count(len(found.links), 'tween')}"
-        yield f"faster    {number} are faster than anything in {corpus}, mostly the {displayed(part.replace('_', ' '))}"
+        yield f"faster    than anything in {corpus} in {number}, mostly the {displayed(part.replace('_', ' '))}"
 
 
 def _find_rig(

@@ -24,7 +24,7 @@ sequences = st.lists(st.tuples(st.integers(0, 3), st.sampled_from([2, 2, 2, 3, 0
 
 
 def played(rows: Rows, repeat: Repeat) -> list[tuple[int, list[tuple[int, int]]]]:
-    """Each call's start, and the rows that it plays: the phrase's cells, and its moves or those that the call gives."""
+    """Return where each call begins and the rows it plays. Moves are the phrase's, unless the call gives its own."""
     out = []
     first = repeat.calls[0]
     for call in repeat.calls:
