@@ -146,7 +146,7 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
         "read_variation": (mm.read_variation, {"path": folder / "variation.json"}),
         "transcribe": (
             transcription.transcribe,
-            {"motion": motion.slice(0, 2), "tolerance": 6.0, "name": "c", "repeats": True},
+            {"motion": motion.slice(0, 2), "tolerance": 6.0, "name": "c", "repeats": True, "vocabulary": ()},
         ),
         "restyle": (transcription.restyle, {"motion": motion, "engine": engine, "tolerance": 30.0}),
         "pass_through": (transcription.pass_through, {"postures": motion.slice(0, 2), "engine": engine}),

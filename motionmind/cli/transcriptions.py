@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,11 +15,14 @@ from motionmind.cli.pictures import CLIP, FIRST, LAST
 from motionmind.cli.printing import count, print_written
 from motionmind.cli.sources import parse_movement, read_movement, select_part
 from motionmind.cli.types import FILE, Number
+from motionmind.errors import MotionMindError
 from motionmind.files import all_or_none, write_atomically
+from motionmind.names.spelling import Source, parse_source
 from motionmind.transcription import LONGEST_MOVE_S, TOLERANCE_RANGE_DEG
 from motionmind.tween.counts import TEMPO_RANGE_BPM
 
 if TYPE_CHECKING:
+    from motionmind.notation.score import Score
     from motionmind.transcription import Transcription
 
 SCORE = ".score"
@@ -61,6 +64,14 @@ COMPARISONS = (".gif", ".mp4", ".html", ".png", ".pdf")
     metavar="S",
     help="Least seconds from posture to posture, even where the tolerance needs more of them.",
 )
+@option(
+    "--vocabulary",
+    section=Section.MOTION,
+    metavar="SCORE|CORPUS",
+    shell_complete=completion.corpora,
+    help="Use the positions of a score, or of a corpus written in scores, where they fit; repeatable.",
+    multiple=True,
+)
 @option("--report", section=Section.OUTPUT, type=FILE, help="File of the deviations over time, as JSON.")
 @option(
     "--picture",
@@ -82,6 +93,7 @@ def transcribe(
     shortest: float,
     tempo: float | None,
     no_repeats: bool,
+    vocabulary: tuple[str, ...],
     home: Path | None,
     **options: Any,
 ) -> None:
@@ -99,11 +111,13 @@ def transcribe(
     files: list[tuple[Path, tuple[str, ...]]] = [(path, (SCORE, *COMPARISONS)) for path in outputs]
     files += [(report, ())] if report else []
     files += [(picture, (".svg", ".png"))] if picture else []
-    check_outputs(files, named.source.paths)
+    words = [parse_source(word, home) for word in vocabulary]
+    check_outputs(files, [*named.source.paths, *(path for word in words for path in word.paths)])
+    scores = [score for word in words for score in _read_vocabulary(word, home)]
     whole = read_movement(named.source, name, home, **options)
     frames = select_part(named, whole, start, end)
     part = whole.slice(frames.start, frames.stop)
-    found = to_score(part, tolerance, shortest=shortest, tempo=tempo, repeats=not no_repeats)
+    found = to_score(part, tolerance, shortest=shortest, tempo=tempo, repeats=not no_repeats, vocabulary=scores)
     with all_or_none():
         for path in outputs:
             _write(path, found)
@@ -114,6 +128,23 @@ def transcribe(
     for line in _lines(found):
         click.echo(line)
     print_written([path for path, _ in files])
+
+
+def _read_vocabulary(source: Source, home: Path | None) -> Sequence[Score]:
+    """Read the scores of a vocabulary.
+
+    Raises:
+        MotionMindError: the source does not exist, or holds no scores.
+    """
+    from motionmind.names.finding import check_exists, open_collection
+
+    check_exists(source, home)
+    if source.name:
+        raise MotionMindError(f"--vocabulary {source.word}: give the whole score or corpus, {source.place}")
+    scores = () if source.kind == "file" else open_collection(source, home).scores
+    if not scores:
+        raise MotionMindError(f"--vocabulary {source.word}: holds no positions; give a score, or a corpus of scores")
+    return scores
 
 
 def _write(path: Path, found: Transcription) -> None:
@@ -150,6 +181,9 @@ def _lines(found: Transcription) -> Iterator[str]:
         lines = len(found.keys) - sum(each.saved for each in found.repeats)
         calls = sum(call.times for each in found.repeats for call in each.calls)
         yield f"{count(len(found.repeats), 'phrase')} danced {calls} times: {lines} lines"
+    if any(found.recognized.values()):
+        shares = ", ".join(f"{share:.0%} of {part}" for part, share in found.recognized.items())
+        yield f"positions of the vocabulary: {shares}"
     for part, values in found.deviation.degrees.items():
         off, most = np.percentile(values, [95.0, 100.0])
         line = f"{part:6} within {off:3.0f} degrees in 95 % of frames, {most:.0f} at most"

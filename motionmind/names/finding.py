@@ -48,6 +48,11 @@ class Collection(ABC):
     def clips(self) -> Mapping[str, str]:
         """Descriptions of the clips by name, in order."""
 
+    @property
+    @abstractmethod
+    def scores(self) -> Sequence[Score]:
+        """The scores in which the collection is written; none of a built corpus."""
+
     @abstractmethod
     def posture(self, name: str) -> Posture:
         """Return a posture by name."""
@@ -106,6 +111,10 @@ class _ScoreCollection(Collection):
     def clips(self) -> Mapping[str, str]:
         return {name: clip.about for name, clip in self._clips.items()}
 
+    @property
+    def scores(self) -> Sequence[Score]:
+        return [self._score]
+
     def posture(self, name: str) -> Posture:
         return _posture(self._score, name)
 
@@ -133,15 +142,14 @@ class _CorpusCollection(Collection):
         return parse_manifest(manifest, SourceManifest, self._folder / store.MANIFEST)
 
     @cached_property
-    def _all_scores(self) -> Sequence[Score]:
-        """The scores of a corpus written by hand, in order."""
+    def scores(self) -> Sequence[Score]:
         return _read_once(tuple(self._folder / name for name in self._written.scores)) if self._written else ()
 
     @cached_property
     def _scores(self) -> dict[str, Score]:
         """The score of each posture by name, the first if several scores have it."""
         found: dict[str, Score] = {}
-        for score in self._all_scores:
+        for score in self.scores:
             found = dict.fromkeys(score.postures, score) | found
         return found
 
@@ -160,7 +168,7 @@ class _CorpusCollection(Collection):
         if self._written is None:
             return _Labels(self._corpus)
         recorded = {clip.name: clip.about for clip in self._written.clips}
-        return recorded | {clip.name: clip.about for score in self._all_scores for clip in score.clips}
+        return recorded | {clip.name: clip.about for score in self.scores for clip in score.clips}
 
     def posture(self, name: str) -> Posture:
         return _posture(self._scores[name], name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,18 @@ from motionmind._typing import Bools, Floats, Ints
 from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.geometry import rotations as rot
 from motionmind.transcription.bones import Bones
+
+
+class Positions(NamedTuple):
+    """Named positions of a layer, as written for the left.
+
+    Attributes:
+        words: their names.
+        degrees: the angles of the layer's joints [N, joints, 3].
+    """
+
+    words: Sequence[str]
+    degrees: Floats
 
 
 class Written(NamedTuple):
@@ -32,7 +45,9 @@ class Written(NamedTuple):
         return out
 
 
-def write_angles(bones: Bones, rotations: Floats, tolerance: float) -> Written:
+def write_angles(
+    bones: Bones, rotations: Floats, tolerance: float, known: Mapping[str, Positions] | None = None
+) -> Written:
     """Return postures that a score can write in few words, near recorded ones.
 
     Joints are fitted from the pelvis outward. Each takes the angles that it has, in whole degrees within its limits,
@@ -44,6 +59,7 @@ def write_angles(bones: Bones, rotations: Floats, tolerance: float) -> Written:
         bones: the bones of the score's body.
         rotations: local rotations of postures on its skeleton [T, J, 4].
         tolerance: degrees; 0 merges nothing.
+        known: named positions of each layer, the first to stand for others.
     """
     body, count = bones.body, len(rotations)
     has = _angles_of(body)
@@ -68,7 +84,7 @@ def write_angles(bones: Bones, rotations: Floats, tolerance: float) -> Written:
             degrees[:, joint] = np.where(has[joint], np.round(wanted).clip(*limits), 0.0) + 0.0  # no -0.0
             fitted[:, joint] = rotations_of(body, degrees)[:, joint]
         if tolerance:
-            _merge(bones, layer, degrees, 0.5 * tolerance)
+            _merge(bones, layer, degrees, 0.5 * tolerance, (known or {}).get(layer))
             fitted[:, joints] = rotations_of(body, degrees)[:, joints]
     return Written(facing, degrees, fitted)
 
@@ -103,32 +119,42 @@ def _in_layer(body: Anatomy, name: str, layer: str) -> bool:
     return body.anatomy(name)[0] in body.layers[layer]
 
 
-def _merge(bones: Bones, layer: str, degrees: Floats, tolerance: float) -> None:
+def _merge(bones: Bones, layer: str, degrees: Floats, tolerance: float, known: Positions | None) -> None:
     """Replace the angles of a layer in `degrees` [T, J, 3] by those of few positions, at most `tolerance` off.
 
-    The slowest become positions first, so that the places where a limb rests have names (leader clustering: Hartigan,
-    "Clustering Algorithms", 1975, chapter 3). Right limbs share the positions of left ones, and trunks those of their
-    mirror images.
+    The nearest of the known positions comes first. Of the others, the slowest become positions first, so that the
+    places where a limb rests have names (leader clustering: Hartigan, "Clustering Algorithms", 1975, chapter 3). Right
+    limbs share the positions of left ones, and trunks those of their mirror images.
     """
     body = bones.body
     names, sides = body.layers[layer], SIDES if body.paired(body.layers[layer][0]) else ("",)
     own = [np.array([body.named(joint, side) for joint in names]) for side in sides]
-    samples = np.concatenate([degrees[:, joints] for joints in own])
-    mirrored = np.zeros(len(samples), dtype=np.bool_) if len(sides) == 2 else ~leads_left(samples)
-    samples[mirrored] = mirror_trunk(samples[mirrored])
-    alone = np.zeros((len(samples), len(body.skeleton), 3))
-    alone[:, own[0]] = samples
     wide = np.isin(bones.joints, own[0])
-    directions = bones.directions(rotations_of(body, alone))[:, wide]
     allowed = 2.0 * np.sin(0.5 * np.radians(bones.allowed(tolerance)[wide]))
+
+    def written_left(angles: Floats) -> tuple[Floats, Bools, Floats]:
+        """Return angles [N, joints, 3] for one side, which of them were mirrored, and the directions of the bones."""
+        mirrored = np.zeros(len(angles), dtype=np.bool_) if len(sides) == 2 else ~leads_left(angles)
+        angles = np.where(mirrored[:, None, None], mirror_trunk(angles), angles)
+        alone = np.zeros((len(angles), len(body.skeleton), 3))
+        alone[:, own[0]] = angles
+        return angles, mirrored, bones.directions(rotations_of(body, alone))[:, wide]
+
+    samples, mirrored, directions = written_left(np.concatenate([degrees[:, joints] for joints in own]))
     speed = np.concatenate([_speed(part) for part in np.split(directions, len(sides))])
-    leaders = np.full(len(samples), -1)
+    merged = samples.copy()
+    nearest = np.ones(len(samples))
+    if known is not None and len(known.words):
+        for angles, _, towards in zip(*written_left(known.degrees), strict=True):
+            off = (rot.norm(directions - towards) / allowed).max(axis=1)
+            merged[off < nearest] = angles
+            nearest = np.minimum(nearest, off)
+    free = nearest == 1.0
     for sample in np.argsort(speed, kind="stable"):
-        if leaders[sample] < 0:
-            free = np.flatnonzero(leaders < 0)
-            near = (rot.norm(directions[free] - directions[sample]) <= allowed).all(axis=1)
-            leaders[free[near]] = sample
-    merged = samples[leaders]
+        if free[sample]:
+            others = np.flatnonzero(free)
+            near = others[(rot.norm(directions[others] - directions[sample]) <= allowed).all(axis=1)]
+            merged[near], free[near] = samples[sample], False
     merged[mirrored] = mirror_trunk(merged[mirrored])
     for joints, part in zip(own, np.split(merged, len(sides)), strict=True):
         degrees[:, joints] = part

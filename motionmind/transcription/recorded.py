@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,9 +14,11 @@ from motionmind.body.contact import lowest_point
 from motionmind.body.motion import Motion
 from motionmind.clean.stances import find_foot_stances, floor_heights
 from motionmind.errors import MotionMindError
+from motionmind.notation.score import Score
 from motionmind.retarget.retarget import to_human23
-from motionmind.transcription.angles import Written, write_angles
+from motionmind.transcription.angles import Positions, Written, write_angles
 from motionmind.transcription.bones import Bones
+from motionmind.transcription.vocabulary import read_positions
 
 MAX_RATE_FPS = 30.0  # frames a second that are compared with the score; a faster recording is resampled
 MAX_RECORDING_S = 600.0  # the steps between frames take 10 s of processor per minute
@@ -33,6 +36,7 @@ class Recorded:
         writable: local rotations of the frames as the notation could write them at best, in the world [T, J, 4].
         up: height of the lowest point of each frame in the air [T], centimetres; 0 on the floor.
         root: position of the pelvis in each written frame [T, 3], metres.
+        positions: named positions of each layer that the score may use.
     """
 
     bones: Bones
@@ -42,6 +46,7 @@ class Recorded:
     writable: Floats
     up: Ints
     root: Floats
+    positions: Mapping[str, Positions]
 
 
 def to_even_human23(motion: Motion) -> Motion:
@@ -52,7 +57,7 @@ def to_even_human23(motion: Motion) -> Motion:
     return moved
 
 
-def prepare(motion: Motion, tolerance: float) -> Recorded:
+def prepare(motion: Motion, tolerance: float, vocabulary: Sequence[Score] = ()) -> Recorded:
     """Prepare a recording of a person for transcription.
 
     The score's body has proportions of its own: joints keep their rotations, and travel is scaled by the bodies'
@@ -61,10 +66,11 @@ def prepare(motion: Motion, tolerance: float) -> Recorded:
     Args:
         motion: the recording.
         tolerance: of the score, degrees.
+        vocabulary: scores whose positions it may use.
 
     Raises:
         MotionMindError: the recording is too long.
-        SkeletonError: it is not of a person.
+        SkeletonError: it is not of a person, or a score is of another body.
     """
     if motion.times[-1] - motion.times[0] > MAX_RECORDING_S:
         raise MotionMindError(
@@ -84,9 +90,11 @@ def prepare(motion: Motion, tolerance: float) -> Recorded:
     floor = floor_heights(lowest, moved.fps) if len(moved) > 1 else lowest
     moved = replace(moved, root=moved.root - np.stack([np.zeros_like(floor), floor, np.zeros_like(floor)], axis=-1))
     bones = Bones.of(body)
-    written = write_angles(bones, moved.rotations, tolerance)
+    positions = read_positions(vocabulary, bones)
+    written = write_angles(bones, moved.rotations, tolerance, positions)
     up = np.where(stands.any(axis=1), 0, np.round(100.0 * np.maximum(lowest - floor, 0.0))).astype(np.int64)
     root = moved.root.copy()
     root[:, 1] = 0.0
     root[:, 1] = 0.01 * up - lowest_point(body, written.rotations, root)[0]
-    return Recorded(bones, moved, stands, written, write_angles(bones, moved.rotations, 0.0).turned(), up, root)
+    writable = write_angles(bones, moved.rotations, 0.0).turned()
+    return Recorded(bones, moved, stands, written, writable, up, root, positions)

@@ -14,9 +14,8 @@ from motionmind.transcription.angles import leads_left, mirror_trunk
 from motionmind.transcription.moves import Move
 from motionmind.transcription.recorded import Recorded
 from motionmind.transcription.repeats import Call, Repeat, Rows
-from motionmind.transcription.words import LINES, angle_terms, limb_word, trunk_word
+from motionmind.transcription.words import LINES, PLANTED, angle_terms, limb_word, trunk_word
 
-PLANTED = "on"  # the position of a leg that bears weight
 OPEN = "MOVE"  # the open words of phrases: MOVE-2 is the move to the second posture
 MAX_CALL_CHARS = 100  # of a line, after which the line of a call is continued
 
@@ -26,16 +25,29 @@ class Vocabulary:
     """The positions of one layer, by their definitions.
 
     Attributes:
-        names: the name of each definition, in order.
+        names: the name of each definition in use, in order.
+        known: the names of positions of a given vocabulary, by their definitions.
         taken: how often each word is in use.
+        count: how many positions were named.
+        recognized: how many of these are known.
     """
 
     names: dict[str, str] = field(default_factory=dict)
+    known: dict[str, str] = field(default_factory=dict)
     taken: dict[str, int] = field(default_factory=dict)
+    count: int = 0
+    recognized: int = 0
+
+    def __post_init__(self) -> None:
+        self.taken |= dict.fromkeys(self.known.values(), 1)
 
     def name(self, terms: str, word: str) -> str:
         """Return the name of a position; a new one is called `word`, with a number if that is taken."""
-        if terms not in self.names:
+        self.count += 1
+        self.recognized += terms in self.known
+        if terms in self.known:
+            self.names[terms] = self.known[terms]
+        elif terms not in self.names:
             self.taken[word] = number = self.taken.get(word, 0) + 1
             self.names[terms] = word if number == 1 else f"{word}-{number}"
         return self.names[terms]
@@ -52,7 +64,14 @@ class ScoreWriter:
 
     def __init__(self, recorded: Recorded, keys: Ints) -> None:
         self.body = recorded.bones.body
-        self.vocabulary = {layer: Vocabulary() for layer in self.body.layers}
+        self.vocabulary = {
+            layer: Vocabulary(
+                known={
+                    self._terms(layer, degrees): word for word, degrees in reversed(list(zip(*positions, strict=True)))
+                }
+            )
+            for layer, positions in recorded.positions.items()
+        }
         points = self.body.skeleton.positions_and_tips(recorded.written.rotations[keys], np.zeros((len(keys), 3)))
         self.cells = [
             [
@@ -68,24 +87,27 @@ class ScoreWriter:
         """Return the cell of a pair of limbs, and add their positions to the vocabulary."""
         words = []
         for number, side in enumerate(SIDES):
-            angles = {joint: degrees[self.body.named(joint, side)] for joint in self.body.layers[layer]}
+            own = degrees[[self.body.named(joint, side) for joint in self.body.layers[layer]]]
             line = self._line(layer, points, side) * np.array([1.0 - 2.0 * number, 1.0, 1.0])
-            bend = float(np.abs(angles[LINES[layer][2]]).max())
-            name = self.vocabulary[layer].name(angle_terms(self.body, layer, angles), limb_word(line, bend))
+            bend = float(np.abs(degrees[self.body.named(LINES[layer][2], side)]).max())
+            name = self.vocabulary[layer].name(self._terms(layer, own), limb_word(line, bend))
             words.append(f"{name} {PLANTED}" if layer == "legs" and stands[number] else name)
         return words[0] if words[0] == words[1] else " / ".join(words)
 
     def _trunk(self, layer: str, degrees: Floats, points: Floats) -> str:
         """Return the cell of the trunk or head, and add its position to the vocabulary, written for the left."""
-        joints = self.body.layers[layer]
-        own = degrees[[self.body.named(joint, "") for joint in joints]]
-        left = bool(leads_left(own))
-        terms, image = (
-            angle_terms(self.body, layer, dict(zip(joints, each, strict=True))) for each in (own, mirror_trunk(own))
+        own = degrees[[self.body.named(joint, "") for joint in self.body.layers[layer]]]
+        terms, image = self._terms(layer, own), self._terms(layer, mirror_trunk(own))
+        vocabulary = self.vocabulary[layer]
+        left = terms in vocabulary.known or (image not in vocabulary.known and bool(leads_left(own)))
+        name = vocabulary.name(
+            terms if left else image, trunk_word(self._line(layer, points, ""), float(own[:, 1].sum()))
         )
-        word = trunk_word(self._line(layer, points, ""), float(own[:, 1].sum()))
-        name = self.vocabulary[layer].name(terms if left else image, word)
         return name if terms == image else f"{name} {'left' if left else 'right'}"
+
+    def _terms(self, layer: str, degrees: Floats) -> str:
+        """Write the angles of a layer's joints [joints, 3] as a definition."""
+        return angle_terms(self.body, layer, dict(zip(self.body.layers[layer], degrees, strict=True)))
 
     def _line(self, layer: str, points: Floats, side: str) -> Floats:
         """Return the unit vector along a part of the body [3]."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -13,13 +13,14 @@ import msgspec
 import numpy as np
 
 from motionmind._typing import Ints
-from motionmind.arguments import check_flag, check_real, check_text, check_type
+from motionmind.arguments import check_flag, check_items, check_real, check_text, check_type
 from motionmind.body.motion import Motion
 from motionmind.ensemble.dancers import Dancer, Ensemble
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import compose
 from motionmind.notation.read import LINE_WORDS, RESERVED_NAMES
+from motionmind.notation.score import Score
 from motionmind.transcription.bones import CM_PER_DEG, deviations
 from motionmind.transcription.following import SLIDE_SHARE, Following, check_fineness
 from motionmind.transcription.moves import Move, counts_of
@@ -55,6 +56,7 @@ class Transcription:
         keys: its postures' frames in `recording` [K].
         fewest: the fewest postures that follow the recording; `keys` can be more, to write takes of a phrase alike.
         repeats: its phrases, with the rows that call them; row k is the posture of `keys[k]`.
+        recognized: by body part, the share of positions that are of the given vocabulary.
         recording: the recording with the score's proportions, on a level floor; at most 30 frames a second.
         motion: the movement of the score.
         deviation: how far that deviates from the recording.
@@ -66,6 +68,7 @@ class Transcription:
     keys: Ints
     fewest: int
     repeats: list[Repeat]
+    recognized: dict[str, float]
     recording: Motion
     motion: Motion
     deviation: Deviation
@@ -98,6 +101,7 @@ def transcribe(
     tempo: float | None = None,
     name: str = "",
     repeats: bool = True,
+    vocabulary: Sequence[Score] = (),
 ) -> Transcription:
     """Transcribe a recording into a score.
 
@@ -116,11 +120,12 @@ def transcribe(
         tempo: counts per minute; None for counts of one second.
         name: name of the score's clip; "" for the motion's.
         repeats: whether phrases that recur become phrases of the score, if it has up to 2,000 postures.
+        vocabulary: scores whose positions are used, by their names, where they are within half the tolerance.
 
     Raises:
         MotionMindError: the tolerance, the time or the tempo is out of range, or the recording lasts more than 10
             minutes.
-        SkeletonError: the movement is not of a person.
+        SkeletonError: the movement is not of a person, or a score of the vocabulary is of another body.
 
     >>> import numpy as np
     >>> from motionmind import Motion, human23
@@ -134,11 +139,12 @@ def transcribe(
     check_real("tempo", tempo, or_none=True)
     check_text("name", name)
     check_flag("repeats", repeats)
+    check_items("vocabulary", vocabulary, "scores", Score)
     check_fineness(tolerance, shortest)
     counts = 60.0 if tempo is None else tempo  # a count is a second where no tempo is known
     if not 1.0 <= counts <= 6000.0:
         raise MotionMindError(f"a tempo must be from 1 to 6000 counts per minute, not {counts:g}")
-    recorded = prepare(motion, tolerance)
+    recorded = prepare(motion, tolerance, vocabulary)
     following = Following(recorded, tolerance, shortest)
     fewest = following.fewest_keys(0, len(recorded.root))
     choices = [(recorded, fewest)]
@@ -147,15 +153,26 @@ def transcribe(
         choices.append(match_takes(following, fewest, phrases, tolerance))
     clip, title = _clip_name(name or motion.name), _title(motion.name)
     drafts = [_draft(*choice, tolerance, counts, clip, title, repeats) for choice in choices]
-    keys, found, text = min(drafts, key=lambda draft: len(draft.keys) - sum(each.saved for each in draft.repeats))
-    composed = _compose(text)
-    deviation = _deviation(recorded, composed)
-    return Transcription(text, tolerance, shortest, keys, len(fewest), found, recorded.motion, composed, deviation)
+    best = min(drafts, key=lambda draft: len(draft.keys) - sum(each.saved for each in draft.repeats))
+    composed = _compose(best.text)
+    return Transcription(
+        best.text,
+        tolerance,
+        shortest,
+        best.keys,
+        len(fewest),
+        best.repeats,
+        best.recognized,
+        recorded.motion,
+        composed,
+        _deviation(recorded, composed),
+    )
 
 
 class _Draft(NamedTuple):
     keys: Ints
     repeats: list[Repeat]
+    recognized: dict[str, float]
     text: str
 
 
@@ -169,7 +186,8 @@ def _draft(
     travel = _travel(recorded, keys, still, tolerance, models)
     moves = [move._replace(left=left, ahead=ahead) for move, (left, ahead) in zip(moves, travel, strict=True)]
     found = find_repeats(writer.rows(moves)) if repeats else []
-    return _Draft(keys, found, writer.text(moves, tempo, clip, title, found))
+    recognized = {layer: words.recognized / words.count for layer, words in writer.vocabulary.items()}
+    return _Draft(keys, found, recognized, writer.text(moves, tempo, clip, title, found))
 
 
 def _clip_name(name: str) -> str:
