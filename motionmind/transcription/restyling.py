@@ -17,9 +17,10 @@ import numpy as np
 
 from motionmind._typing import Floats, Ints
 from motionmind.arguments import check_function, check_type
-from motionmind.body.motion import Motion
+from motionmind.body.motion import Insertion, Motion
 from motionmind.body.plausibility import at_rate
 from motionmind.body.rates import FILM_FPS
+from motionmind.credits.credit import Credit, add_up
 from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
 from motionmind.geometry import rotations as rot
 from motionmind.metrics.figures import assign_states, measure_feet
@@ -212,7 +213,7 @@ def pass_through(
         part, link = _join(postures, number, (float(start), float(end)), engine, request, parts, watch)
         parts.append(part)
         links.append(link)
-    motion = _chained(parts, request.fps, postures.name)
+    motion = _chained(parts, request.fps, postures)
     source = (source or postures).at(postures.times[0] + motion.times)
     source = replace(source, times=motion.times)
     return Restyled(motion, keys, source, tuple(links), _figures(source, motion, engine))
@@ -248,22 +249,35 @@ def _join(
     )
 
 
-def _chained(parts: list[Motion], fps: float, name: str) -> Motion:
-    """Return movements one after another; each begins in the last frame of the one before."""
+def _chained(parts: list[Motion], fps: float, postures: Motion) -> Motion:
+    """Return movements one after another; each begins in the last frame of the one before.
+
+    Of each movement one frame is credited to the source of the postures: the one that is kept.
+    """
     begins = np.cumsum([0.0, *(part.times[-1] - part.times[0] for part in parts)])
     rotations = np.concatenate([parts[0].rotations, *(part.rotations[1:] for part in parts[1:])])
+    kept = [replace(credit, share=credit.share / fps) for credit in postures.own_credits]
     return replace(
         parts[0],
         rotations=rotations,
         root=np.concatenate([parts[0].root, *(part.root[1:] for part in parts[1:])]),
         times=np.arange(len(rotations)) / fps,
         insertions=tuple(
-            replace(one, times=one.times - part.times[0] + begin)
+            replace(
+                one,
+                times=one.times - part.times[0] + begin,
+                credits=add_up([*kept, *_seconds_by_credit(one, float(part.times[-1] - part.times[0]) - 1.0 / fps)]),
+            )
             for begin, part in zip(begins, parts, strict=False)
             for one in part.insertions
         ),
-        name=name,
+        name=postures.name,
     )
+
+
+def _seconds_by_credit(insertion: Insertion, seconds: float) -> list[Credit]:
+    """Return an insertion's credits with shares in seconds."""
+    return [replace(credit, share=credit.share * max(seconds, 0.0)) for credit in insertion.credits or (Credit(1.0),)]
 
 
 def _figures(source: Motion, motion: Motion, engine: Engine) -> dict[str, tuple[float, float]]:

@@ -13,6 +13,7 @@ from bundled_clips import ballet_clip
 from command_line import Run
 
 from motionmind import Engine, Motion, MotionMindError, NoPathError, SkeletonError, compose, read_motion, write_motion
+from motionmind.credits import Credit
 from motionmind.geometry import rotations as rot
 from motionmind.transcription import Restyled, pass_through, restyle, transcribe
 
@@ -49,6 +50,16 @@ def test_movement_between_postures_is_not_the_recordings() -> None:
     assert np.median(found.degrees) > 1.0
     assert found.degrees[found.keys].max() < 1e-4
     assert found.centimetres[found.keys].max() < 1e-4
+
+
+def test_kept_postures_are_credited_to_their_recording_a_frame_each() -> None:
+    found, clip = restyled(), replace(recorded(), recorded=(Credit(1.0, "plies", "Ada", "own", licence="CC-BY-4.0"),))
+    credited = restyle(clip, engine("karate")).motion.credits
+    (own,) = (credit for credit in credited if credit.corpus == "own")
+    assert own.performer == "Ada"
+    assert own.share == pytest.approx((len(found.keys) - 1) / (len(found.motion) - 1))
+    assert {credit.corpus for credit in credited} >= {"own", "karate"}
+    assert sum(credit.share for credit in credited) == pytest.approx(1.0)
 
 
 def test_the_first_movement_is_the_tween_of_the_first_two_postures() -> None:
