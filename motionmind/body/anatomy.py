@@ -154,8 +154,8 @@ class Anatomy:
         for name, given in degrees.items():
             vectors[:, self.skeleton.index(name)] = given
         out = to_rotations(self._conventions, vectors)
-        for index, frame in self._measured_elsewhere:
-            out[:, index] = rot.inv_mul(self._between(out, frame, index), out[:, index])
+        for index, _ in self._measured_elsewhere:
+            out[:, [index]] = self.rotations_of(np.array([index]), vectors[:, [index]], out)
         return out
 
     def degrees(self, rotations: Floats, joints: Sequence[int] | None = None) -> Floats:
@@ -179,6 +179,20 @@ class Anatomy:
             for place in np.flatnonzero(joints == index):
                 turned[..., place, :] = rot.mul(self._between(rotations, frame, index), turned[..., place, :])
         return to_degrees(self._conventions.of(joints), turned)
+
+    def rotations_of(self, joints: Indices, degrees: Floats, rotations: Floats) -> Floats:
+        """Return the local rotations of some joints only [..., n, 4]: the inverse of `degrees_of`.
+
+        Args:
+            joints: their indices [n].
+            degrees: their angles [..., n, 3].
+            rotations: local rotations [..., J, 4], of which those of the joints above count.
+        """
+        out = to_rotations(self._conventions.of(joints), degrees)
+        for index, frame in self._measured_elsewhere:
+            for place in np.flatnonzero(joints == index):
+                out[..., place, :] = rot.inv_mul(self._between(rotations, frame, index), out[..., place, :])
+        return out
 
     @cached_property
     def limits(self) -> tuple[Floats, Floats]:

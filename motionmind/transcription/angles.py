@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,10 @@ from motionmind._typing import Bools, Floats, Ints
 from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.geometry import rotations as rot
 from motionmind.transcription.bones import Bones
+
+# Turns about a segment's length that are tried, in passes: about the nearest orientation, then about the best so far.
+TURNS_DEG = (range(-100, 101, 20), range(-16, 17, 4), range(-3, 4))
+TURN_SHARE = 0.1  # of the deviation of orientations beside that of the next segment's direction, which shows
 
 
 class Positions(NamedTuple):
@@ -52,8 +57,11 @@ def write_angles(
 
     Joints are fitted from the pelvis outward. Each takes the angles that it has, in whole degrees within its limits,
     that bring its segment nearest to the recorded orientation, given how far its parent is off. So neither rounding nor
-    a missing angle, such as the knee's twist, adds up along a limb. Facings and the positions of each layer are then
-    merged: a position stands for those in which no bone differs by more than half the tolerance.
+    a missing angle, such as the knee's twist, adds up along a limb. A segment's turn about its own length, which shows
+    only in the next segment, is the one that brings that nearest: the forearm turns as the hand needs it.
+
+    Facings and the positions of each layer are then merged: a position stands for those in which no bone differs by
+    more than half the tolerance.
 
     Args:
         bones: the bones of the score's body.
@@ -69,7 +77,8 @@ def write_angles(
     has[0, 1] = False  # the pelvis's turn about the vertical, which is the facing
     fitted = rotations.copy()
     fitted[:, 0] = rot.mul(rot.about_vertical(-np.radians(facing)), fitted[:, 0])
-    segments = body.skeleton.global_rotations(fitted)
+    fit = _Fit(body, has, body.skeleton.global_rotations(fitted), fitted)
+    next_segment = _turning_segments(body, has)
     degrees = np.zeros((count, len(body.skeleton), 3))
     # The trunk first: the limbs make up for what its positions leave out.
     trunk_first = sorted(body.layers, key=lambda layer: body.paired(body.layers[layer][0]))
@@ -78,15 +87,97 @@ def write_angles(
         for joint in joints:
             parent = body.skeleton.parents[joint]
             above = body.skeleton.global_rotations(fitted)[:, parent] if joint else rot.IDENTITY
-            fitted[:, joint] = rot.inv_mul(above, segments[:, joint])
-            wanted = body.degrees_of(np.array([joint]), fitted)[:, 0]
-            limits = body.limits[0][joint], body.limits[1][joint]
-            degrees[:, joint] = np.where(has[joint], np.round(wanted).clip(*limits), 0.0) + 0.0  # no -0.0
-            fitted[:, joint] = rotations_of(body, degrees)[:, joint]
+            degrees[:, joint] = fit(joint, above)
+            if joint in next_segment:
+                degrees[:, joint] = _turn_about_length(fit, joint, next_segment[joint], above, degrees[:, joint])
+            fitted[:, joint] = fit.reach(joint, degrees[:, joint])
         if tolerance:
             _merge(bones, layer, degrees, 0.5 * tolerance, (known or {}).get(layer))
             fitted[:, joints] = rotations_of(body, degrees)[:, joints]
     return Written(facing, degrees, fitted)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Finds the angles of single joints that bring their segments nearest to recorded orientations.
+
+    Attributes:
+        body: the anatomy.
+        has: which angles its joints have [J, 3].
+        segments: recorded orientations of the segments [T, J, 4].
+        fitted: local rotations [T, J, 4]; those of joints above the one in question have their angles.
+    """
+
+    body: Anatomy
+    has: Bools
+    segments: Floats
+    fitted: Floats
+
+    def __call__(self, joint: int, above: Floats) -> Floats:
+        """Return the angles of a joint [T, 3], whole degrees within its limits, below orientations `above` [T, 4]."""
+        self.fitted[:, joint] = rot.inv_mul(above, self.segments[:, joint])
+        wanted = self.body.degrees_of(np.array([joint]), self.fitted)[:, 0]
+        return self.allowed(joint, wanted)
+
+    def allowed(self, joint: int, degrees: Floats) -> Floats:
+        """Return the nearest angles that a joint has [T, 3]."""
+        least, most = self.body.limits[0][joint], self.body.limits[1][joint]
+        return np.where(self.has[joint], np.round(degrees).clip(least, most), 0.0) + 0.0  # no -0.0
+
+    def reach(self, joint: int, degrees: Floats) -> Floats:
+        """Return the local rotations of a joint [T, 4] at these angles [T, 3]."""
+        return self.body.rotations_of(np.array([joint]), degrees[:, None], self.fitted)[:, 0]
+
+
+def _turn_about_length(fit: _Fit, joint: int, below: int, above: Floats, degrees: Floats) -> Floats:
+    """Return angles of a joint [T, 3] whose turn about its segment's length brings the segment below nearest.
+
+    Args:
+        fit: the fit.
+        joint: the joint.
+        below: the joint at the end of its segment.
+        above: orientations of the joint's parent [T, 4].
+        degrees: the angles that bring its own segment nearest [T, 3].
+    """
+    axis = _long_axis(fit.body, joint)
+    offset = fit.body.skeleton.offsets[fit.body.skeleton.children(below)[0]]
+    along = offset / rot.norm(offset)
+    wanted = rot.mul_vec(fit.segments[:, below], along)
+    best, least = degrees.copy(), np.full(len(degrees), np.inf)
+    for offsets in TURNS_DEG:
+        centre = best.copy()
+        for offset in offsets:
+            tried = centre.copy()
+            tried[:, axis] += offset
+            tried = fit.allowed(joint, tried)
+            fit.fitted[:, joint] = fit.reach(joint, tried)
+            reached = rot.mul(above, fit.fitted[:, joint])
+            end = rot.mul(reached, fit.reach(below, fit(below, reached)))
+            off = rot.norm(rot.mul_vec(end, along) - wanted) ** 2
+            for each, turned in ((joint, reached), (below, end)):
+                off += (TURN_SHARE * rot.angle(turned, fit.segments[:, each])) ** 2
+            nearer = off < least
+            best[nearer], least[nearer] = tried[nearer], off[nearer]
+    return best
+
+
+def _turning_segments(body: Anatomy, has: Bools) -> dict[int, int]:
+    """Return the joints that turn their segment about its length, with the joint below, if that lacks an angle."""
+    out = {}
+    for joint in range(len(body.skeleton)):
+        below = body.skeleton.children(joint)
+        if len(below) != 1 or has[below[0]].all() or not has[joint, _long_axis(body, joint)]:
+            continue
+        turned = np.zeros((2, len(body.skeleton), 3))
+        turned[1, joint, _long_axis(body, joint)] = 90.0
+        places = body.skeleton.positions(rotations_of(body, turned), np.zeros((2, 3)))[:, below[0]]
+        if np.allclose(*places):
+            out[joint] = below[0]
+    return out
+
+
+def _long_axis(body: Anatomy, joint: int) -> int:
+    return "xyz".index(body.anatomy(body.skeleton.names[joint])[1].long)
 
 
 def mirror_trunk(degrees: Floats) -> Floats:

@@ -16,6 +16,7 @@ from motionmind import MotionMindError, compose, read_motion, read_score
 from motionmind.body.anatomy_file import anatomy_named
 from motionmind.body.mirror import mirrored
 from motionmind.body.motion import Motion
+from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import played
 from motionmind.transcription import Transcription, transcribe
 from motionmind.transcription.angles import leads_left, mirror_trunk, write_angles
@@ -180,6 +181,22 @@ def test_angles_of_whole_degrees_come_back() -> None:
     np.testing.assert_array_equal(written.facing, degrees[:, 0, 1])
     degrees[:, 0, 1] = 0.0
     np.testing.assert_array_equal(written.degrees, degrees)
+
+
+@pytest.mark.parametrize(("turning", "below"), [("elbow", "wrist"), ("shoulder", "elbow")])
+def test_a_segment_turns_about_its_length_as_the_next_one_needs_it(turning: str, below: str) -> None:
+    bent = np.tile([0.0, 0.0, -60.0], (len(recorded()), 1))
+    hands = HUMAN.rotations({"left_wrist": bent, "right_wrist": bent})
+    rotations = recorded().rotations.copy()
+    for side, turn in (("left", 50.0), ("right", -50.0)):  # which the joint below takes back
+        joint, after, wrist = (HUMAN.named(name, side) for name in (turning, below, "wrist"))
+        rotations[:, wrist] = hands[:, wrist]
+        twist = rot.from_axis_angle([1.0, 0.0, 0.0], np.radians(turn))
+        rotations[:, joint] = rot.mul(rotations[:, joint], twist)
+        rotations[:, after] = rot.inv_mul(twist, rotations[:, after])
+    written = write_angles(BONES, rotations, 0.0)
+    off = deviations(BONES.directions(written.turned()), BONES.directions(rotations))
+    assert np.percentile(off, 99.0) < 2.5
 
 
 def test_merged_positions_are_few_and_near() -> None:
