@@ -1,7 +1,7 @@
 """Stances of a recording: in which frames each foot stands.
 
 A foot stands in a run of frames in which its leg bears the body (`motionmind.body.support`) and one of its points on
-the floor, heel, ball or tip, hardly moves.
+the floor, heel, ball or tip, hardly moves. A leg may bear the body without: while its foot turns or slides.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.contact import Posed, floor_height, pose
 from motionmind.body.limbs import limb_of_points
 from motionmind.body.motion import Motion
-from motionmind.body.support import find_bearers, size_of
+from motionmind.body.support import SUPPORT_HEIGHT_M, find_bearers, size_of
 from motionmind.body.tempo import runs_of
 from motionmind.clean.jitter import smooth
 from motionmind.footing.feet import Foot, find_free_feet, foot_points
@@ -37,12 +37,14 @@ class FootStances(NamedTuple):
         points: indices of its points (`motionmind.body.contact.contact_points`) [Q].
         speeds: speeds of its points [T, Q], m/s; points off the floor are faster than any foot.
         stances: first frame of each stance, and the frame after it.
+        bears: whether its leg bears the body, also while the foot turns or slides [T].
     """
 
     foot: Foot
     points: Indices
     speeds: Floats
     stances: list[tuple[int, int]]
+    bears: Bools
 
 
 def find_foot_stances(motion: Motion) -> tuple[Posed, list[FootStances]]:
@@ -57,14 +59,18 @@ def find_foot_stances(motion: Motion) -> tuple[Posed, list[FootStances]]:
         return posed, []
     steady = smooth(posed.places, min(STEADY_HZ, 0.4 * fps), fps)
     limb = limb_of_points(skeleton)[posed.joints]
-    bears, _, touches = find_bearers(steady, limb, size, fps, floor_heights(posed.lowest, fps))
+    floor = floor_heights(posed.lowest, fps)
+    bears, _, touches = find_bearers(steady, limb, size, fps, floor)
     out = []
     for foot in feet:
         own = np.flatnonzero(foot_points(foot, posed.joints, len(skeleton)))
         speeds = _speeds(steady[:, own], fps) + np.where(touches[:, own], 0.0, _ALOFT_MPS)
         stances = _stances(bears[:, foot.limb] & (speeds.min(axis=1) < STANDS_MPS * size), fps)
-        out.append(FootStances(foot, own, speeds, stances))
-    return posed, out
+        out.append(FootStances(foot, own, speeds, stances, _in_runs(_stances(bears[:, foot.limb], fps), len(motion))))
+    # Who is on the floor stands on something: a foot that is too fast to bear, as in a spin, bears if it is the lowest.
+    slides = ~np.any([each.bears for each in out], axis=0) & (posed.lowest < floor + SUPPORT_HEIGHT_M * size)
+    lowest = limb[steady[..., 1].argmin(axis=1)]
+    return posed, [each._replace(bears=each.bears | (slides & (lowest == each.foot.limb))) for each in out]
 
 
 def floor_heights(lowest: Floats, fps: float) -> Floats:
@@ -84,6 +90,14 @@ def _stances(bears: Bools, fps: float) -> list[tuple[int, int]]:
         if start > 0 and stop < len(bears) and stop - start < SHORTEST_SWING_S * fps:
             joined[start:stop] = True
     return [(start, stop) for start, stop in runs_of(joined) if stop - start >= max(3, SHORTEST_STANCE_S * fps)]
+
+
+def _in_runs(runs: list[tuple[int, int]], count: int) -> Bools:
+    """Return whether each of `count` frames is in one of the runs."""
+    out = np.zeros(count, dtype=np.bool_)
+    for start, stop in runs:
+        out[start:stop] = True
+    return out
 
 
 def _speeds(places: Floats, fps: float) -> Floats:

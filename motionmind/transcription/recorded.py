@@ -1,4 +1,4 @@
-"""Prepare a recording for transcription: the score's body, an even rate, the floor at 0, stances of the feet."""
+"""Prepare a recording for transcription: the score's body, an even rate, the floor at 0, the legs that bear."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Recorded:
     Attributes:
         bones: the bones of the score's body.
         motion: the recording with the score's proportions, above a level floor at height 0.
-        stands: whether the left and the right foot stand [T, 2].
+        stands: whether the left and the right leg bear the body [T, 2].
         written: the frames as the score may write them: in few words.
         writable: local rotations of the frames as the notation could write them at best, in the world [T, J, 4].
         up: height of the lowest point of each frame in the air [T], centimetres; 0 on the floor.
@@ -85,8 +85,7 @@ def prepare(motion: Motion, tolerance: float, vocabulary: Sequence[Score] = ()) 
     lowest = posed.lowest
     for found in feet:
         side = SIDES.index(body.skeleton.names[found.foot.leg[0]].partition("_")[0])
-        for start, stop in found.stances:
-            stands[start:stop, side] = True
+        stands[:, side] = found.bears
     floor = floor_heights(lowest, moved.fps) if len(moved) > 1 else lowest
     moved = replace(moved, root=moved.root - np.stack([np.zeros_like(floor), floor, np.zeros_like(floor)], axis=-1))
     bones = Bones.of(body)

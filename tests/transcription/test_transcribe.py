@@ -16,6 +16,7 @@ from motionmind import MotionMindError, compose, read_motion, read_score
 from motionmind.body.anatomy_file import anatomy_named
 from motionmind.body.mirror import mirrored
 from motionmind.body.motion import Motion
+from motionmind.clean.stances import find_foot_stances
 from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import played
 from motionmind.transcription import Transcription, transcribe
@@ -153,6 +154,18 @@ def test_a_standing_foot_stays_and_travel_is_written(tmp_path: Path) -> None:
     end = found.motion.root[-1] - found.motion.root[0]
     went = found.recording.root[-1] - found.recording.root[0]
     assert np.linalg.norm((end - went)[[0, 2]]) <= 0.04 + 0.01
+
+
+def test_a_leg_bears_also_while_its_foot_turns_or_slides() -> None:
+    turning = prepare(ballet_clip("pirouettes").resample(30.0), 6.0)
+    _, feet = find_foot_stances(turning.motion)
+    stand_still = sum(stop - start for foot in feet for start, stop in foot.stances)
+    assert stand_still < 0.9 * turning.stands.sum()
+    assert turning.stands.any(axis=1).all()
+    assert not turning.up.any()
+    jumping = prepare(ballet_clip("sautes").resample(30.0), 6.0)
+    assert 0.1 < (~jumping.stands.any(axis=1)).mean() < 0.5
+    np.testing.assert_array_equal(jumping.up > 0, ~jumping.stands.any(axis=1))
 
 
 def test_a_jump_is_written_in_the_air() -> None:
