@@ -57,13 +57,22 @@ class Composing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     text: Annotated[str, msgspec.Meta(max_length=4_000_000)]
 
 
-def write_score(_: Any, motion: Motion, tolerance: float, tempo: float) -> dict[str, Any]:
-    """Transcribe movement in a worker; return the text, and the lines and the time of each posture, seconds."""
+def write_score(
+    _: Any, motion: Motion, tolerance: float, tempo: float, corpus: str, home: Path | None
+) -> dict[str, Any]:
+    """Transcribe movement in a worker, with the positions of the corpus if that is written in scores.
+
+    Returns:
+        The text, and the lines and the time of each posture, seconds.
+    """
+    from motionmind.names.finding import open_collection
+    from motionmind.names.spelling import parse_source
     from motionmind.notation.compose import played
     from motionmind.notation.read import read_score
     from motionmind.transcription import transcribe
 
-    text = transcribe(motion, tolerance, tempo=tempo).text
+    vocabulary = open_collection(parse_source(corpus, home), home).scores
+    text = transcribe(motion, tolerance, tempo=tempo, vocabulary=vocabulary).text
     with tempfile.TemporaryDirectory(prefix="motionmind-") as folder:
         path = Path(folder) / _FILE
         path.write_text(text, encoding="utf-8")
@@ -83,10 +92,9 @@ def routes(studio: Studio) -> list[BaseRoute]:
 
     async def write(request: Request) -> Response:
         given = await body_of(request, Scoring)
-        motion = _part(studio, given.block)
-        job = studio.workers.submit(
-            "score", write_score, motion, given.tolerance, studio.project.state.tempo, finish=_shown, urgent=True
-        )
+        motion, state = _part(studio, given.block), studio.project.state
+        wishes = given.tolerance, state.tempo, state.corpus, studio.home
+        job = studio.workers.submit("score", write_score, motion, *wishes, finish=_shown, urgent=True)
         credited[job.id] = motion.credits
         while len(credited) > _MAX_SCORES:
             credited.popitem(last=False)

@@ -48,6 +48,7 @@ def test_the_piece_is_written_and_every_posture_has_its_line(served: Served) -> 
     assert found["times"][0] == 0.0
     assert found["times"][-1] == pytest.approx(seconds, abs=0.05)
     assert f"tempo   {served.project()['tempo']:g}" in found["text"]
+    assert {"fifth-leading", "demi-second"} <= set(found["text"].split())  # positions of the corpus, by their names
 
 
 def test_a_stretch_is_written_alone(served: Served) -> None:
