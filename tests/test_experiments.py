@@ -742,6 +742,58 @@ def test_files_are_compared_on_the_pairs_that_all_of_them_made() -> None:
     assert table["seconds"][0] == table["seconds"][1]
 
 
+# --- transcription ----------------------------------------------------------------------------------------------------
+
+
+def test_the_fewest_postures_follow_every_frame_and_as_many_even_ones_do_not(tmp_path: Path) -> None:
+    from experiments.harness import Setting, answer
+
+    rows = {row["method"]: row for row in answer("transcription", Setting(quick=True, data=None), Here(), tmp_path)}
+    assert rows["fewest, joined"]["followed"] == 1.0
+    assert rows["even, joined"]["followed"] < 0.95
+    assert rows["transcribe"]["postures"] == rows["even, joined"]["postures"]
+    for part in ("legs", "arms", "torso", "head"):
+        assert rows["transcribe"][part] == pytest.approx(rows["fewest, joined"][part], abs=0.2)
+        assert rows["transcribe"][part] >= rows["transcribe"][f"unwritten_{part}"] - 12.0
+
+
+def test_a_kata_is_found_again_turned_mirrored_and_without_a_step() -> None:
+    from experiments.kata.steps import aligned_supports, best_alignment, danced
+
+    kata = danced(None, "karate/heian-shodan")
+    assert [step.foot for step in kata.steps[:6]] == [0, 1, 1, 1, 0, 0]
+    assert [int(sector) for sector in kata.sectors[6:9]] == [0, 0, 0]  # age-uke, ahead
+    found = best_alignment(kata, kata.turned(3, mirrored=True))
+    assert (found.cost, found.mirrored, found.sectors) == (0.0, True, 3)
+    supports = aligned_supports(found)
+    np.testing.assert_array_equal(*supports)
+    assert set(supports[0].tolist()) == {1, 2, 3}
+    shorter = best_alignment(kata, kata.in_order(np.delete(np.arange(len(kata.steps)), 7)))
+    assert shorter.cost == 0.5
+    assert [pair for pair in shorter.pairs if None in pair] == [(7, None)]
+
+
+def test_the_recorded_kata_has_the_steps_of_the_composed_one(shared_data: Path) -> None:
+    from experiments.kata.run import work
+
+    rows = work(str(shared_data), "cmu-135/135_06", "karate/heian-shodan", None, 3)
+    paired = [row for row in rows if row["direction"] != ""]
+    assert len(paired) >= 20
+    assert all(row["foot_one"] == row["foot_other"] for row in paired)
+    assert sum(row["direction"] <= 45.0 and row["facing"] <= 45.0 for row in paired) >= 19
+
+
+def test_steps_of_bundled_kata_are_compared_and_drawn(tmp_path: Path) -> None:
+    from experiments.harness import Setting, answer
+
+    rows = answer("kata", Setting(quick=True, data=None), Here(), tmp_path)
+    assert rows[0]["agree"] > 0.9
+    assert rows[0]["random"] < 12.0
+    drawn = (tmp_path / "found.svg").read_text()
+    assert drawn.count("<circle") == 22 + 21  # the tips of the arrows
+    assert ElementTree.fromstring(drawn).tag.endswith("svg")
+
+
 # --- A* ---------------------------------------------------------------------------------------------------------------
 
 
