@@ -89,7 +89,7 @@ def prepare(motion: Motion, tolerance: float, vocabulary: Sequence[Score] = ()) 
     floor = floor_heights(lowest, moved.fps) if len(moved) > 1 else lowest
     moved = replace(moved, root=moved.root - np.stack([np.zeros_like(floor), floor, np.zeros_like(floor)], axis=-1))
     bones = Bones.of(body)
-    positions = read_positions(vocabulary, bones)
+    positions = read_positions(vocabulary, body)
     written = write_angles(bones, moved.rotations, tolerance, positions)
     up = np.where(stands.any(axis=1), 0, np.round(100.0 * np.maximum(lowest - floor, 0.0))).astype(np.int64)
     root = moved.root.copy()

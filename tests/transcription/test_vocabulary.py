@@ -97,7 +97,7 @@ def test_a_clip_of_ballet_is_mostly_ballet_and_stays_within_the_tolerance() -> N
 
 
 def test_named_positions_are_the_nearest_within_half_the_tolerance() -> None:
-    positions = read_positions(ballet(), BONES)["arms"]
+    positions = read_positions(ballet(), HUMAN)["arms"]
     exact = write_angles(BONES, ballet_clip("temps-lie").resample(30.0).rotations, 0.0).degrees
     merged = exact.copy()
     _merge(BONES, "arms", merged, 4.0, positions)
@@ -123,7 +123,7 @@ def test_named_positions_are_the_nearest_within_half_the_tolerance() -> None:
 
 
 def test_the_named_postures_of_a_score_without_clips_are_a_vocabulary() -> None:
-    positions = read_positions([read_score(bundled("corpora") / "ballet" / "vocabulary.score")], BONES)
+    positions = read_positions([read_score(bundled("corpora") / "ballet" / "vocabulary.score")], HUMAN)
     assert {"arabesque-leading", "passe-poised-leading", "on-poised"} & set(positions["legs"].words)
     assert {"bas", "fifth", "second"} <= set(positions["arms"].words)
 
