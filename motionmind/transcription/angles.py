@@ -15,7 +15,8 @@ from motionmind.transcription.bones import Bones
 
 # Turns about a segment's length that are tried, in passes: about the nearest orientation, then about the best so far.
 TURNS_DEG = (range(-100, 101, 20), range(-16, 17, 4), range(-3, 4))
-TURN_SHARE = 0.1  # of the deviation of orientations beside that of the next segment's direction, which shows
+TURN_SHARE = 0.1  # of the deviation of orientations beside that of the next segments' directions, which show
+BELOW_SHARES = (1.0, 0.1)  # of the next segment, and of the shorter one after it
 
 
 class Positions(NamedTuple):
@@ -58,7 +59,7 @@ def write_angles(
     Joints are fitted from the pelvis outward. Each takes the angles that it has, in whole degrees within its limits,
     that bring its segment nearest to the recorded orientation, given how far its parent is off. So neither rounding nor
     a missing angle, such as the knee's twist, adds up along a limb. A segment's turn about its own length, which shows
-    only in the next segment, is the one that brings that nearest: the forearm turns as the hand needs it.
+    only in the next ones, is the one that brings them nearest: the forearm turns as the hand needs it.
 
     Facings and the positions of each layer are then merged: a position stands for those in which no bone differs by
     more than half the tolerance.
@@ -130,7 +131,7 @@ class _Fit:
 
 
 def _turn_about_length(fit: _Fit, joint: int, below: int, above: Floats, degrees: Floats) -> Floats:
-    """Return angles of a joint [T, 3] whose turn about its segment's length brings the segment below nearest.
+    """Return angles of a joint [T, 3] whose turn about its segment's length brings the segments below nearest.
 
     Args:
         fit: the fit.
@@ -139,10 +140,9 @@ def _turn_about_length(fit: _Fit, joint: int, below: int, above: Floats, degrees
         above: orientations of the joint's parent [T, 4].
         degrees: the angles that bring its own segment nearest [T, 3].
     """
-    axis = _long_axis(fit.body, joint)
-    offset = fit.body.skeleton.offsets[fit.body.skeleton.children(below)[0]]
-    along = offset / rot.norm(offset)
-    wanted = rot.mul_vec(fit.segments[:, below], along)
+    skeleton, axis = fit.body.skeleton, _long_axis(fit.body, joint)
+    ends = {parent: skeleton.offsets[child] for child, parent in enumerate(skeleton.parents)}
+    chain = [(each, ends[each]) for each in (below, *skeleton.children(below)) if each in ends]
     best, least = degrees.copy(), np.full(len(degrees), np.inf)
     for offsets in TURNS_DEG:
         centre = best.copy()
@@ -150,12 +150,15 @@ def _turn_about_length(fit: _Fit, joint: int, below: int, above: Floats, degrees
             tried = centre.copy()
             tried[:, axis] += offset
             tried = fit.allowed(joint, tried)
-            fit.fitted[:, joint] = fit.reach(joint, tried)
-            reached = rot.mul(above, fit.fitted[:, joint])
-            end = rot.mul(reached, fit.reach(below, fit(below, reached)))
-            off = rot.norm(rot.mul_vec(end, along) - wanted) ** 2
-            for each, turned in ((joint, reached), (below, end)):
-                off += (TURN_SHARE * rot.angle(turned, fit.segments[:, each])) ** 2
+            turned = fit.fitted[:, joint] = fit.reach(joint, tried)
+            reached = rot.mul(above, turned)
+            off = (TURN_SHARE * rot.angle(reached, fit.segments[:, joint])) ** 2
+            for (each, along), share in zip(chain, BELOW_SHARES, strict=False):
+                reached = rot.mul(reached, fit.reach(each, fit(each, reached)))
+                apart = rot.mul_inv(reached, fit.segments[:, each])
+                wanted = rot.mul_vec(fit.segments[:, each], along / rot.norm(along))
+                off += share * rot.norm(rot.mul_vec(apart, wanted) - wanted) ** 2
+                off += share * (TURN_SHARE * rot.angle(reached, fit.segments[:, each])) ** 2
             nearer = off < least
             best[nearer], least[nearer] = tried[nearer], off[nearer]
     return best

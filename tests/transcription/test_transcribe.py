@@ -328,7 +328,7 @@ def test_recordings_come_back_within_what_is_reported(shared_data: Path, file: s
     played = found.motion.at(found.recording.times)
     off = deviations(BONES.directions(played.rotations), BONES.directions(found.recording.rotations))[:, wide]
     assert np.percentile(off.max(axis=1), 50.0) <= 6.0
-    assert np.percentile(found.deviation.centimetres, 95.0) <= 3.0
+    assert np.percentile(found.deviation.centimetres, 95.0) <= 3.5  # 3, and feet that are put on the floor
 
 
 def test_names_of_clips_are_those_that_a_score_allows() -> None:
