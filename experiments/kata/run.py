@@ -65,11 +65,11 @@ def work(data: str | None, one: str, other: str, mirror: bool | None, shuffles: 
 
 
 def _paired(aligned: Aligned) -> list[Row]:
-    """Return both steps of each pair, and by how many degrees directions and facings differ; "" for what is not."""
+    """Return both steps of each pair, and by how many degrees directions and facings differ; "" if unpaired."""
     out = []
     for i, j in aligned.pairs:
         a, b = None if i is None else aligned.one.steps[i], None if j is None else aligned.other.steps[j]
-        row = _told("one", a) | _told("other", b) | {"direction": "", "facing": ""}
+        row = _reported("one", a) | _reported("other", b) | {"direction": "", "facing": ""}
         if a and b:
             apart = 360.0 / N_SECTORS * (sector_of(np.array(a.to)) - sector_of(np.array(b.to)))
             row |= {"direction": _wrapped(float(apart)), "facing": _wrapped(a.facing - b.facing)}
@@ -100,7 +100,7 @@ def _compared(a: Ints, b: Ints) -> Row:
     }
 
 
-def _told(whose: str, step: Step | None) -> Row:
+def _reported(whose: str, step: Step | None) -> Row:
     """Return the foot, and the sectors of its direction and of the facing: nothing by which a performance is copied."""
     if step is None:
         return {f"{key}_{whose}": "" for key in ("foot", "to", "facing")}
@@ -108,7 +108,7 @@ def _told(whose: str, step: Step | None) -> Row:
     return {f"foot_{whose}": step.foot, f"to_{whose}": to, f"facing_{whose}": facing}
 
 
-# --- what is told -----------------------------------------------------------------------------------------------------
+# --- report -----------------------------------------------------------------------------------------------------
 
 
 def chart(rows: list[Row]) -> str:

@@ -29,7 +29,7 @@ TOLERANCE_DEG = 6.0  # of the transcription
 
 
 class Step(NamedTuple):
-    """One foot's way from stance to stance.
+    """The displacement of a foot from stance to stance.
 
     Attributes:
         foot: 0 left, 1 right.
@@ -144,6 +144,8 @@ def _steps_of(path: Path, name: str | None) -> Danced:
 def _steps(foot: int, times: Floats, bears: Bools, places: Floats) -> list[Step]:
     """Return the steps of a foot, given the postures in which it bears [K] and where the feet are [K, 2, 2]."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], bears.astype(np.int8), [0]]))).reshape(-1, 2)
+    if len(edges) == 0:
+        return []
     stances = [(start, stop, np.median(places[start:stop, foot], axis=0)) for start, stop in edges.tolist()]
     out, (_, left, last) = list[Step](), stances[0]
     for start, stop, place in stances[1:]:

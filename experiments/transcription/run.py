@@ -119,11 +119,11 @@ def _least_written(recording: Recorded) -> str:
 
 
 def _supported(recording: Recorded) -> Row:
-    """Return the share of frames in which no foot stands, in which the body turns, too, and in which it is in the air.
+    """Return the share of frames in which no leg bears, in which the body turns, too, and in which it is in the air.
 
     It turns if its pelvis turns by `TURNING_DEG_S`.
     """
-    motion, none = recording.motion, ~recording.stands.any(axis=1)
+    motion, none = recording.motion, ~recording.bears.any(axis=1)
     heading = np.unwrap(rot.heading(motion.rotations[:, 0]))
     turns = np.abs(np.degrees(np.gradient(heading))) * motion.fps > TURNING_DEG_S
     air = find_support(motion.skeleton, motion.rotations, motion.root, motion.fps).airborne
@@ -198,7 +198,7 @@ def tell(rows: list[Row]) -> str:
         "recordings": lambda r: r["by"],
         **{f"{part}, degrees": column(f"unwritten_{part}") for part in PARTS},
         "worst joint, clips": lambda r: _counted(r["rows"], "unwritten_joint"),
-        "no foot stands, % of frames": column("unsupported", 100.0),
+        "no leg bears, % of frames": column("unsupported", 100.0),
         "and the body turns, %": column("turning", 100.0),
         "in the air, %": column("aloft", 100.0),
     }

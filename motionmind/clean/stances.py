@@ -1,7 +1,7 @@
 """Stances of a recording: in which frames each foot stands.
 
 A foot stands in a run of frames in which its leg bears the body (`motionmind.body.support`) and one of its points on
-the floor, heel, ball or tip, hardly moves. A leg may bear the body without: while its foot turns or slides.
+the floor, heel, ball or tip, hardly moves. A leg also bears the body while its foot turns or slides.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def find_foot_stances(motion: Motion) -> tuple[Posed, list[FootStances]]:
         speeds = _speeds(steady[:, own], fps) + np.where(touches[:, own], 0.0, _ALOFT_MPS)
         stances = _stances(bears[:, foot.limb] & (speeds.min(axis=1) < STANDS_MPS * size), fps)
         out.append(FootStances(foot, own, speeds, stances, _in_runs(_stances(bears[:, foot.limb], fps), len(motion))))
-    # Who is on the floor stands on something: a foot that is too fast to bear, as in a spin, bears if it is the lowest.
+    # A body on the floor needs a support: if all feet are too fast to bear, as in a spin, the lowest one bears.
     slides = ~np.any([each.bears for each in out], axis=0) & (posed.lowest < floor + SUPPORT_HEIGHT_M * size)
     lowest = limb[steady[..., 1].argmin(axis=1)]
     return posed, [each._replace(bears=each.bears | (slides & (lowest == each.foot.limb))) for each in out]

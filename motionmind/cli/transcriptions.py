@@ -69,7 +69,7 @@ COMPARISONS = (".gif", ".mp4", ".html", ".png", ".pdf")
     section=Section.MOTION,
     metavar="SCORE|CORPUS",
     shell_complete=completion.corpora,
-    help="Use the positions of a score, or of a corpus written in scores, where they fit; repeatable.",
+    help="Use the positions of a score's clips and postures, or of a corpus of scores, where they fit; repeatable.",
     multiple=True,
 )
 @option("--report", section=Section.OUTPUT, type=FILE, help="File of the deviations over time, as JSON.")
@@ -104,6 +104,7 @@ def transcribe(
     'hero.glb#Dance'. The score has the fewest postures between which every frame is followed within the tolerance.
     docs/notation.md explains the language of scores.
     """
+    from motionmind.notation.sources import sources
     from motionmind.plots import draw_deviation
     from motionmind.transcription import transcribe as to_score
 
@@ -111,9 +112,8 @@ def transcribe(
     files: list[tuple[Path, tuple[str, ...]]] = [(path, (SCORE, *COMPARISONS)) for path in outputs]
     files += [(report, ())] if report else []
     files += [(picture, (".svg", ".png"))] if picture else []
-    words = [parse_source(word, home) for word in vocabulary]
-    check_outputs(files, [*named.source.paths, *(path for word in words for path in word.paths)])
-    scores = [score for word in words for score in _read_vocabulary(word, home)]
+    scores = [score for word in vocabulary for score in _read_vocabulary(parse_source(word, home), home)]
+    check_outputs(files, [*named.source.paths, *(path for score in scores for path in sources(Path(score.path)))])
     whole = read_movement(named.source, name, home, **options)
     frames = select_part(named, whole, start, end)
     part = whole.slice(frames.start, frames.stop)
@@ -125,7 +125,7 @@ def transcribe(
             write_atomically(report, found.report())
         if picture:
             draw_deviation(found).save(picture)
-    for line in _lines(found):
+    for line in _lines(found, bool(scores)):
         click.echo(line)
     print_written([path for path, _ in files])
 
@@ -166,7 +166,7 @@ def _write(path: Path, found: Transcription) -> None:
         write_group_film(path, found.compared())
 
 
-def _lines(found: Transcription) -> Iterator[str]:
+def _lines(found: Transcription, has_vocabulary: bool) -> Iterator[str]:
     """Format what the score holds and what it leaves out."""
     import numpy as np
 
@@ -181,7 +181,7 @@ def _lines(found: Transcription) -> Iterator[str]:
         lines = len(found.keys) - sum(each.saved for each in found.repeats)
         calls = sum(call.times for each in found.repeats for call in each.calls)
         yield f"{count(len(found.repeats), 'phrase')} danced {calls} times: {lines} lines"
-    if any(found.recognized.values()):
+    if has_vocabulary:
         shares = ", ".join(f"{share:.0%} of {part}" for part, share in found.recognized.items())
         yield f"positions of the vocabulary: {shares}"
     for part, values in found.deviation.degrees.items():

@@ -18,7 +18,7 @@ from starlette.routing import BaseRoute, Route
 
 from motionmind.body.motion import Motion
 from motionmind.credits.credit import Credit
-from motionmind.errors import MotionMindError
+from motionmind.errors import CorpusError, MotionMindError
 from motionmind.studio.api import body_of, json
 from motionmind.studio.edits import Id
 from motionmind.studio.export import composed
@@ -26,6 +26,7 @@ from motionmind.studio.reading import Order, lines_of, load_clip, load_lines
 from motionmind.studio.room import Room
 
 if TYPE_CHECKING:
+    from motionmind.notation.score import Score
     from motionmind.studio.studio import Studio
 
 _MAX_SCORES = 100  # whose credits are known
@@ -65,19 +66,29 @@ def write_score(
     Returns:
         The text, and the lines and the time of each posture, seconds.
     """
-    from motionmind.names.finding import open_collection
-    from motionmind.names.spelling import parse_source
     from motionmind.notation.compose import played
     from motionmind.notation.read import read_score
     from motionmind.transcription import transcribe
 
-    vocabulary = open_collection(parse_source(corpus, home), home).scores
-    text = transcribe(motion, tolerance, tempo=tempo, vocabulary=vocabulary).text
+    text = transcribe(motion, tolerance, tempo=tempo, vocabulary=_vocabulary(corpus, home)).text
     with tempfile.TemporaryDirectory(prefix="motionmind-") as folder:
         path = Path(folder) / _FILE
         path.write_text(text, encoding="utf-8")
         ((rows, movement),) = played(read_score(path))
     return {"text": text, "times": movement.times.tolist(), **lines_of(rows)}
+
+
+def _vocabulary(corpus: str, home: Path | None) -> list[Score]:
+    """Return a corpus's scores of the body of transcriptions; none if the corpus is missing, or holds recordings."""
+    from motionmind.body.anatomy_file import anatomy_named
+    from motionmind.names.finding import open_collection
+    from motionmind.names.spelling import parse_source
+
+    try:
+        scores = open_collection(parse_source(corpus, home), home).scores
+    except CorpusError:
+        return []
+    return [score for score in scores if score.body is anatomy_named("human23")]
 
 
 def _shown(result: dict[str, Any]) -> dict[str, Any]:

@@ -31,7 +31,7 @@ class Recorded:
     Attributes:
         bones: the bones of the score's body.
         motion: the recording with the score's proportions, above a level floor at height 0.
-        stands: whether the left and the right leg bear the body [T, 2].
+        bears: whether the left and the right leg bear the body [T, 2].
         written: the frames as the score may write them: in few words.
         writable: local rotations of the frames as the notation could write them at best, in the world [T, J, 4].
         up: height of the lowest point of each frame in the air [T], centimetres; 0 on the floor.
@@ -41,7 +41,7 @@ class Recorded:
 
     bones: Bones
     motion: Motion
-    stands: Bools
+    bears: Bools
     written: Written
     writable: Floats
     up: Ints
@@ -80,20 +80,20 @@ def prepare(motion: Motion, tolerance: float, vocabulary: Sequence[Score] = ()) 
     moved, body = to_even_human23(motion), anatomy_named("human23")
     root = moved.root * (body.skeleton.height / moved.skeleton.height)
     moved = replace(moved, skeleton=body.skeleton, root=root)
-    stands = np.zeros((len(moved), 2), dtype=np.bool_)
+    bears = np.zeros((len(moved), 2), dtype=np.bool_)
     posed, feet = find_foot_stances(moved)
     lowest = posed.lowest
     for found in feet:
         side = SIDES.index(body.skeleton.names[found.foot.leg[0]].partition("_")[0])
-        stands[:, side] = found.bears
+        bears[:, side] = found.bears
     floor = floor_heights(lowest, moved.fps) if len(moved) > 1 else lowest
     moved = replace(moved, root=moved.root - np.stack([np.zeros_like(floor), floor, np.zeros_like(floor)], axis=-1))
     bones = Bones.of(body)
     positions = read_positions(vocabulary, body)
     written = write_angles(bones, moved.rotations, tolerance, positions)
-    up = np.where(stands.any(axis=1), 0, np.round(100.0 * np.maximum(lowest - floor, 0.0))).astype(np.int64)
+    up = np.where(bears.any(axis=1), 0, np.round(100.0 * np.maximum(lowest - floor, 0.0))).astype(np.int64)
     root = moved.root.copy()
     root[:, 1] = 0.0
     root[:, 1] = 0.01 * up - lowest_point(body, written.rotations, root)[0]
     writable = write_angles(bones, moved.rotations, 0.0).turned()
-    return Recorded(bones, moved, stands, written, writable, up, root, positions)
+    return Recorded(bones, moved, bears, written, writable, up, root, positions)

@@ -104,8 +104,8 @@ def find_takes(following: Following, keys: Ints) -> list[list[Take]]:
         later: tuple[Poses, Floats, list[Ints]] | None = None  # of the next key: places, rows to go, frames to come
         for k in range(len(keys) - 1, -1, -1):
             off = (rot.norm(ahead - directions[k]) / following.allowed).max(axis=1)
-            stands = recorded.stands[keys[k]][::-1] if mirrored else recorded.stands[keys[k]]
-            off[(recorded.stands != stands).any(axis=1)] = np.inf
+            bears = recorded.bears[keys[k]][::-1] if mirrored else recorded.bears[keys[k]]
+            off[(recorded.bears != bears).any(axis=1)] = np.inf
             off[np.abs(0.01 * recorded.up + height[k] - recorded.root[:, 1]) > following.metres] = np.inf
             visits = _visits(off, -1 if mirrored else int(keys[k]))
             frames = np.concatenate([np.zeros(0, dtype=np.int64), *visits])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
 
@@ -14,9 +15,8 @@ from motionmind.transcription.angles import leads_left, mirror_trunk
 from motionmind.transcription.moves import Move
 from motionmind.transcription.recorded import Recorded
 from motionmind.transcription.repeats import Call, Repeat, Rows
-from motionmind.transcription.words import LINES, PLANTED, angle_terms, limb_word, trunk_word
+from motionmind.transcription.words import LINES, OPEN, PLANTED, angle_terms, limb_word, trunk_word
 
-OPEN = "MOVE"  # the open words of phrases: MOVE-2 is the move to the second posture
 MAX_CALL_CHARS = 100  # of a line, after which the line of a call is continued
 
 
@@ -27,19 +27,19 @@ class Vocabulary:
     Attributes:
         names: the name of each definition in use, in order.
         known: the names of positions of a given vocabulary, by their definitions.
-        taken: how often each word is in use.
+        taken: names in use, or known.
         count: how many positions were named.
         recognized: how many of these are known.
     """
 
     names: dict[str, str] = field(default_factory=dict)
     known: dict[str, str] = field(default_factory=dict)
-    taken: dict[str, int] = field(default_factory=dict)
+    taken: set[str] = field(default_factory=set)
     count: int = 0
     recognized: int = 0
 
     def __post_init__(self) -> None:
-        self.taken |= dict.fromkeys(self.known.values(), 1)
+        self.taken |= set(self.known.values())
 
     def name(self, terms: str, word: str) -> str:
         """Return the name of a position; a new one is called `word`, with a number if that is taken."""
@@ -48,8 +48,9 @@ class Vocabulary:
         if terms in self.known:
             self.names[terms] = self.known[terms]
         elif terms not in self.names:
-            self.taken[word] = number = self.taken.get(word, 0) + 1
-            self.names[terms] = word if number == 1 else f"{word}-{number}"
+            numbered = (f"{word}-{number}" for number in itertools.count(2))
+            self.names[terms] = next(one for one in itertools.chain([word], numbered) if one not in self.taken)
+            self.taken.add(self.names[terms])
         return self.names[terms]
 
 
@@ -64,18 +65,11 @@ class ScoreWriter:
 
     def __init__(self, recorded: Recorded, keys: Ints) -> None:
         self.body = recorded.bones.body
-        self.vocabulary = {
-            layer: Vocabulary(
-                known={
-                    self._terms(layer, degrees): word for word, degrees in reversed(list(zip(*positions, strict=True)))
-                }
-            )
-            for layer, positions in recorded.positions.items()
-        }
+        self.vocabulary = {layer: Vocabulary(known=self._known(layer, recorded)) for layer in self.body.layers}
         points = self.body.skeleton.positions_and_tips(recorded.written.rotations[keys], np.zeros((len(keys), 3)))
         self.cells = [
             [
-                self._limbs(layer, recorded.written.degrees[key], points[row], recorded.stands[key])
+                self._limbs(layer, recorded.written.degrees[key], points[row], recorded.bears[key])
                 if self.body.paired(joints[0])
                 else self._trunk(layer, recorded.written.degrees[key], points[row])
                 for layer, joints in self.body.layers.items()
@@ -83,7 +77,7 @@ class ScoreWriter:
             for row, key in enumerate(keys)
         ]
 
-    def _limbs(self, layer: str, degrees: Floats, points: Floats, stands: Floats) -> str:
+    def _limbs(self, layer: str, degrees: Floats, points: Floats, bears: Floats) -> str:
         """Return the cell of a pair of limbs, and add their positions to the vocabulary."""
         words = []
         for number, side in enumerate(SIDES):
@@ -91,7 +85,7 @@ class ScoreWriter:
             line = self._line(layer, points, side) * np.array([1.0 - 2.0 * number, 1.0, 1.0])
             bend = float(np.abs(degrees[self.body.named(LINES[layer][2], side)]).max())
             name = self.vocabulary[layer].name(self._terms(layer, own), limb_word(line, bend))
-            words.append(f"{name} {PLANTED}" if layer == "legs" and stands[number] else name)
+            words.append(f"{name} {PLANTED}" if layer == "legs" and bears[number] else name)
         return words[0] if words[0] == words[1] else " / ".join(words)
 
     def _trunk(self, layer: str, degrees: Floats, points: Floats) -> str:
@@ -104,6 +98,13 @@ class ScoreWriter:
             terms if left else image, trunk_word(self._line(layer, points, ""), float(own[:, 1].sum()))
         )
         return name if terms == image else f"{name} {'left' if left else 'right'}"
+
+    def _known(self, layer: str, recorded: Recorded) -> dict[str, str]:
+        """Return the names of a layer's given positions by their definitions; of several names the first."""
+        out: dict[str, str] = {}
+        for word, degrees in zip(*recorded.positions[layer], strict=True):
+            out.setdefault(self._terms(layer, degrees), word)
+        return out
 
     def _terms(self, layer: str, degrees: Floats) -> str:
         """Write the angles of a layer's joints [joints, 3] as a definition."""

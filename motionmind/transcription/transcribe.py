@@ -240,7 +240,7 @@ def _travel(
     missing = 100.0 * ((recorded.root[keys] - recorded.root[keys[0]]) - (composed.root - composed.root[0]))[:, [0, 2]]
     facing = np.radians(recorded.written.facing[keys])
     stays = np.zeros(len(keys), dtype=np.bool_)
-    stays[1:] = (recorded.stands[keys[1:]] & recorded.stands[keys[:-1]]).any(axis=1)
+    stays[1:] = (recorded.bears[keys[1:]] & recorded.bears[keys[:-1]]).any(axis=1)
     written, out = np.zeros(2), [(0, 0)]
     for row in range(1, len(keys)):
         sine, cosine = np.sin(facing[row]), np.cos(facing[row])

@@ -15,6 +15,7 @@ LINES = {
     "head": ("cervical", "atlantal_tip", ""),
 }
 PLANTED = "on"  # the position of a leg that bears weight
+OPEN = "MOVE"  # the open words of phrases: MOVE-2 is the move to the second posture
 BENT_DEG = 50.0  # a knee or elbow that bends by more is named
 TRUNK_TURNED_DEG = 20.0  # a trunk or head that turns by more is named
 UPRIGHT_DEG = 15.0  # a trunk or head that leans by less is upright

@@ -11,12 +11,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bundled_clips import ballet_clip
 from scores import BENDS
 from studio_server import Served, serving
 
 from motionmind.studio import uploads
 from motionmind.studio.project import Project
 from motionmind.studio.reading import Answer
+from motionmind.studio.scoring import write_score
 
 
 @pytest.fixture
@@ -49,6 +51,12 @@ def test_the_piece_is_written_and_every_posture_has_its_line(served: Served) -> 
     assert found["times"][-1] == pytest.approx(seconds, abs=0.05)
     assert f"tempo   {served.project()['tempo']:g}" in found["text"]
     assert {"fifth-leading", "demi-second"} <= set(found["text"].split())  # positions of the corpus, by their names
+
+
+@pytest.mark.parametrize("corpus", ["gone", "hands", "medley"])
+def test_a_corpus_without_positions_of_its_own_does_not_matter(corpus: str, tmp_path: Path) -> None:
+    motion = ballet_clip("temps-lie").resample(30.0).slice(0, 60)
+    assert write_score(None, motion, 10.0, 60.0, corpus, tmp_path)["text"]
 
 
 def test_a_stretch_is_written_alone(served: Served) -> None:

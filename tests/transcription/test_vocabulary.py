@@ -14,6 +14,7 @@ from command_line import Run
 from motionmind import read_score
 from motionmind._typing import Floats
 from motionmind.body.anatomy_file import anatomy_named
+from motionmind.body.motion import Motion
 from motionmind.bundled import bundled
 from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.notation.compose import compose
@@ -21,6 +22,7 @@ from motionmind.notation.score import Score
 from motionmind.transcription import transcribe
 from motionmind.transcription.angles import _merge, write_angles
 from motionmind.transcription.bones import Bones, deviations
+from motionmind.transcription.text import Vocabulary
 from motionmind.transcription.vocabulary import read_positions
 
 HUMAN = anatomy_named("human23")
@@ -124,14 +126,91 @@ def test_named_positions_are_the_nearest_within_half_the_tolerance() -> None:
 
 def test_the_named_postures_of_a_score_without_clips_are_a_vocabulary() -> None:
     positions = read_positions([read_score(bundled("corpora") / "ballet" / "vocabulary.score")], HUMAN)
-    assert {"arabesque-leading", "passe-poised-leading", "on-poised"} & set(positions["legs"].words)
+    assert {"arabesque-leading", "arabesque-other", "passe-poised-leading"} <= set(positions["legs"].words)
     assert {"bas", "fifth", "second"} <= set(positions["arms"].words)
+
+
+def test_a_transcription_is_the_vocabulary_of_another(tmp_path: Path) -> None:
+    first = transcribe(ballet_clip("adagio").resample(30.0).slice(0, 400), 12.0)
+    (tmp_path / "first.score").write_text(first.text)
+    score = read_score(tmp_path / "first.score")
+    words = {layer: set(positions.words) for layer, positions in read_positions([score], HUMAN).items()}
+    assert not any(" " in word or word.startswith("on-") for word in words["legs"])
+    again = transcribe(ballet_clip("adagio").resample(30.0).slice(0, 400), 12.0, vocabulary=[score])
+    assert min(again.recognized.values()) > 0.9
+    other = transcribe(ballet_clip("temps-lie").resample(30.0), 12.0, vocabulary=[score])
+    assert 0.0 < other.recognized["legs"] < 1.0
+
+
+def test_names_in_use_are_numbered_on() -> None:
+    vocabulary = Vocabulary(known={"known": "down-2"})
+    assert [vocabulary.name(terms, "down") for terms in ("a", "b", "known", "a")] == [
+        "down",
+        "down-3",
+        "down-2",
+        "down",
+    ]
+    assert (vocabulary.count, vocabulary.recognized) == (4, 1)
+
+
+OWN = """title  Own
+body   human23
+arms
+  MOVE-2    = shoulder flexion 30
+  lib-first = shoulder flexion 60
+  same      = shoulder flexion 60
+
+posture moved = neutral | MOVE-2
+posture first = neutral | lib-first
+posture same  = neutral | same
+"""
+
+
+def test_names_that_mean_something_else_or_occur_twice_change(tmp_path: Path) -> None:
+    (tmp_path / "lib.score").write_text("title Lib\nbody human23\narms\n  first = shoulder flexion 90\n")
+    own = OWN.replace("arms\n", "include lib.score as lib\narms\n", 1) + "posture lib = neutral | lib.first\n"
+    (tmp_path / "own.score").write_text(own)
+    (tmp_path / "other.score").write_text(OWN.replace("flexion 30", "flexion 45"))
+    scores = [read_score(tmp_path / name) for name in ("own.score", "other.score")]
+    found = read_positions(scores, HUMAN)["arms"]
+    assert list(found.words) == ["MOVE-2-arms", "lib-first", "same", "lib-first-2"]
+    assert np.abs(found.degrees).max(axis=(1, 2)).tolist() == [30.0, 60.0, 60.0, 90.0]  # of two scores, the first's
+    posed = HUMAN.rotations({name: np.tile([-60.0, 0.0, 0.0], (2, 1)) for name in ("left_shoulder", "right_shoulder")})
+    still = Motion(HUMAN.skeleton, posed, np.zeros((2, 3)), np.array([0.0, 0.1]), "still")
+    assert cells(transcribe(still, vocabulary=scores).text)[0][1] == "lib-first"  # and of two names, the first
+
+
+def test_the_facing_is_not_part_of_a_position(tmp_path: Path) -> None:
+    text = DANCE.replace("  1     | on | ahead", "  1 face 90 | on | ahead")
+    (tmp_path / "a.score").write_text(text)
+    (tmp_path / "b.score").write_text(DANCE)
+    turned, ahead = (read_positions([read_score(tmp_path / name)], HUMAN) for name in ("a.score", "b.score"))
+    for layer in HUMAN.layers:
+        assert turned[layer].words == ahead[layer].words
+        np.testing.assert_array_equal(turned[layer].degrees, ahead[layer].degrees)
+
+
+def test_a_vocabulary_that_no_clip_uses_is_refused(run: Run) -> None:
+    Path("defs.score").write_text("title D\nbody human23\narms\n  low = shoulder flexion 30\n")
+    done = run("transcribe", "ballet/temps-lie", "-o", "t.score", "--vocabulary", "defs.score")
+    assert done.code == 2
+    assert done.err.startswith("error: defs.score: a vocabulary needs clips or postures")
+
+
+def test_the_scores_of_a_vocabulary_are_not_overwritten(run: Run) -> None:
+    Path("own.score").write_text(DANCE)
+    before = Path("own.score").read_bytes()
+    done = run("transcribe", "ballet/temps-lie", "-o", "own.score", "--vocabulary", "own.score")
+    assert done.code == 2
+    assert Path("own.score").read_bytes() == before
 
 
 def test_a_vocabulary_of_another_body_is_refused(tmp_path: Path) -> None:
     motion = compose(own(tmp_path).path, "bows")
     insect = read_score(bundled("corpora") / "walk-hexapod" / "insect.score")
-    with pytest.raises(SkeletonError, match=r"a vocabulary must be of the body human23; .*insect\.score is of hexapod"):
+    with pytest.raises(
+        SkeletonError, match=r"a vocabulary must have the joints of human23; .*insect\.score is of hexapod"
+    ):
         transcribe(motion, vocabulary=[insect])
     with pytest.raises(MotionMindError, match="vocabulary"):
         transcribe(motion, vocabulary=["ballet"])  # type: ignore[list-item]
