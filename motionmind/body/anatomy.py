@@ -186,7 +186,7 @@ class Anatomy:
         Args:
             joints: their indices [n].
             degrees: their angles [..., n, 3].
-            rotations: local rotations [..., J, 4] of the joints above them.
+            rotations: local rotations [..., J, 4]; only those of the joints above matter.
         """
         out = to_rotations(self._conventions.of(joints), degrees)
         for index, frame in self._measured_elsewhere:
