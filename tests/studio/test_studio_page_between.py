@@ -458,4 +458,5 @@ def test_the_slider_is_as_long_amid_an_insertion_and_credits_open_to_a_finger(st
     assert boxes[0] == boxes[1] == boxes[2]
     page.get_by_test_id("open-take").click()
     summary = page.get_by_test_id("credits").locator("summary")
+    summary.wait_for()
     assert summary.bounding_box()["height"] >= 24
