@@ -38,7 +38,7 @@ def jobs(setting: Setting) -> list[dict[str, Any]]:
 
 
 def work(data: str | None, one: str, other: str, mirror: bool | None, shuffles: int) -> list[Row]:
-    """Align two kata's steps, and the first's with the second's in random orders; a row each pair of steps.
+    """Align two kata's steps, and the first's with the second's in random orders; a row for each pair of steps.
 
     `mirror` says whether the second is mirrored; None chooses.
     """
@@ -108,7 +108,7 @@ def _reported(whose: str, step: Step | None) -> Row:
     return {f"foot_{whose}": step.foot, f"to_{whose}": to, f"facing_{whose}": facing}
 
 
-# --- report -----------------------------------------------------------------------------------------------------
+# --- report -----------------------------------------------------------------------------------------------------------
 
 
 def chart(rows: list[Row]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
 
@@ -15,7 +14,7 @@ from motionmind.transcription.angles import leads_left, mirror_trunk
 from motionmind.transcription.moves import Move
 from motionmind.transcription.recorded import Recorded
 from motionmind.transcription.repeats import Call, Repeat, Rows
-from motionmind.transcription.words import LINES, OPEN, PLANTED, angle_terms, limb_word, trunk_word
+from motionmind.transcription.words import LINES, OPEN, PLANTED, angle_terms, free_name, limb_word, trunk_word
 
 MAX_CALL_CHARS = 100  # of a line, after which the line of a call is continued
 
@@ -48,8 +47,7 @@ class Vocabulary:
         if terms in self.known:
             self.names[terms] = self.known[terms]
         elif terms not in self.names:
-            numbered = (f"{word}-{number}" for number in itertools.count(2))
-            self.names[terms] = next(one for one in itertools.chain([word], numbered) if one not in self.taken)
+            self.names[terms] = free_name(word, self.taken)
             self.taken.add(self.names[terms])
         return self.names[terms]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import chain, count
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from motionmind.notation import compose
 from motionmind.notation.posture_line import Row, posture_row
 from motionmind.notation.score import Score
 from motionmind.transcription.angles import Positions, mirror_trunk
-from motionmind.transcription.words import OPEN, PLANTED
+from motionmind.transcription.words import OPEN, PLANTED, free_name
 
 
 def read_positions(scores: Sequence[Score], body: Anatomy) -> Mapping[str, Positions]:
@@ -82,8 +81,7 @@ def _one_word_each(layer: str, texts: Iterable[str]) -> list[str]:
         word = text.replace(",", "").replace(".", "-").replace(" ", "-")
         if word == PLANTED or word.startswith(f"{OPEN}-"):
             word += f"-{layer}"
-        numbered = (f"{word}-{number}" for number in count(2))
-        out.append(next(one for one in chain([word], numbered) if one not in out))
+        out.append(free_name(word, out))
     return out
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
+from itertools import chain, count
+
 import numpy as np
 
 from motionmind._typing import Floats
@@ -82,6 +85,11 @@ def angle_terms(body: Anatomy, layer: str, degrees: dict[str, Floats]) -> str:
         if len(parts) > 1:
             terms.append(" ".join(parts))
     return ", ".join(terms) or "neutral"
+
+
+def free_name(word: str, taken: Container[str]) -> str:
+    """Return a word, with the least number from 2 on if it is taken."""
+    return next(name for name in chain([word], (f"{word}-{number}" for number in count(2))) if name not in taken)
 
 
 def _plain(value: float, opposite: str) -> str:
